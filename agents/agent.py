@@ -53,6 +53,29 @@ def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) 
     return neighbour
 
 
+def own_of(config: AgentConfig, m: Measurement, P_set: float, V_set: float, saturated: tuple[int, int]) -> Own:
+    """Return the own inverter as a law sees it, with the set-points (W, V) before its step and the saturated sides."""
+    P_rated, V_nom, m_q, f_nom = config.P_rated, config.V_nom, config.m_q, config.f_nom
+    return Own(
+        config.name,
+        config.kind == "GFM",
+        m.t,
+        m.P / P_rated,
+        m.Q / P_rated,
+        m.V / V_nom,
+        (m.f - f_nom) / f_nom,
+        m_q * m.Q / P_rated,  # z
+        P_set / P_rated,
+        V_set / V_nom,
+        config.m_p,
+        m_q,
+        P_rated,
+        V_nom,
+        f_nom,
+        *saturated,
+    )
+
+
 class Agent:
     """State of one agent.
 
@@ -96,8 +119,12 @@ class Agent:
         self._known: dict[str, Nameplate] = {config.name: self.nameplate}
         self._neighbours: tuple[Iterable[str], tuple[str, ...]] = (), ()
         """The last roster, and the in-neighbours on it; forgotten when the known agents change."""
-        self._heard: dict[str, State] = {} if board is None else board
-        self._leader = config.kind == "GFM"
+        self.heard: dict[str, State] = {} if board is None else board
+        """Last state of each neighbour; one that its law did not send (`quiet`) leaves the one before."""
+        self.around: Sequence[Neighbour] = ()
+        """Neighbours in the sums of the last tick."""
+        self.saturated = (0, 0)
+        """Saturated sides of P and V at the last tick."""
         self._takes_part = config.control.acts(config.name, config.kind)
         options = config.control.degraded_communication
         self._weights = StalenessWeights(options)
@@ -115,6 +142,16 @@ class Agent:
         """Own island at the last two measurements, the latest first."""
         self._apart: frozenset[str] = frozenset()
         """Neighbours out of step."""
+
+    @property
+    def weighs_alike(self) -> bool:
+        """Whether every state has the weight 1, whatever its age."""
+        return self._weights.all_count
+
+    @property
+    def watches_saturation(self) -> bool:
+        """Whether the sides on which its inverter is saturated count."""
+        return self._stops
 
     def knows(self, name: str) -> bool:
         """Whether the nameplate of an agent is known."""
@@ -140,7 +177,7 @@ class Agent:
         self._drop(name)
 
     def _drop(self, name: str) -> None:
-        self._heard.pop(name, None)
+        self.heard.pop(name, None)
         self._weights.forget(name)
         if self._detector is not None:
             self._detector.forget(name)
@@ -157,7 +194,7 @@ class Agent:
         A state is older than the own measurement. When all inverters change from one island to another, an agent would
         leave out all neighbours for a tick; so the previous island counts too.
         """
-        state = self._heard.get(name)
+        state = self.heard.get(name)
         if state is not None and state.island == OFF:
             return False
         if state is None or self._detector is not None:
@@ -190,7 +227,7 @@ class Agent:
         """Note the latest state of an agent whose nameplate is known; `wire.admission` has checked the sender."""
         if state.quiet:
             return  # its law sends nothing: its last state stays valid
-        self._heard[state.sender] = state
+        self.heard[state.sender] = state
         if self._weights.ages_count:
             self._weights.arrived(state.sender)
 
@@ -215,6 +252,7 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
+        self.around = ()
         if self.graph_error:
             news = self.graph_error if self.graph_error != self._reported_graph_error else ""
             self._reported_graph_error = self.graph_error
@@ -235,6 +273,7 @@ class Agent:
             self._saturation_V.begin()
             self._law_runs = False
         around = self._around(measurement.t, neighbours, ages)  # on hold too, to learn the usual ages of links
+        self.around = around
         shared, send = NOTHING, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
@@ -283,8 +322,8 @@ class Agent:
             detector.restart()
         detector.sensed(t, measurement.f)
         for name in neighbours:
-            if name in self._heard:
-                detector.heard(name, self._heard[name].t, self._heard[name].angle)
+            if name in self.heard:
+                detector.heard(name, self.heard[name].t, self.heard[name].angle)
         return frozenset(name for name in neighbours if detector.apart(name, t))
 
     def _own(self, m: Measurement) -> Own:
@@ -292,31 +331,12 @@ class Agent:
         config, e = self.config, (m.f - self.config.f_nom) / self.config.f_nom
         assert self._P_set is not None
         assert self._V_set is not None
-        P_saturated, V_saturated = self._saturated_sides(m, e) if self._stops else (0, 0)
-        P_rated, V_nom, m_q = config.P_rated, config.V_nom, config.m_q
-        return Own(
-            config.name,
-            self._leader,
-            m.t,
-            m.P / P_rated,
-            m.Q / P_rated,
-            m.V / V_nom,
-            e,
-            m_q * m.Q / P_rated,  # z
-            self._P_set / P_rated,
-            self._V_set / V_nom,
-            config.m_p,
-            m_q,
-            P_rated,
-            V_nom,
-            config.f_nom,
-            P_saturated,
-            V_saturated,
-        )
+        self.saturated = self._saturated_sides(m, e) if self._stops else (0, 0)
+        return own_of(config, m, self._P_set, self._V_set, self.saturated)
 
     def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
         """Return the neighbours that count, with the age (s) and the weight of their last states."""
-        heard, known, islands = self._heard, self._known, self._islands
+        heard, known, islands = self.heard, self._known, self._islands
         if self._detector is None and self._islands_from_switches and islands[0]:  # as `shares_island`, in one go
             here = [
                 state

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from wire.journal import RecordLevel
 from wire.plugins.plugin import Plugin
 from wire.schema.plausible import Plausible, Range, Unit
 from wire.schema.relations import Below
@@ -201,6 +202,8 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     Empty: none."""
     max_age: float = MAX_AGE
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""
+    record: RecordLevel = "physics"
+    """What the journal of this process has, for a recorder."""
 
     def by_own_clock(self) -> AgentConfig:
         """Return the configuration in simulated time, where a clock that is off makes the period seem longer."""

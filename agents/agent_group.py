@@ -12,11 +12,13 @@ from collections.abc import Iterable, Sequence
 
 from agents.agent import Agent
 from agents.agent_config import AgentConfig
+from agents.decision_journal import DecisionJournal
 from agents.graphs import GraphError, RosterGraph
 from agents.laws.law import Law
 from agents.own_nameplate import check_nameplate
 from agents.topology import rule_of, without_missing
-from wire.messages import Measurement, State
+from wire.journal import JournalBuffer
+from wire.messages import Journal, Measurement, State
 
 
 class AgentGroup:
@@ -45,6 +47,19 @@ class AgentGroup:
         self._neighbours: dict[str, tuple[str, ...]] = dict.fromkeys(self._agents, ())
         """In-neighbours of each agent at the next tick; at the first one, no state is there yet."""
         self._listens = self._meet(configs)
+        self._journals: dict[str, DecisionJournal] = {}
+        """Journal of each agent, if they keep any."""
+        self._usual: set[str] = set()
+        """Agents that decide as usual: with the last states of all in-neighbours, each with the same weight."""
+        self._counts = [len(names) for names in self._listens.values()]
+        """Number of in-neighbours of each agent."""
+        self._all_told = False
+        """Whether all agents had a state for their neighbours at the last tick."""
+        self._parts = 0
+        self._changed: list[State] = []
+        """States whose decisions were noted since the journals were taken."""
+        if any(config.record != "physics" for config in configs):
+            self._journals = {name: DecisionJournal(agent, JournalBuffer()) for name, agent in self._agents.items()}
         self._notes_arrivals = any(agent.notes_arrivals for agent in self._agents.values())
 
     def _meet(self, configs: Sequence[AgentConfig]) -> dict[str, tuple[str, ...]]:
@@ -66,6 +81,8 @@ class AgentGroup:
         """Return the decision of each agent that has a measurement of this tick."""
         agents, neighbours = self._agents, self._neighbours
         states = [agents[measured.to].tick(measured, neighbours[measured.to]) for measured in measurements]
+        if self._journals:
+            self._note_decisions(states)
         told = {state.sender: state for state in states if not (state.idle or state.quiet)}
         self._board.update(told)
         if self._notes_arrivals:
@@ -73,5 +90,38 @@ class AgentGroup:
                 for other in self._listens[name]:
                     if other in told:
                         agent.hear(told[other])
-        self._neighbours = self._listens
+        if self._neighbours is not self._listens:
+            self._neighbours = self._listens
+            self._usual.clear()
+        self._all_told = len(told) == len(agents)
         return states
+
+    def take_journals(self) -> tuple[Journal, ...]:
+        """Take out the parts of all journals since the last call; mostly there are none."""
+        if not self._changed:
+            return ()
+        changed, self._changed = self._changed, []
+        journals = []
+        for state in changed:
+            for data in self._journals[state.sender].journal.take_parts():
+                journals.append(Journal(sender=state.sender, epoch=state.epoch, seq=self._parts, t=state.t, data=data))
+        self._parts += bool(changed)
+        return tuple(journals)
+
+    def _note_decisions(self, states: Sequence[State]) -> None:
+        """Note how each agent decided, where that changed; mostly a look at all of them suffices."""
+        if (
+            self._all_told
+            and len(self._usual) == len(states)
+            and [len(agent.around) for agent in self._agents.values()] == self._counts
+        ):
+            return
+        for state in states:
+            name = state.sender
+            journal = self._journals[name]
+            if journal.tick(state.seq, 0, self._neighbours[name]):
+                self._changed.append(state)
+            if journal.is_usual:
+                self._usual.add(name)
+            else:
+                self._usual.discard(name)

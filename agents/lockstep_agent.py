@@ -26,11 +26,13 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from agents.agent_config import AgentConfig
 from agents.agent_node import AgentNode
+from agents.decision_journal import DecisionJournal
 from agents.graphs import GraphError
 from agents.known_agents import KnownAgents
 from agents.laws.law import Law
 from agents.topology import in_neighbours, is_pairwise
 from wire.codec import RejectedError, decode, encode
+from wire.journal import JournalBuffer
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.node import Route
@@ -75,6 +77,9 @@ class LockstepAgent(AgentNode):
         self.members = self._known.members
         if config.clock_rate != 1.0:  # its periods seem longer to it than they are
             self._agent = Agent(config.by_own_clock(), law)
+        if config.record != "physics":
+            self.journal = JournalBuffer()
+            self._decisions = DecisionJournal(self._agent, self.journal)
         self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
         self._last_heard = self._barrier.last_heard
@@ -115,7 +120,8 @@ class LockstepAgent(AgentNode):
     @property
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
-        return self.keys.ready(self._name), self.keys.state(self._name), self.keys.report(self._name)
+        keys, name = self.keys, self._name
+        return keys.ready(name), keys.state(name), keys.report(name), keys.journal(name)
 
     @property
     def messages_needed(self) -> int:
@@ -243,6 +249,7 @@ class LockstepAgent(AgentNode):
     def _report_the_last(self) -> None:
         if not self._reported:
             self._reported = True
+            self._publish_decisions()
             self._report_links(final=True)
 
     # ---------------------------------------------------------------- getting ready
@@ -379,13 +386,30 @@ class LockstepAgent(AgentNode):
             neighbours = self._neighbours
             if self._neighbours_of is not self._processes:
                 neighbours = tuple(name for name in neighbours if name in self._processes)
+            seq = measured.seq
             if measured is not grant:
                 measured = replace(measured, seq=grant.seq, t=grant.t)
             state = self._agent.tick(measured, neighbours)
+            if self.journal is not None:
+                self._note_decision(grant.seq, grant.seq - seq, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
         if (grant.seq + 1) % REPORT_TICKS == 0:
+            self._publish_decisions()
             self._report_links()
         self._await_next(grant, now)
+
+    def _note_decision(self, tick: int, measurement: int, neighbours: tuple[str, ...]) -> None:
+        """Note a decision, before its state is sent.
+
+        Without emulated links entries are rare, and none may wait: once the plant has the last state, the run is over.
+        """
+        if self._decisions.tick(tick, measurement, neighbours) and self._links is None:
+            self._publish_decisions()
+
+    def _publish_decisions(self) -> None:
+        """Send the journal; with emulated links an empty one too, as it says up to when nothing has changed."""
+        t = time_of(self._tick or 0, self._config.T_c)
+        self._publish_journal(self.keys.journal(self._name), self._config.epoch, t, empty=self._links is not None)
 
     def _await_next(self, grant: Measurement, now: float) -> None:
         """Start the wait for the next tick: it needs the states of this one, and some may be here already."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Sequence
 
 from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
@@ -31,12 +31,16 @@ class DirectPlant(LockstepPlant):
     def begin_tick(self) -> list[Measurement]:
         """Return the measurements of this tick, one for each agent."""
         measurements = list(self._measurements())
+        if self._tick_traffic is not None:
+            self._tick_traffic.measured(measurements)
         if self.tick == 0:
             self._report(final=False)
         return measurements
 
-    def end_tick(self, states: Iterable[State]) -> None:
+    def end_tick(self, states: Sequence[State]) -> None:
         """Hold the set-points of these states and advance; at the end of the run, or if the plant breaks, be over."""
+        if self._tick_traffic is not None:
+            self._tick_traffic.decided(states)
         for state in states:
             self._note_state(state)
             if not state.idle:

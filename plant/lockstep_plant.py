@@ -25,9 +25,10 @@ from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.telemetry_reporter import measurement_of
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, Nameplate, Prepare, Ready, State
+from wire.messages import PLANT, AnyMessage, Journal, LinkReport, Measurement, Nameplate, Prepare, Ready, State
 from wire.node import Route
 from wire.timing.tick_barrier import Awaited, TickBarrier
+from wire.traffic import TickTraffic
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
 
@@ -72,8 +73,12 @@ class LockstepPlant(PlantNode):
             self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
             self.routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
             self.routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            self.routes[self.keys.journal(name)] = Route(name, (Journal,), self._on_journal)
         self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
+        self._tick_traffic: TickTraffic | None = None
+        if self.journal is not None:
+            self._tick_traffic = self.traffic = TickTraffic(self.keys, self._everyone, self.journal)
         self._measurement_keys = {name: self.keys.measurement(name) for name in self._everyone}
 
     # ---------------------------------------------------------------- what the driver needs
@@ -308,6 +313,8 @@ class LockstepPlant(PlantNode):
 
     def _finish_tick(self, now: float) -> None:
         """Hold the set-points and advance."""
+        if self._tick_traffic is not None:
+            self._tick_traffic.ticked(self.tick)
         self._states.update((state.sender, state) for state in self._late_states(self.t))
         for name in self._roster:
             if (state := self._states.get(name)) is not None:
@@ -321,6 +328,7 @@ class LockstepPlant(PlantNode):
             self._close("end of the scenario", now)
         elif self.tick % TELEMETRY_TICKS == 0:
             self._report(final=False)
+            self._report_journal()
             if self.tick % REPORT_TICKS == 0:
                 self._report_links()
 
@@ -330,6 +338,8 @@ class LockstepPlant(PlantNode):
         self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents)
 
     def _close(self, reason: str, now: float) -> None:
+        if self._tick_traffic is not None:
+            self._tick_traffic.ticked(self.tick)
         self._tell_the_end(reason)
         self.phase = "closing"
         self._barrier.wait_for({}, now)

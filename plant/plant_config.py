@@ -11,6 +11,7 @@ from plant.equipment.inverter_parameters import GfmParameters as GfmParameters
 from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
 from plant.simulator import Simulator
+from wire.journal import RecordLevel
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 
@@ -192,3 +193,5 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Wall-clock: whether the run breaks when it cannot keep pace."""
     agent_configs: dict[str, dict[str, Any]] = {}
     """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""
+    record: RecordLevel = "physics"
+    """What the journal of this process has, for a recorder."""

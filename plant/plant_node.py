@@ -16,9 +16,10 @@ from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
 from plant.telemetry_reporter import Reporter
 from wire.codec import encode
+from wire.journal import JournalBuffer
 from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, LinkReport, Pacing, PlantEvent, State, Stop
+from wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop
 from wire.node import Node
 from wire.printable import printable
 from wire.timing.clock import ticks_until, time_of
@@ -65,6 +66,8 @@ class PlantNode(Node):
         """All present tokens of agents and recorders, refused ones too."""
         self._schedule = AgentSchedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
+        if config.record != "physics":
+            self.journal = JournalBuffer()
         self._last_due = False
         """Whether the run has ended and the last telemetry is still to be sent."""
 
@@ -82,6 +85,7 @@ class PlantNode(Node):
 
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared; of two processes of one name the first takes part."""
+        self._note_token(key, now, appeared=True)
         match self.keys.parts(key):
             case ("alive", "recorder", name):
                 self._tokens.add(key)
@@ -99,6 +103,7 @@ class PlantNode(Node):
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
         self._tokens.discard(key)
+        self._note_token(key, now, appeared=False)
         match self.keys.parts(key):
             case ("alive", "recorder", name):
                 self._recorders.discard(name)
@@ -179,6 +184,14 @@ class PlantNode(Node):
         if report.final:
             self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
+    def _on_journal(self, journal: Journal, payload: bytes, now: float) -> None:
+        """Pass on a part of an agent's journal."""
+        self._publish(self.keys.telemetry, payload)
+
+    def _report_journal(self) -> None:
+        """Send the own journal since the last report."""
+        self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
+
     def _report_links(self, *, last: bool = False) -> None:
         """Send the account of the emulated links to the plant since the last report."""
         self._publish_link_reports(self.keys.telemetry, self._links, self.config.epoch, t=self.t, last=last)
@@ -230,5 +243,6 @@ class PlantNode(Node):
         """Send the last telemetry, unless it is sent already."""
         if self._last_due:
             self._last_due = False
+            self._report_journal()
             self._report_links(last=True)
             self._report(final=True)

@@ -10,6 +10,7 @@ import platform
 import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from importlib import metadata
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
@@ -21,14 +22,17 @@ from plant.realtime.pacer import sentence
 from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_info import RecordInfo
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
 from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugin_keys import claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
+from wire.journal import RecordLevel
 from wire.messages import Pacing, Telemetry
 
 if TYPE_CHECKING:
@@ -66,6 +70,8 @@ class Request(RunMetrics):
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
     self_check: bool = False
     """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
+    record: RecordLevel = "all"
+    """What the record of each case has; see `wire.journal.RecordLevel`."""
     outside: tuple[str, ...] | None = None
     """Inverters that federates of a HELICS federation control instead of our agents; None for a run without HELICS."""
     lasting: bool = True
@@ -208,8 +214,9 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
     """Run one case by the driver asked for, and record it."""
     time = request.scenario.time
     plant, agents = _configs(request, case)
+    record = _record_info(request, case, plant, agents)
     self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
-    with Recorder(request.folder / case, self_check=self_check) as recorder:
+    with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
 
         def note(telemetry: Telemetry) -> None:
             recorder(telemetry)
@@ -220,18 +227,47 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             if request.driver == "inprocess":
                 from scenarios.drivers.inprocess import run_inprocess
 
-                outcome = run_inprocess(plant, agents, note, on_links=recorder)
+                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder)
             else:
                 from scenarios.drivers.process_driver import run_processes
 
                 outcome = run_processes(
-                    plant, agents, request.folder / "log" / case, note, on_links=recorder, shared=request.processes
+                    plant,
+                    agents,
+                    request.folder / "log" / case,
+                    note,
+                    on_links=recorder,
+                    on_journal=recorder,
+                    shared=request.processes,
                 )
             if outcome.broke:
                 raise BrokenRunError(f"case {case}: {outcome.broke}")
-            return recorder.finish(time.end_s, time.record_s), outcome
+            recorded = recorder.finish(time.end_s, time.record_s)
+            if recorder.record_failure:
+                outcome = dataclasses.replace(
+                    outcome, notes=(*outcome.notes, f"{recorder.record_failure}; the run went on without it")
+                )
+            return recorded, outcome
         except RecordError as error:
             raise BrokenRunError(f"case {case}: {error}") from error
+
+
+def _record_info(request: Request, case: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> RecordInfo:
+    """Return what the record of a case says about its run."""
+    scenario, real = request.scenario, request.clock == "wall"
+    return RecordInfo(
+        level=plant.record,
+        scenario=scenario.name,
+        case=case,
+        toml=to_toml(scenario, _as_run(request)),
+        seed=scenario.seed,
+        driver=request.driver,
+        versions=versions(),
+        inverters=tuple(row.name for row in inverters_of(scenario, request.feeder)),
+        plant=plant,
+        agents=agents,
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",
+    )
 
 
 def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
@@ -239,6 +275,8 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
     real = request.clock == "wall"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
+    plant = msgspec.structs.replace(plant, record=request.record)
+    agents = tuple(msgspec.structs.replace(agent, record=request.record) for agent in agents)
     if request.outside is not None:
         plant = msgspec.structs.replace(
             plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)

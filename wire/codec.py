@@ -76,6 +76,12 @@ def encode(message: Message) -> bytes:
     return body + crc32(body).to_bytes(CRC, "little")
 
 
+def payload_of(message: AnyMessage) -> bytes:
+    """Return the bytes as which a message came, if none has come since; else those that `encode` makes."""
+    payload, latest = _latest
+    return payload if message is latest and payload is not None else encode(message)
+
+
 def decode(payload: bytes) -> AnyMessage:
     """Return the message of a payload, whole and within its bounds; raise RejectedError for any other payload.
 

@@ -100,6 +100,10 @@ class Keys:
         """Return the key of reports on the emulated links into an agent."""
         return f"{self._root}/report/{inverter}"
 
+    def journal(self, inverter: str) -> str:
+        """Return the key of an agent's journal."""
+        return f"{self._root}/journal/{inverter}"
+
     def link_request(self, inverter: str) -> str:
         """Return the key of commands to the emulated links into an agent."""
         return f"{self._root}/link_request/{inverter}"
@@ -231,12 +235,16 @@ def describe() -> tuple[KeySpec, ...]:
             "wall-clock: instead of state, at a tick at which the law sends nothing to the neighbours",
         ),
         row(
-            keys.telemetry, "publication", "Telemetry, LinkReport, LinkRequest", "plant", "recorders",
+            keys.telemetry, "publication", "Telemetry, LinkReport, Journal, LinkRequest", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
         ),
         row(
             keys.report(agent), "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
             "in a run with emulated links: every 100 ticks, and when it ends",
+        ),
+        row(
+            keys.journal(agent), "publication", "Journal", "agent", "plant, which publishes it on telemetry",
+            "in a recorded run: when the way in which the agent decides changes; wall-clock: every 0.2 s",
         ),
         row(
             keys.link_request(agent), "publication", "LinkRequest", "plant", "agent",

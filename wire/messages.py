@@ -219,6 +219,13 @@ class LinkReport(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_
             raise ValueError("instance: the last part must name the instance that gets its acknowledgement")
 
 
+class Journal(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
+    """A part of the sender's journal (agent -> plant -> recorders; plant -> recorders). `seq` counts the parts."""
+
+    data: Data
+    """Entries, one after the other (`wire.journal`), for the record; no core reads them."""
+
+
 class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A command to emulated links for messages sent at `t` or later; number 0 asks for status (plant -> agent)."""
 
@@ -410,6 +417,7 @@ AnyMessage = (
     | Stop
     | Leave
     | LinkReport
+    | Journal
     | LinkRequest
     | LinkAcknowledgement
     | Command
@@ -420,7 +428,7 @@ AnyMessage = (
 """Every type of message."""
 
 MESSAGES = (
-    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, LinkRequest, LinkAcknowledgement,
-    Command, Answer, AgentStatus, Telemetry,
+    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, Journal, LinkRequest,
+    LinkAcknowledgement, Command, Answer, AgentStatus, Telemetry,
 )  # fmt: skip
 """The types of `AnyMessage`, for documentation made from the code."""

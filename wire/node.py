@@ -26,10 +26,12 @@ from typing import Any, NamedTuple
 from wire.actions import Action, Fetch, Log, Publish
 from wire.admission import Admission
 from wire.codec import RejectedError, RejectedMessages, decode, encode
+from wire.journal import JournalBuffer
 from wire.keys import Keys
 from wire.links import Links
 from wire.membership import Membership
-from wire.messages import AnyMessage, LinkReport, Message, Nameplate
+from wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
+from wire.traffic import Traffic
 
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
@@ -73,6 +75,11 @@ class Node:
         self.members = Membership(self.admission)
         self._name = name
         self.routes: dict[str, Route] = {}
+        self.journal: JournalBuffer | None = None
+        """Entries for the record since the last part; None if this node keeps no journal."""
+        self.traffic: Traffic | None = None
+        """Notes messages and tokens in the journal; None if nobody records them here."""
+        self._journal_parts = 0
         self._actions: list[Action | Log] = []
 
     @property
@@ -106,6 +113,7 @@ class Node:
         """Take a message; count and drop it if it cannot be used. After the end, ignore it."""
         if self.finished:
             return
+        rejected_as = ""
         try:
             route = self.routes.get(key)
             if route is None:
@@ -120,10 +128,14 @@ class Node:
             route.handle(message, payload, now)
             self._used(message, now)
         except RejectedError as rejected:
+            rejected_as = rejected.kind
             self.rejects.add(rejected.kind, key, rejected.text)
         except Exception as error:
             # The last line of defence: an error of ours rejects the message that raised it, and nothing else.
+            rejected_as = "failed"
             self.rejects.failed(key, error)
+        if self.traffic is not None:
+            self.traffic.received(key, payload, now, rejected_as)
 
     @property
     def watched(self) -> str:
@@ -169,7 +181,21 @@ class Node:
         """Note a message that was used."""
 
     def _publish(self, key: str, payload: bytes) -> None:
+        if self.traffic is not None:
+            self.traffic.sent(key, payload)
         self._actions.append(Publish(key, payload))
+
+    def _note_token(self, key: str, now: float, *, appeared: bool) -> None:
+        if self.traffic is not None and self.keys.parts(key):
+            self.traffic.token(key, now, appeared=appeared)
+
+    def _publish_journal(self, key: str, epoch: int, t: float, *, empty: bool = False) -> None:
+        """Publish the journal since the last part, if there is anything in it, or also if it is `empty`."""
+        if self.journal is None:
+            return
+        for data in self.journal.take_parts() or ([b""] if empty else []):
+            self._publish(key, encode(Journal(sender=self._name, epoch=epoch, seq=self._journal_parts, t=t, data=data)))
+            self._journal_parts += 1
 
     def _publish_link_reports(
         self, key: str, links: Links | None, epoch: int, *, t: float = 0.0, instance: str = "", last: bool = False

@@ -16,7 +16,7 @@ from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
 from wire.actions import Publish
 from wire.codec import decode
-from wire.messages import Telemetry
+from wire.messages import Journal, Telemetry
 
 
 def messages_decide(plant: PlantConfig, agents: Sequence[AgentConfig]) -> bool:
@@ -31,6 +31,7 @@ def run_direct(
     laws: Sequence[Law],
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
+    on_journal: Callable[[Journal], None] = lambda journal: None,
 ) -> DirectPlant:
     """Run to the end; return the plant's core.
 
@@ -46,6 +47,8 @@ def run_direct(
         The plant at t = 0.
     on_telemetry : Callable[[Telemetry], None]
         Takes the plant's telemetry.
+    on_journal : Callable[[Journal], None], optional
+        Takes the journals, if the configurations ask for them.
     """
     core = DirectPlant(config, plant)
     place = {name: i for i, name in enumerate(config.agents)}
@@ -53,9 +56,14 @@ def run_direct(
     group = AgentGroup([agents[i] for i in order], [laws[i] for i in order])
     while not core.finished:
         core.end_tick(group.tick(core.begin_tick()))
+        for journal in group.take_journals():
+            on_journal(journal)
         for action in core.take_actions():
             if isinstance(action, Publish) and action.key == core.keys.telemetry:
                 message = decode(action.payload)
+                if isinstance(message, Journal):
+                    on_journal(message)
+                    continue
                 assert isinstance(message, Telemetry)
                 on_telemetry(message)
     return core

@@ -27,7 +27,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulated_links import links_of
 from wire.actions import Action, Fetch, Listen, Log, Publish
 from wire.codec import decode
-from wire.messages import PLANT, LinkReport, Nameplate, PlantEvent, Telemetry
+from wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
 
 SHOWN = 5
 """Missing messages that an error names."""
@@ -49,6 +49,8 @@ class InprocessBus:
         Takes the plant's telemetry.
     on_links : Callable[[LinkReport], None]
         Takes the reports of emulated links.
+    on_journal : Callable[[Journal], None]
+        Takes the journals of the nodes.
     newcomer : Callable[[str], LockstepAgent]
         Makes the core of an agent that the plant awaits while the run goes on.
     known : KnownAgents
@@ -61,13 +63,14 @@ class InprocessBus:
         agents: Iterable[LockstepAgent],
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
+        on_journal: Callable[[Journal], None],
         newcomer: Callable[[str], LockstepAgent],
         known: KnownAgents,
     ) -> None:
         self._plant, self._agents = plant, list(agents)
         self._newcomer, self._known = newcomer, known
         self._awaited: list[str] = []
-        self._on_telemetry, self._on_links = on_telemetry, on_links
+        self._on_telemetry, self._on_links, self._on_journal = on_telemetry, on_links, on_journal
         self._subscribers: defaultdict[str, list[_Node]] = defaultdict(list)
         self._telemetry = plant.keys.telemetry
         self._nameplates: dict[str, bytes] = {}
@@ -113,7 +116,7 @@ class InprocessBus:
         self._nameplates[nameplate] = answer
         _, _, inverter, instance = self._plant.keys.parts(name)
         keys = self._plant.keys
-        for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter)):
+        for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter), keys.journal(inverter)):
             if self._plant not in self._subscribers[key]:
                 self._subscribers[key].append(self._plant)
         self._plant.appeared(name, 0.0)
@@ -137,6 +140,8 @@ class InprocessBus:
                         self._on_telemetry(message)
                     elif isinstance(message, LinkReport):
                         self._on_links(message)
+                    elif isinstance(message, Journal):
+                        self._on_journal(message)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(((side,), action.key, self._nameplates[action.key]))
@@ -164,6 +169,7 @@ def run_inprocess(
     on_telemetry: Callable[[Telemetry], None],
     *,
     on_links: Callable[[LinkReport], None] = lambda report: None,
+    on_journal: Callable[[Journal], None] = lambda journal: None,
     plant: PlantLike | None = None,
     messages: bool = False,
 ) -> Outcome:
@@ -179,6 +185,8 @@ def run_inprocess(
         Called with every telemetry message as it comes; the first at t = 0.
     on_links : Callable[[LinkReport], None], optional
         Called with every report of emulated links.
+    on_journal : Callable[[Journal], None], optional
+        Called with every part of a node's journal, if the configurations ask for journals.
     plant : PlantLike, optional
         A plant at t = 0 to use instead of building the configuration's.
     messages : bool, optional
@@ -216,11 +224,11 @@ def run_inprocess(
         agents: list[LockstepAgent] = []
         side: LockstepPlant
         if messages or messages_decide(plant_config, tuple(known.values())):
-            side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_links)
+            side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_links, on_journal)
         else:
             for config in known.values():
                 laws.append(make_law(config.control))
-            side = run_direct(plant_config, tuple(known.values()), laws, plant, note)
+            side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_journal)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     return Outcome(
@@ -242,6 +250,7 @@ def _run_on_bus(
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
     on_links: Callable[[LinkReport], None],
+    on_journal: Callable[[Journal], None],
 ) -> LockstepPlant:
     """Run with messages; return the plant's core, and add the agents' cores and their laws to the lists."""
     side = LockstepPlant(plant_config, plant, links_of(PLANT, plant_config.links))
@@ -262,7 +271,7 @@ def _run_on_bus(
         agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
         return agents[-1]
 
-    InprocessBus(side, agents, on_telemetry, on_links, newcomer, known_agents).run()
+    InprocessBus(side, agents, on_telemetry, on_links, on_journal, newcomer, known_agents).run()
     return side
 
 

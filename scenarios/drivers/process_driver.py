@@ -20,7 +20,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from scenarios.drivers.telemetry_stream import Recordable
-from wire.messages import PLANT, LinkReport, PlantEvent, Telemetry
+from wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
@@ -47,6 +47,7 @@ def run_processes(
     on_status: Callable[[str], None] | None = None,
     on_start: Callable[[Children], None] | None = None,
     on_links: Callable[[LinkReport], None] = lambda report: None,
+    on_journal: Callable[[Journal | LinkRequest], None] = lambda message: None,
     plant_command: Sequence[str] = (),
     shared: int = 0,
     star: bool = True,
@@ -75,6 +76,8 @@ def run_processes(
         Called once all processes are started; tests inject faults here.
     on_links : Callable[[LinkReport], None], optional
         Called with every report of emulated links.
+    on_journal : Callable[[Journal | LinkRequest], None], optional
+        Called with every part of a node's journal, if the configurations ask for journals, and every link command.
     plant_command : Sequence[str], optional
         Arguments of the interpreter for another plant than the usual one; tests have smaller ones.
     shared : int, optional
@@ -106,7 +109,7 @@ def run_processes(
     if sorted(order) != sorted([PLANT, *first]):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
-    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_status)
+    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_journal, on_status)
     try:
         with Supervisor(
             plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command, shared=shared
@@ -131,6 +134,7 @@ class _ProcessDriver:
         config: PlantConfig,
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
+        on_journal: Callable[[Journal | LinkRequest], None],
         on_status: Callable[[str], None] | None,
     ) -> None:
         self.client = TelemetryClient(RECORDER, config.run, config.listen[0], config.clock, self._take)
@@ -142,6 +146,7 @@ class _ProcessDriver:
         if self._wall:
             self._plant_deadline += config.wait_for_agents + 2.0 * config.T_c / config.speed
         self._on_telemetry, self._on_links, self._on_status = on_telemetry, on_links, on_status
+        self._on_journal = on_journal
         self._began = self._ended_at = monotonic()
         self._started: float | None = None
         self._plant_ready = self._ended = False
@@ -184,6 +189,8 @@ class _ProcessDriver:
     def _take(self, message: Recordable) -> None:
         if isinstance(message, LinkReport):
             self._on_links(message)
+        elif isinstance(message, Journal | LinkRequest):
+            self._on_journal(message)
         elif isinstance(message, Telemetry):
             if self._started is None:
                 self._started = monotonic()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.codec import RejectedError, encode
-from wire.messages import PLANT, Answer, AnyMessage, Command, LinkReport, LinkRequest, Telemetry
+from wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
 from wire.node import Route
 from wire.plant_follower import PlantFollower
 
@@ -27,7 +27,9 @@ class TelemetryEndpoint(PlantFollower):
         self._name, self._stream = name, stream
         self._questions = 0
         self._recordable: list[Recordable] = []
-        self.routes[self.keys.telemetry] = Route(PLANT, (Telemetry, LinkReport, LinkRequest), self._on_recordable)
+        self.routes[self.keys.telemetry] = Route(
+            PLANT, (Telemetry, LinkReport, Journal, LinkRequest), self._on_recordable
+        )
         if stream is not None:
             self.routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
 
@@ -72,7 +74,9 @@ class TelemetryEndpoint(PlantFollower):
         )
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        if not isinstance(message, LinkReport):  # the plant passes them on as they are, once it has checked them
+        if not isinstance(
+            message, LinkReport | Journal
+        ):  # the plant passes them on as they are, once it has checked them
             super()._admit(route, message, now)
 
     def _on_recordable(self, message: Recordable, payload: bytes, now: float) -> None:

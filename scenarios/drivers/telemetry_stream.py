@@ -6,7 +6,7 @@ keeps its latest messages (`plant.realtime.kept_telemetry`) and publishes them a
 
 from __future__ import annotations
 
-from wire.messages import Answer, LinkReport, LinkRequest, Telemetry
+from wire.messages import Answer, Journal, LinkReport, LinkRequest, Telemetry
 
 QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""
@@ -21,7 +21,7 @@ LONGEST = 60.0
 """Longest such time (s)."""
 
 
-Recordable = Telemetry | LinkReport | LinkRequest
+Recordable = Telemetry | LinkReport | Journal | LinkRequest
 """Messages that the plant publishes for recorders."""
 
 

@@ -13,7 +13,7 @@ from scenarios.drivers.telemetry_stream import Recordable
 from scenarios.live.link_log import LinkLog
 from scenarios.live.show.snapshot import line_of
 from scenarios.results.record import Recorded, Recorder, RecordError
-from wire.messages import LinkReport, LinkRequest, Telemetry
+from wire.messages import LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
 
 _STOP = "stop"
@@ -126,7 +126,6 @@ class LiveRecorder:
         try:
             if isinstance(message, LinkRequest):
                 self._take_request(message)
-                return
             if isinstance(message, Telemetry):
                 self._say_events(message)
             self._record(message)
@@ -140,7 +139,7 @@ class LiveRecorder:
         if telemetry.final:  # before the terminal says that the run has ended
             self._say_all(*self._limit.left_out())
 
-    def _record(self, message: Telemetry | LinkReport) -> None:
+    def _record(self, message: Recordable) -> None:
         """Record one message; an error in writing ends the record, not the run."""
         recorder = self._recorder
         if recorder is None:

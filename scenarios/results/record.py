@@ -13,13 +13,17 @@ import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import msgspec
 
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_record import LinkRecord
-from wire.messages import LinkReport, PlantEvent, Telemetry
+from wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
+
+if TYPE_CHECKING:
+    from scenarios.record.record_info import RecordInfo
+    from scenarios.record.recording import Recording
 
 QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
 """Columns of each inverter, in the order of `wire.messages.Telemetry.rows`, with their units."""
@@ -113,7 +117,7 @@ def _with_texts_of_repr(text: bytes, mark: bytes) -> Iterator[bytes]:
 
 
 class Recorder:
-    """Record one case: call it with every `Telemetry` and `LinkReport`, then `finish()`.
+    """Record one case: call it with every message that the plant publishes for recorders, then `finish()`.
 
     With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows; without one it keeps
     the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Floats are
@@ -128,10 +132,17 @@ class Recorder:
         Whether rows may be missing, as in a run whose recorder was out of reach for too long; else that is an error.
     self_check : EmulationConfig, optional
         The faults that the case configures, to test the emulated links against them at the end.
+    record : RecordInfo, optional
+        The run, for its record run.mcap in the same folder; None writes none.
     """
 
     def __init__(
-        self, folder: Path | None = None, *, gaps: bool = False, self_check: EmulationConfig | None = None
+        self,
+        folder: Path | None = None,
+        *,
+        gaps: bool = False,
+        self_check: EmulationConfig | None = None,
+        record: RecordInfo | None = None,
     ) -> None:
         self._gaps, self._folder, self._self_check = gaps, folder, self_check
         self._hash = hashlib.sha256()
@@ -139,6 +150,18 @@ class Recorder:
         if folder is not None:
             folder.mkdir(parents=True)
             self._file = (folder / PARTIAL).open("wb")
+        self._recording: Recording | None = None
+        self._not_recorded = ""
+        """Why there is no run.mcap though one was asked for."""
+        if folder is not None and record is not None:
+            try:
+                from scenarios.record.recording import Recording  # mcap: only for runs with a record
+
+                self._recording = Recording(folder, record, QUANTITIES)
+            except ImportError as error:
+                self._not_recorded = f"there is no run.mcap: {error}; install gridpeers with its dependencies"
+            except OSError as error:
+                self._not_recorded = f"there is no run.mcap: it cannot be made: {error.strerror}"
         self._finished = False
         self._inverters: tuple[str, ...] = ()
         self._first: list[float] = []
@@ -167,24 +190,36 @@ class Recorder:
     ) -> None:
         self.close()
 
-    def __call__(self, message: Telemetry | LinkReport) -> None:
+    def __call__(self, message: Telemetry | LinkReport | Journal | LinkRequest) -> None:
         """Take one message; with a folder its rows and verdicts are in a file when this returns."""
+        if isinstance(message, Telemetry):
+            self._take(message)
+            return
         if isinstance(message, LinkReport):
             self.links(message)
-        else:
-            self._take(message)
+        if self._recording is not None:
+            self._recording.message(message)
+
+    @property
+    def record_failure(self) -> str:
+        """Sentence on why run.mcap ends early, or is not there; empty if it is whole."""
+        return self._not_recorded if self._recording is None else self._recording.failure
 
     def _take(self, telemetry: Telemetry) -> None:
         if not self._inverters:
             self._inverters = telemetry.inverters
             self._write((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
+        lines = []
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
             self._note_time(row[0])
             if self._file is None:
                 self.rows.append(row)
-            self._write(csv_line(row))
+            lines.append(csv_line(row))
+            self._write(lines[-1])
+        if self._recording is not None:
+            self._recording.telemetry(telemetry, lines)
         self.events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible
@@ -206,6 +241,8 @@ class Recorder:
         RecordError
             If rows are missing.
         """
+        if self._recording is not None:
+            self._recording.close()
         if self._file is not None:
             self._file.close()
         expected = round(end / record_step) + 1
@@ -239,6 +276,8 @@ class Recorder:
 
     def close(self) -> None:
         """End the record. What came of a case that was not finished stays, under the partial name."""
+        if self._recording is not None:
+            self._recording.close()
         if self._folder is not None and self._file is not None and not self._finished:
             with contextlib.suppress(OSError):  # of a full disk: what is in the file stays, and the writer reported it
                 self._file.close()

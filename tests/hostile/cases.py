@@ -31,6 +31,7 @@ BODIES: dict[str, dict[str, Any]] = {
     "Stop": dict(reason="enough", refused=False),
     "Leave": {},
     "LinkReport": dict(data=b"book", instance="a", final=False),
+    "Journal": dict(data=b"entries"),
     "LinkRequest": dict(link_command={"heal": {"on": "*"}}, reply_to="z1"),
     "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
     "Command": dict(verb="status", argument="", link_command={"x": 1.0}, reply_to="z1"),

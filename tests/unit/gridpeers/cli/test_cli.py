@@ -166,7 +166,7 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
         *("I", "log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt"),
     }
     assert (here / "status.txt").read_text() == "complete\n"
-    assert sorted(path.name for path in (here / "I").iterdir()) == ["events.csv", "history.csv"]
+    assert sorted(path.name for path in (here / "I").iterdir()) == ["events.csv", "history.csv", "run.mcap"]
     as_run = tomllib.loads((here / "scenario.toml").read_text())
     assert as_run["seed"] == 7
     assert as_run["as_run"].keys() >= {"driver", "gridpeers", "python", "eclipse-zenoh"}

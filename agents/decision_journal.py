@@ -1,0 +1,130 @@
+"""How an agent decides, noted in its journal: the states that it used, their weights, and those that it left out. Pure.
+
+A decision can be computed again from the own measurement and the neighbours' states, which the record has. So the
+journal only names the states. In simulated time it does so where their ages in ticks, weights or reasons change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from agents.agent import Agent
+from wire.journal import Decision, JournalBuffer
+
+
+class DecisionJournal:
+    """Note the decisions of one agent.
+
+    Parameters
+    ----------
+    agent : Agent
+        The agent.
+    journal : JournalBuffer
+        Takes the entries.
+    """
+
+    def __init__(self, agent: Agent, journal: JournalBuffer) -> None:
+        self._agent, self.journal = agent, journal
+        self._neighbours: Sequence[str] | None = None
+        """In-neighbours of the last entry; None before the first."""
+        self._states: list[int | None] = []
+        self._others: tuple[object, ...] = ()
+        """Its further parts, but for the tick."""
+        self._weighs = not agent.weighs_alike
+
+    @property
+    def is_usual(self) -> bool:
+        """Whether the agent decided with the states of the tick before of all in-neighbours, and will be so again."""
+        measurement, unused, weights, _ = self._others or (0, [], [], None)
+        all_new = not any(age != 1 for age in self._states)
+        alike = self._agent.weighs_alike and not self._agent.watches_saturation
+        return all_new and alike and not (measurement or unused or weights)
+
+    def tick(self, tick: int, measurement: int, neighbours: Sequence[str]) -> bool:
+        """Note the decision of a tick of simulated time if it was made otherwise than the one before.
+
+        Parameters
+        ----------
+        tick : int
+            k.
+        measurement : int
+            Age of the own measurement in ticks.
+        neighbours : Sequence[str]
+            In-neighbours by the graph, among those on the roster.
+
+        Returns
+        -------
+        bool
+            Whether an entry was made.
+        """
+        agent = self._agent
+        heard, used = agent.heard, agent.around
+        try:
+            states: list[int | None] = [tick - heard[name].seq for name in neighbours]
+        except KeyError:
+            states = [tick - heard[name].seq if name in heard else None for name in neighbours]
+        unused = [] if len(used) == len(neighbours) else self._reasons(neighbours, states)
+        weights = [neighbour.weight for neighbour in used] if self._weighs else []
+        others = (measurement, unused, weights, agent.saturated)
+        if states == self._states and neighbours == self._neighbours and others == self._others:
+            return False
+        self._neighbours, self._states, self._others = neighbours, states, others
+        if weights:
+            weights = self._all_weights(neighbours)
+        self.journal.add(Decision(tick, measurement, list(neighbours), states, unused, weights, agent.saturated))
+        return True
+
+    def live(
+        self,
+        tick: int,
+        measurement: int,
+        neighbours: Sequence[str],
+        ages: Mapping[str, float],
+        at: float,
+        before: tuple[float, float],
+    ) -> None:
+        """Note a decision in wall-clock time.
+
+        Parameters
+        ----------
+        tick : int
+            Number of the own state.
+        measurement : int
+            Number of the own measurement.
+        neighbours : Sequence[str]
+            In-neighbours by the graph, among those that have been met.
+        ages : Mapping[str, float]
+            Age of the last state of each (s of run time), infinite if none was heard.
+        at : float
+            Time on the own clock (s, monotonic).
+        before : tuple[float, float]
+            Set-points (W, V) before it.
+        """
+        agent = self._agent
+        states = [agent.heard[name].seq if name in agent.heard else None for name in neighbours]
+        unused = [] if len(agent.around) == len(neighbours) else self._reasons(neighbours, states)
+        shown = [ages[name] if state is not None else None for name, state in zip(neighbours, states, strict=True)]
+        weights = self._all_weights(neighbours) if self._weighs else []
+        self.journal.add(
+            Decision(
+                tick, measurement, list(neighbours), states, unused, weights, agent.saturated, at, shown, list(before)
+            )
+        )
+
+    def _reasons(self, neighbours: Sequence[str], states: Sequence[int | None]) -> list[str]:
+        """Return why the agent left out each neighbour; empty for those that it used."""
+        used = {neighbour.name for neighbour in self._agent.around}
+        return [
+            ""
+            if name in used
+            else "silent"
+            if state is None
+            else "stale"
+            if self._agent.shares_island(name)
+            else "island"
+            for name, state in zip(neighbours, states, strict=True)
+        ]
+
+    def _all_weights(self, neighbours: Sequence[str]) -> list[float]:
+        weights = {neighbour.name: neighbour.weight for neighbour in self._agent.around}
+        return [weights.get(name, 0.0) for name in neighbours]

@@ -1,0 +1,239 @@
+"""The decisions of an agent from its journal, with the messages that they name."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Iterator
+from contextlib import suppress
+from functools import lru_cache
+from math import inf
+
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from agents.graphs import GraphError
+from agents.own_nameplate import nameplate_of
+from agents.topology import in_neighbours, rule_of
+from scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
+from scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
+from wire.journal import Decision, Heard, Received
+from wire.messages import OFF, PLANT, Measurement, Nameplate, State
+from wire.timing.clock import time_of
+
+_NOTHING = Decision(0, 0, [], [], [], [])
+
+
+class DecisionReader:
+    """Decisions and heard messages of the agents of a record.
+
+    Parameters
+    ----------
+    index : MessageIndex
+        Messages and entries of the record.
+    """
+
+    def __init__(self, index: MessageIndex) -> None:
+        self._index, self._info = index, index.info
+        self._nameplates = {config.name: nameplate_of(config) for config in index.info.agents}
+        self._forms = lru_cache(maxsize=None)(self._read_forms)
+        self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
+
+    def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
+        """Yield the decisions of an agent; see `RunRecord.decisions`."""
+        config = self._info.agent(agent)
+        if config is None:
+            return iter(())
+        return (self._in_ticks if self._info.clock == "simulated" else self._live)(config, since, until)
+
+    # ---------------------------------------------------------------- simulated time
+
+    def _read_forms(self, agent: str) -> tuple[list[int], list[Decision], float]:
+        """Return the entries on how an agent decides, the tick of each, and the run time (s) up to which they hold."""
+        found: dict[int, Decision] = {}
+        until = inf
+        linked = bool((config := self._info.agent(agent)) and config.links)
+        for index in self._index.near(0.0, inf):
+            for journal, entry in self._index.part(index).entries:
+                if journal.sender == agent and isinstance(entry, Decision):
+                    found[entry.tick] = entry
+        if linked and not self._index.file.complete:
+            reports = [journal.t for journal in self._index.journals(agent)]
+            until = max(reports, default=-1.0)
+        ticks = sorted(found)
+        return ticks, [found[tick] for tick in ticks], until
+
+    def _in_ticks(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
+        name, T_c = config.name, self._info.T_c
+        ticks, forms, covered = self._forms(name)
+        for index in self._index.near(since, until):
+            own = [
+                each for (sender, _), all_ in self._index.part(index).states.items() if sender == name for each in all_
+            ]
+            for state in sorted(own, key=lambda each: each.seq):
+                t = time_of(state.seq, T_c)
+                if not since - 1e-9 <= t <= until + 1e-9 or t > covered:
+                    continue
+                at = bisect_right(ticks, state.seq) - 1
+                decision = self._at_tick(config, state, t, forms[at] if at >= 0 else _NOTHING)
+                if decision is not None:
+                    yield decision
+
+    def _at_tick(self, config: AgentConfig, state: State, t: float, form: Decision) -> RecordedDecision | None:
+        name, tick = config.name, state.seq
+        idle = state.idle
+        age = 0 if idle else form.measurement
+        measured = self._index.measurement(name, tick - age, time_of(tick - age, self._info.T_c))
+        if measured is None:
+            return None
+        if age:
+            measured = replace(measured, seq=tick, t=t)
+        neighbours = []
+        for i, neighbour in enumerate([] if idle else form.neighbours):
+            lag = form.states[i]
+            number = None if lag is None else tick - lag
+            heard = None if number is None else self._index.state(neighbour, number, time_of(number, self._info.T_c))
+            since = None if number is None else t - (time_of(number, self._info.T_c) if heard is None else heard.t)
+            neighbours.append(self._input(form, i, heard, number, since))
+        return self._decision(config, state, measured, tuple(neighbours), form, age=age)
+
+    # ---------------------------------------------------------------- wall-clock time
+
+    def _live(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
+        name = config.name
+        for index in self._index.near(since, until):
+            for journal, entry in self._index.part(index).entries:
+                if journal.sender != name or not isinstance(entry, Decision):
+                    continue
+                measured = self._index.measurement(name, entry.measurement, journal.t)
+                state = self._index.state(name, entry.tick, journal.t)
+                if measured is None or state is None or not since - 1e-9 <= measured.t <= until + 1e-9:
+                    continue
+                neighbours = []
+                for i, neighbour in enumerate(entry.neighbours):
+                    number, age = entry.states[i], entry.ages[i] if i < len(entry.ages) else None
+                    at = measured.t - (age or 0.0)
+                    heard = None if number is None else self._index.state(neighbour, number, at)
+                    neighbours.append(self._input(entry, i, heard, number, age))
+                yield self._decision(config, state, measured, tuple(neighbours), entry)
+
+    # ---------------------------------------------------------------- both
+
+    def _input(
+        self, form: Decision, i: int, state: State | None, number: int | None, age: float | None
+    ) -> NeighbourInput:
+        name = form.neighbours[i]
+        unused = form.unused[i] if i < len(form.unused) else ""
+        weight = form.weights[i] if i < len(form.weights) else 1.0
+        return NeighbourInput(
+            nameplate=self._nameplate(name, state),
+            state=state,
+            number=number,
+            age=age,
+            weight=0.0 if unused else weight,
+            unused=unused,
+        )
+
+    def _nameplate(self, name: str, state: State | None) -> Nameplate:
+        known = self._nameplates.get(name)
+        if known is None:  # of an agent that no configuration names
+            known = replace(next(iter(self._nameplates.values())), sender=name)
+        return known if state is None or state.epoch == known.epoch else replace(known, epoch=state.epoch)
+
+    def _decision(
+        self,
+        config: AgentConfig,
+        state: State,
+        measured: Measurement,
+        neighbours: tuple[NeighbourInput, ...],
+        form: Decision,
+        *,
+        age: int = 0,
+    ) -> RecordedDecision:
+        met = {each.name for each in neighbours}
+        action = _action(config, state, measured)
+        return RecordedDecision(
+            config=config,
+            tick=state.seq,
+            at=form.at,
+            measurement=measured,
+            measurement_age=age,
+            neighbours=neighbours,
+            not_met=tuple(name for name in self._listens(config.name) if name not in met),
+            before=self._before(config, state, measured, action, form),
+            saturated=form.saturated if action == "law" else (0, 0),
+            action=action,
+            state=state,
+        )
+
+    def _before(
+        self, config: AgentConfig, state: State, measured: Measurement, action: Action, form: Decision
+    ) -> tuple[float, float]:
+        """Return the set-points (W, V) before a decision: the agent's own, or those of the plant after a pause."""
+        if len(form.before) == 2:
+            return form.before[0], form.before[1]
+        if action == "law":
+            last = self._index.state(config.name, state.seq - 1, time_of(state.seq - 1, self._info.T_c))
+            if last is not None and last.epoch == state.epoch and not (last.idle or last.island == OFF):
+                return last.P_set, last.V_set
+        return measured.P_set, measured.V_set
+
+    def _all_in_neighbours(self, agent: str) -> tuple[str, ...]:
+        """Return the in-neighbours of an agent if all configured agents were there."""
+        config = self._info.agent(agent)
+        with suppress(GraphError, ValueError):  # a rule of others that fails, or is not here
+            if config is not None:
+                return in_neighbours(config.control, agent, self._nameplates, rule_of(config.control))
+        return ()
+
+    # ---------------------------------------------------------------- messages as they were heard
+
+    def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
+        """Yield messages as they were heard; see `RunRecord.heard`."""
+        if self._info.clock == "wall":
+            return self._heard_live(receiver, since, until)
+        return self._heard_by_plant(since, until) if receiver == PLANT else self._heard_in_ticks(receiver, since, until)
+
+    def _heard_by_plant(self, since: float, until: float) -> Iterator[MessageOnWire]:
+        for message in self._index.messages(None, since, until, "State"):
+            yield on_wire(message.key, message.payload, None, receiver=PLANT, message=message.message)
+
+    def _heard_in_ticks(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
+        last: dict[str, int | None] = {}
+        for decision in self.decisions(receiver, since, until):
+            if not decision.measurement_age:
+                key = f"measurement/{receiver}"
+                yield on_wire(key, None, None, receiver=receiver, message=decision.measurement)
+            for each in decision.neighbours:
+                if each.state is not None and each.number != last.get(each.name):
+                    yield on_wire(f"state/{each.name}", None, None, receiver=receiver, message=each.state)
+                last[each.name] = each.number
+
+    def _heard_live(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
+        for index in self._index.near(since, until):
+            for journal, entry in self._index.part(index).entries:
+                if journal.sender != receiver:
+                    continue
+                if isinstance(entry, Heard):
+                    kind, _, name = entry.key.partition("/")
+                    found = (
+                        self._index.measurement(receiver, entry.seq, journal.t)
+                        if kind == "measurement"
+                        else self._index.state(name, entry.seq, journal.t)
+                    )
+                    message = heard_of(name, receiver, found, entry, journal.t)
+                elif isinstance(entry, Received):
+                    message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
+                else:
+                    continue
+                if since - 1e-9 <= message.t <= until + 1e-9:
+                    yield message
+
+
+def _action(config: AgentConfig, state: State, measured: Measurement) -> Action:
+    """Return what the agent did."""
+    if state.idle:
+        return "idle"
+    if measured.island == OFF:
+        return "off"
+    takes_part = config.control.acts(config.name, config.kind)
+    return "hold" if measured.grid_connected or not takes_part else "law"

@@ -1,0 +1,86 @@
+"""Entries of a journal from its bytes, which may be cut off, damaged, or from a later version."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import msgpack
+import msgspec
+
+from scenarios.record.record_info import RecordInfo
+from wire.bounds import LIMIT
+from wire.codec import CRC, RejectedError, decode
+from wire.journal import ENTRIES, Decision, Entry, Exchange, Heard, Process, Received, Sent, Token, Woken
+from wire.messages import AnyMessage, Measurement, State
+
+_AnyEntry = Exchange | Sent | Heard | Received | Token | Woken | Process | Decision
+assert set(ENTRIES) == set(_AnyEntry.__args__)
+
+
+def entries_of(data: bytes) -> Iterator[Entry]:
+    """Yield the entries in the data of a `Journal`; those of unknown kinds are left out.
+
+    Raises
+    ------
+    ValueError
+        Where the bytes end within an entry, or make none.
+    """
+    unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
+    unpacker.feed(data)
+    while True:
+        try:
+            raw = unpacker.unpack()
+        except msgpack.OutOfData:
+            if unpacker.tell() != len(data):
+                raise ValueError(f"it ends within an entry, at byte {unpacker.tell()} of {len(data)}") from None
+            return
+        except (msgpack.UnpackException, ValueError, RecursionError) as error:
+            raise ValueError(f"no msgpack at byte {unpacker.tell()}: {error or type(error).__name__}") from None
+        yield from _entry(raw)
+
+
+def _entry(raw: Any) -> Iterator[Entry]:
+    try:
+        yield msgspec.convert(raw, _AnyEntry)
+    except msgspec.ValidationError as error:
+        if not str(error).startswith("Invalid value"):  # of a kind that a later version has
+            raise ValueError(f"an entry is none of ours: {error}") from None
+
+
+def message_of(
+    raw: bytes | Sequence[Any], kind: type[Measurement] | type[State], info: RecordInfo
+) -> AnyMessage | None:
+    """Return a message of an `Exchange`: from its bytes, or from its values in the order of the fields.
+
+    None if it cannot be read: it is damaged, or has a value beyond its bounds.
+    """
+    if isinstance(raw, bytes):
+        return sound(raw)
+    fields = info.fields.get(kind.__name__, ())
+    if not isinstance(raw, list | tuple) or len(raw) != len(fields):
+        return None
+    try:
+        return msgspec.convert(dict(zip(fields, raw, strict=True)) | {"type": kind.__name__}, kind)
+    except msgspec.ValidationError:
+        return None
+
+
+def sound(payload: bytes) -> AnyMessage | None:
+    """Return the message of a payload; None if no receiver of this version would take it."""
+    try:
+        return decode(payload)
+    except RejectedError:
+        return None
+
+
+def values_of(payload: bytes) -> dict[str, Any]:
+    """Return what a payload says, whether a receiver would take it or not; empty if it is no msgpack map.
+
+    It reads messages of later versions and of other people's agents, and those that a link has corrupted.
+    """
+    try:
+        values = msgpack.unpackb(payload[:-CRC], strict_map_key=False)
+    except (ValueError, msgpack.UnpackException, RecursionError):
+        return {}
+    return {str(name): value for name, value in values.items()} if isinstance(values, dict) else {}

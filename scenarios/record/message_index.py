@@ -1,0 +1,258 @@
+"""The messages and journal entries of a record, found by sender and number without reading all of it."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import inf
+from typing import Any, TypeVar
+
+from scenarios.record.journal_reader import entries_of, message_of, sound, values_of
+from scenarios.record.record_channels import Topic
+from scenarios.record.record_file import RecordFile, RecordMessage
+from wire.codec import encode
+from wire.journal import Entry, Exchange, Heard, Received, Sent
+from wire.messages import PLANT, AnyMessage, Journal, Measurement, State
+
+M = TypeVar("M", bound=AnyMessage)
+
+_JOURNALS: tuple[Topic, ...] = ("journal",)
+
+LATE = 5.0
+"""Longest time (s of run time) after which an entry of a journal may come into the record."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class MessageOnWire:
+    """A message as it was sent, or as it was heard."""
+
+    sender: str
+    """Name of its sender."""
+    receiver: str
+    """Name of who heard it; empty for a message as it was sent."""
+    kind: str
+    """Its type, such as "State"; empty if it has none."""
+    key: str
+    """Its key, without `gridpeers/<run>/`."""
+    epoch: int
+    """Epoch of its sender; -1 if it cannot be read."""
+    number: int
+    """Its number; -1 if it cannot be read."""
+    t: float
+    """Run time that it says (s); -1 if it cannot be read."""
+    at: float | None
+    """When it was sent, or heard, on the clock of that process (s, monotonic); None in simulated time."""
+    rejected: str = ""
+    """Kind of its rejection by the receiver (`wire.codec.KINDS`); empty if it was used, or as it was sent."""
+    message: AnyMessage | None = None
+    """The message; None if the record does not have it, or no receiver of this version would take it."""
+    payload: bytes = b""
+    """Its bytes; empty if the record does not have them."""
+
+
+@dataclass
+class _Part:
+    """What is in one part of the file."""
+
+    states: dict[tuple[str, int], list[State]] = field(default_factory=lambda: defaultdict(list))
+    measurements: dict[tuple[str, int], list[Measurement]] = field(default_factory=lambda: defaultdict(list))
+    entries: list[tuple[Journal, Entry]] = field(default_factory=list)
+    """All entries, each with the part of the journal that it came in."""
+
+
+class MessageIndex:
+    """Find messages and entries in the file of a record.
+
+    Parameters
+    ----------
+    file : RecordFile
+        The file.
+    """
+
+    def __init__(self, file: RecordFile) -> None:
+        self.file, self.info = file, file.info
+        self.damage: list[str] = []
+        """Sentences on what could not be read."""
+        self._spans = file.spans
+        self._ends = [until for _, until in self._spans]
+        for i in range(1, len(self._ends)):  # so that they rise, should a part hold late entries alone
+            self._ends[i] = max(self._ends[i], self._ends[i - 1])
+        self.part = lru_cache(maxsize=16)(self._read_part)
+
+    def note_damage(self, text: str) -> None:
+        """Note that something could not be read."""
+        if text not in self.damage:
+            self.damage.append(text)
+
+    # ---------------------------------------------------------------- messages of the plant for recorders
+
+    def of_type(self, topic: Topic, kind: type[M]) -> Iterator[M]:
+        """Yield the messages of a topic that can be read."""
+        for record in self.file.messages([topic]):
+            message = self._message(record)
+            if isinstance(message, kind):
+                yield message
+
+    def _message(self, record: RecordMessage) -> AnyMessage | None:
+        message = sound(record.data)
+        if message is None:
+            self.note_damage(f"a message of {record.topic} at t = {record.t / 1e9:.2f} s cannot be read")
+        return message
+
+    # ---------------------------------------------------------------- journals
+
+    def near(self, since: float, until: float) -> range:
+        """Return the parts that may have what happened between two run times (s)."""
+        first = bisect_left(self._ends, since - 1e-9)
+        last = bisect_left(self._ends, until + LATE) + 1 if until < inf else len(self._ends)
+        return range(first, min(last, len(self._ends)))
+
+    def journals(self, node: str) -> Iterator[Journal]:
+        """Yield the parts of the journal of a node."""
+        for record in self.file.messages(_JOURNALS):
+            journal = self._message(record)
+            if isinstance(journal, Journal) and journal.sender == node:
+                yield journal
+
+    def entries(self, node: str, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
+        """Yield the entries of the journal of a node."""
+        for index in self.near(since, until):
+            yield from (entry for journal, entry in self.part(index).entries if journal.sender == node)
+
+    def state(self, sender: str, number: int, t: float) -> State | None:
+        """Return a state of about run time t (s); None if the record does not have it."""
+        return _nearest(
+            (each for i in self.near(t - 1.0, t) for each in self.part(i).states.get((sender, number), ())), t
+        )
+
+    def measurement(self, to: str, number: int, t: float) -> Measurement | None:
+        """Return a measurement of about run time t (s); None if the record does not have it."""
+        return _nearest(
+            (each for i in self.near(t - 1.0, t) for each in self.part(i).measurements.get((to, number), ())), t
+        )
+
+    def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:
+        """Yield messages as they were sent; see `RunRecord.messages`."""
+        known: dict[tuple[str, str, int, int], None] = {}
+        for index in self.near(since, until):
+            for journal, entry in self.part(index).entries:
+                for each in self._sent(journal, entry):
+                    key = (each.sender, each.kind, each.epoch, each.number)
+                    fits = (sender is None or each.sender == sender) and (kind is None or each.kind == kind)
+                    if not fits or not since - 1e-9 <= each.t <= until + 1e-9:
+                        continue
+                    if each.kind == "State" and key in known:  # the plant notes it too, while it knows no journal
+                        continue
+                    known[key] = None
+                    if len(known) > 100_000:
+                        known.pop(next(iter(known)))
+                    yield each
+
+    def _sent(self, journal: Journal, entry: Entry) -> Iterator[MessageOnWire]:
+        if isinstance(entry, Exchange):
+            for kind, raws in ((Measurement, entry.measurements), (State, entry.states)):
+                for raw in raws:
+                    message = message_of(raw, kind, self.info)
+                    if isinstance(message, Measurement):
+                        yield on_wire(f"measurement/{message.to}", raw, None, message=message)
+                    elif isinstance(message, State):
+                        yield on_wire(f"state/{message.sender}", raw, None, message=message)
+        elif isinstance(entry, Sent):
+            yield on_wire(entry.key, entry.payload, entry.at)
+        elif isinstance(entry, Received) and not entry.rejected:
+            yield on_wire(entry.key, entry.payload, None)
+
+    def _read_part(self, index: int) -> _Part:
+        part = _Part()
+        for record in self.file.part(index):
+            if record.topic != "journal":
+                continue
+            journal = self._message(record)
+            if not isinstance(journal, Journal):
+                continue
+            try:
+                for entry in entries_of(journal.data):
+                    part.entries.append((journal, entry))
+                    self._note(part, entry)
+            except ValueError as error:
+                self.note_damage(f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read: {error}")
+        return part
+
+    def _note(self, part: _Part, entry: Entry) -> None:
+        if isinstance(entry, Exchange):
+            for raw in entry.measurements:
+                self._keep(part, message_of(raw, Measurement, self.info))
+            for raw in entry.states:
+                self._keep(part, message_of(raw, State, self.info))
+        elif isinstance(entry, Sent) or (isinstance(entry, Received) and not entry.rejected):
+            self._keep(part, sound(entry.payload))
+
+    def _keep(self, part: _Part, message: AnyMessage | None) -> None:
+        if isinstance(message, State):
+            part.states[message.sender, message.seq].append(message)
+        elif isinstance(message, Measurement):
+            part.measurements[message.to, message.seq].append(message)
+        elif message is None:
+            self.note_damage("a message in a journal cannot be read")
+
+
+def _nearest(found: Iterable[M], t: float) -> M | None:
+    """Return the message that is nearest in time: numbers begin anew with a process."""
+    return min(found, key=lambda message: abs(message.t - t), default=None)
+
+
+def on_wire(
+    key: str, raw: Any, at: float | None, *, receiver: str = "", rejected: str = "", message: AnyMessage | None = None
+) -> MessageOnWire:
+    """Return a message from its bytes, or from the message itself where none were sent."""
+    payload = raw if isinstance(raw, bytes) else b"" if message is None else encode(message)
+    message = message or sound(payload)
+    if message is None:
+        values = values_of(payload)
+        named = {name: values.get(name) for name in ("type", "sender", "epoch", "seq", "t")}
+    else:
+        named = {
+            "type": type(message).__name__,
+            "sender": message.sender,
+            "epoch": message.epoch,
+            "seq": message.seq,
+            "t": message.t,
+        }
+    return MessageOnWire(
+        sender=str(named["sender"] or key.rpartition("/")[2])[:64],
+        receiver=receiver,
+        kind=str(named["type"] or "")[:40],
+        key=key,
+        epoch=_whole(named["epoch"]),
+        number=_whole(named["seq"]),
+        t=float(named["t"]) if isinstance(named["t"], int | float) else -1.0,
+        at=at,
+        rejected=rejected,
+        message=message,
+        payload=payload,
+    )
+
+
+def heard_of(sender: str, receiver: str, state: State | Measurement | None, entry: Heard, t: float) -> MessageOnWire:
+    """Return a message as it was heard, whose bytes are in its sender's journal."""
+    kind = "Measurement" if entry.key.startswith("measurement/") else "State"
+    return MessageOnWire(
+        sender=PLANT if kind == "Measurement" else sender,
+        receiver=receiver,
+        kind=kind,
+        key=entry.key,
+        epoch=entry.epoch,
+        number=entry.seq,
+        t=t if state is None else state.t,
+        at=entry.at,
+        rejected=entry.rejected,
+        message=state,
+        payload=b"" if state is None else encode(state),
+    )
+
+
+def _whole(value: Any) -> int:
+    return value if isinstance(value, int) and not isinstance(value, bool) else -1

@@ -1,0 +1,101 @@
+"""Compute the decisions of an agent again, by the same core from the recorded inputs, and compare them with the record.
+
+The core gets the measurement of each decision, the neighbours, and the states that the agent had heard by then.
+So a difference means that the record lacks an input, or that the code or the law is another one than in the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import closing
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from agents.agent import Agent
+from agents.carriers.make import make_law
+from agents.laws.law import Law
+from scenarios.record.record_reader import RunRecord
+from scenarios.record.recorded_decision import RecordedDecision
+from wire.codec import encode
+from wire.messages import State
+
+
+class Recomputed(NamedTuple):
+    """A decision of the record, and its state as the core decides it from the recorded inputs."""
+
+    decision: RecordedDecision
+    """As recorded."""
+    state: State
+    """As computed again."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether both states have the same bytes."""
+        return encode(self.decision.state) == encode(self.state)
+
+
+def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterator[Recomputed]:
+    """Yield all decisions of an agent, each with its state computed again.
+
+    A law may have a memory, so this begins with the first decision.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The record.
+    agent : str
+        Name of the agent.
+    law : Law, optional
+        Law to decide with; by default that of the record, made anew.
+
+    Raises
+    ------
+    RecordFileError
+        If there was no such agent, or no decision was recorded.
+    ValueError
+        If the law is not here.
+    """
+    with closing(_Recomputation(record, agent, law)) as again:
+        for decision in record.decisions(agent):
+            yield Recomputed(decision, again.decide(decision))
+
+
+class _Recomputation:
+    """An agent's core, fed from a record."""
+
+    def __init__(self, record: RunRecord, agent: str, law: Law | None) -> None:
+        config = record.info.agent(agent)
+        assert config is not None
+        self._config = config if config.clock == "wall" else config.by_own_clock()
+        self._own_law = None if law is not None else make_law(config.control)
+        self._law = law or self._own_law
+        self._core = Agent(self._config, self._law)
+        self._epoch: int | None = None
+
+    def decide(self, decision: RecordedDecision) -> State:
+        """Return the state of a decision."""
+        if decision.state.epoch != self._epoch:  # another process of this name
+            self._epoch = decision.state.epoch
+            self._core = Agent(replace(self._config, epoch=self._epoch), self._law)
+        core = self._core
+        for each in decision.neighbours:
+            heard = core.heard.get(each.name)
+            if each.state is None:
+                if heard is not None:
+                    core.forget(each.name)
+                core.meet(each.nameplate)
+            elif heard is None or (heard.epoch, heard.seq) != (each.state.epoch, each.state.seq):
+                core.meet(each.nameplate)
+                core.hear(each.state)
+        if decision.action == "idle" and not core.fault:
+            return core.idle_state(decision.measurement)
+        if self._config.clock == "simulated":
+            return core.tick(decision.measurement, [each.name for each in decision.neighbours])
+        ages = {each.name: each.age for each in decision.neighbours if each.age is not None and each.unused != "stale"}
+        return replace(core.tick(decision.measurement, tuple(ages), ages), seq=decision.tick)
+
+    def close(self) -> None:
+        """Release what the law has opened, if it was made here."""
+        if self._own_law is not None:
+            self._own_law.close()

@@ -1,0 +1,222 @@
+"""Read the file of a record, whole or cut off, without trusting anything in it.
+
+The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
+half written, and no index at the end. So the index is not used: the reader goes from record to record, which takes one
+look at each chunk of about a second, and stops where the file ends or makes no sense.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Collection, Iterator
+from functools import lru_cache
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO, NamedTuple, get_args
+
+import lz4.frame
+import msgspec
+import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Header, Message, Metadata
+from mcap.stream_reader import breakup_chunk
+
+from scenarios.record.record_channels import Topic
+from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo
+
+_MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
+_FRAME = struct.Struct("<BQ")
+_TIMES = struct.Struct("<QQQ")
+
+MOST_CHUNK = 256_000_000
+"""Most bytes of a chunk: far more than a writer of ours makes of a second."""
+
+_BROKEN = (
+    McapError, struct.error, ValueError, KeyError, OverflowError, MemoryError, zstandard.ZstdError, RuntimeError,
+)  # fmt: skip
+"""What the MCAP library and its decompressors raise over bytes that are none of theirs."""
+
+
+class RecordFileError(ValueError):
+    """A record that cannot be read, or does not have what was asked for; one sentence says why and what to do."""
+
+
+class RecordMessage(NamedTuple):
+    """A message of the file."""
+
+    topic: Topic
+    """Topic of its channel."""
+    t: int
+    """Run time at which its sender published it (ns)."""
+    number: int
+    """Its number."""
+    data: bytes
+    """Its bytes."""
+
+
+class _ChunkPlace(NamedTuple):
+    offset: int
+    length: int
+    since: int
+    until: int
+
+
+class RecordFile:
+    """The file of one record, opened.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    RecordFileError
+        If it is missing, no record of ours, or from a later version.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.damage: list[str] = []
+        """Sentences on parts of the file that could not be read."""
+        self.complete = False
+        """Whether the file was closed properly: everything that was recorded is in it."""
+        self._chunks: list[_ChunkPlace] = []
+        info: RecordInfo | None = None
+        try:
+            with path.open("rb") as file:
+                self._size = file.seek(0, 2)
+                file.seek(0)
+                info = self._scan(file)
+        except OSError as error:
+            raise RecordFileError(f"{path}: cannot be read: {error.strerror}") from None
+        if info is None:
+            raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
+        self.info: RecordInfo = info
+        """The run."""
+        self._load = lru_cache(maxsize=8)(self._load_chunk)
+
+    @property
+    def spans(self) -> list[tuple[float, float]]:
+        """First and last run time (s) of each part that can be read on its own, in the order of the file."""
+        return [(place.since / 1e9, place.until / 1e9) for place in self._chunks]
+
+    @property
+    def t_end(self) -> float:
+        """Latest run time in the record (s)."""
+        return max((place.until for place in self._chunks), default=0) / 1e9
+
+    def messages(self, topics: Collection[Topic] | None = None) -> Iterator[RecordMessage]:
+        """Yield the messages of these topics, or all, in the order of the file; one part is in memory at a time."""
+        for index in range(len(self._chunks)):
+            yield from (message for message in self.part(index) if topics is None or message.topic in topics)
+
+    def part(self, index: int) -> tuple[RecordMessage, ...]:
+        """Return the messages of one of `spans`; none if it is damaged, which `damage` then tells."""
+        return self._load(index)
+
+    # ---------------------------------------------------------------- inside
+
+    def _scan(self, file: BinaryIO) -> RecordInfo | None:
+        """Note where the chunks are; return what the file says about its run."""
+        if file.read(len(_MAGIC)) != _MAGIC:
+            raise RecordFileError(f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}")
+        info: RecordInfo | None = None
+        self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
+        """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
+        while frame := file.read(_FRAME.size):
+            if len(frame) < _FRAME.size:
+                self._cut("within the length of a record")
+                break
+            opcode, length = _FRAME.unpack(frame)
+            start = file.tell()
+            if start + length > self._size:
+                self._cut("within a chunk" if opcode == Opcode.CHUNK else "within a record")
+                break
+            if opcode == Opcode.FOOTER:
+                self.complete = True
+                break
+            if opcode == Opcode.CHUNK and length > _TIMES.size:
+                since, until, size = _TIMES.unpack(file.read(_TIMES.size))
+                if size > MOST_CHUNK or since > until:
+                    self.damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
+                else:
+                    self._chunks.append(_ChunkPlace(start, length, since, until))
+            elif opcode == Opcode.HEADER:
+                self._check_header(file.read(length))
+            elif opcode == Opcode.METADATA:
+                info = info or self._info_of(file.read(length))
+            file.seek(start + length)
+        if not self.complete and not self.damage:
+            self._cut("between two chunks")
+        return info
+
+    def _cut(self, where: str) -> None:
+        at = f" after t = {self.t_end:.2f} s" if self._chunks else ""
+        self.damage.append(f"the file is cut off {where}{at}: its writer was killed, or is still at work")
+
+    def _check_header(self, data: bytes) -> None:
+        try:
+            profile = Header.read(ReadDataStream(BytesIO(data))).profile
+        except _BROKEN:
+            profile = ""
+        if profile != PROFILE:
+            raise RecordFileError(
+                f"{self.path}: an MCAP file, but no record of gridpeers: its profile is {profile[:40]!r}"
+            )
+
+    def _info_of(self, data: bytes) -> RecordInfo | None:
+        try:
+            metadata = Metadata.read(ReadDataStream(BytesIO(data)))
+            if metadata.name != METADATA:
+                return None
+            version = int(metadata.metadata["format"])
+        except _BROKEN:
+            return None
+        by = metadata.metadata.get("gridpeers", "") or "unknown"
+        if version > FORMAT:
+            raise RecordFileError(
+                f"{self.path}: a record of format {version}, written by gridpeers {by[:40]}; this one reads up to "
+                f"{FORMAT}: install the later gridpeers"
+            )
+        try:
+            return msgspec.json.decode(metadata.metadata["info"], type=RecordInfo)
+        except (KeyError, msgspec.MsgspecError) as error:
+            raise RecordFileError(
+                f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
+            ) from None
+
+    def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
+        """Read a chunk."""
+        place = self._chunks[index]
+        try:
+            with self.path.open("rb") as file:
+                file.seek(place.offset)
+                chunk = Chunk.read(ReadDataStream(BytesIO(file.read(place.length))))
+            self._check_size(chunk)
+            records = breakup_chunk(chunk, validate_crc=True)
+        except OSError as error:
+            raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
+        except _BROKEN as error:
+            self.damage.append(
+                f"a chunk is damaged, from t = {place.since / 1e9:.2f} s to {place.until / 1e9:.2f} s: "
+                f"{str(error)[:100] or type(error).__name__}"
+            )
+            return ()
+        messages = []
+        for record in records:
+            if isinstance(record, Channel):
+                self._topics[record.id] = record.topic  # type: ignore[assignment]  # a topic that is none of ours is never asked for
+            elif isinstance(record, Message) and record.channel_id in self._topics:
+                topic = self._topics[record.channel_id]
+                messages.append(RecordMessage(topic, record.log_time, record.sequence, record.data))
+        return tuple(messages)
+
+    def _check_size(self, chunk: Chunk) -> None:
+        """Raise ValueError over a chunk that would take more memory than it says."""
+        if chunk.compression == "zstd" and not 0 <= zstandard.frame_content_size(chunk.data) <= MOST_CHUNK:
+            raise ValueError("its length is not known, or too large")
+        if chunk.compression == "lz4" and not 0 < lz4.frame.get_frame_info(chunk.data)["content_size"] <= MOST_CHUNK:
+            raise ValueError("its length is not known, or too large")

@@ -1,0 +1,90 @@
+"""What a record says about its run: version of the format, scenario, configurations, versions of the packages."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
+from wire.journal import RecordLevel
+from wire.messages import Measurement, State
+
+FILE = "run.mcap"
+"""Name of a record in the folder of its case."""
+
+FORMAT = 1
+"""Version of the format. A reader refuses a record of a later one; a new kind of entry or message does not raise it."""
+
+PROFILE = "gridpeers"
+"""Profile in the header of the file, by which a record of ours is known."""
+
+METADATA = "gridpeers"
+"""Name of the metadata record with the `RecordInfo`."""
+
+
+class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
+    """The run of a record, as it was configured."""
+
+    format: int = FORMAT
+    """Version of the format."""
+    level: RecordLevel
+    """What the record has."""
+    scenario: str
+    """Name of the scenario."""
+    case: str
+    """Name of the case; empty in a live run without a scenario."""
+    toml: str
+    """The scenario as run, as TOML; empty in a live run without a scenario."""
+    seed: int
+    """Seed of everything drawn at random."""
+    driver: Literal["inprocess", "processes", "live"]
+    """What carried the messages."""
+    versions: dict[str, str]
+    """Versions of gridpeers and of everything that has a part in the numbers."""
+    inverters: tuple[str, ...]
+    """Names of all inverters, in the order of their table."""
+    plant: PlantConfig
+    """Configuration of the plant: run, kind of time, T_c, end."""
+    agents: tuple[AgentConfig, ...]
+    """Configuration of each agent, also of those that join later: nameplate, graph, law, emulated links."""
+    fields: dict[str, tuple[str, ...]] = msgspec.field(
+        default_factory=lambda: {kind.__name__: kind.__struct_fields__ for kind in (Measurement, State)}
+    )
+    """Fields of the messages that journals have as lists of values."""
+    started: str = ""
+    """Wall-clock time at which a run in real time was started, with its time zone; empty in simulated time, where the
+    record does not depend on it."""
+
+    @property
+    def run(self) -> str:
+        """Name of the run, part of every key."""
+        return self.plant.run
+
+    @property
+    def clock(self) -> Literal["simulated", "wall"]:
+        """Kind of time."""
+        return self.plant.clock
+
+    @property
+    def T_c(self) -> float:
+        """Control period (s)."""
+        return self.plant.T_c
+
+    def agent(self, name: str) -> AgentConfig | None:
+        """Return the configuration of an agent; None if no agent of this name was configured."""
+        return next((config for config in self.agents if config.name == name), None)
+
+    def to_metadata(self) -> dict[str, str]:
+        """Return the metadata of the file: everything as JSON, and what people look for first as texts of its own."""
+        return {
+            "format": str(self.format),
+            "info": msgspec.json.encode(self).decode(),
+            "scenario": self.scenario,
+            "case": self.case,
+            "run": self.run,
+            "clock": self.clock,
+            "seed": str(self.seed),
+            "gridpeers": self.versions.get("gridpeers", ""),
+        }

@@ -1,0 +1,250 @@
+"""Open a record and ask it: `RunRecord`.
+
+All times are run time (s) unless a name says otherwise. Everything is read when it is asked for, a second at a time,
+so a record of hours takes no more memory than a short one. Nothing in the file is trusted: what cannot be read is left
+out, and `damage` tells so.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator
+from math import inf
+from pathlib import Path
+from typing import TypeVar
+
+from netem.ledger import LinkTrace
+from scenarios.emulation.link_reports import data_of
+from scenarios.record.decision_reader import DecisionReader
+from scenarios.record.message_index import MessageIndex, MessageOnWire
+from scenarios.record.record_file import RecordFile, RecordFileError
+from scenarios.record.record_info import FILE
+from scenarios.record.recorded_decision import RecordedDecision
+from scenarios.results.history import History
+from scenarios.short_names import short
+from wire.journal import Entry
+from wire.messages import LinkReport, LinkRequest, PlantEvent, Telemetry
+
+__all__ = ["RecordFileError", "RunRecord"]
+
+T = TypeVar("T")
+
+
+class RunRecord:
+    """The record of one case, opened.
+
+    Make one with `RunRecord.open`.
+
+    Attributes
+    ----------
+    path : Path
+        The file.
+    info : RecordInfo
+        The run: scenario, case, configurations of plant and agents, versions.
+
+    Examples
+    --------
+    Why did inverter 4 do that at 4.3 s?
+
+    >>> record = RunRecord.open("runs/islanding/latest/IV")                             # doctest: +SKIP
+    >>> decision = record.decision("inv4", 4.3)                                         # doctest: +SKIP
+    >>> decision.before, decision.after                                                 # doctest: +SKIP
+    >>> [(each.name, each.age, each.weight, each.unused) for each in decision.neighbours]  # doctest: +SKIP
+    """
+
+    def __init__(self, file: RecordFile) -> None:
+        self._file = file
+        self.path, self.info = file.path, file.info
+        self._index = MessageIndex(file)
+        self._decisions = DecisionReader(self._index)
+
+    @classmethod
+    def open(cls, path: str | Path) -> RunRecord:
+        """Open a record.
+
+        Parameters
+        ----------
+        path : str or Path
+            The file run.mcap, the folder of a case, or the folder of a run with one case.
+
+        Raises
+        ------
+        RecordFileError
+            If there is none, it is no record of gridpeers, or from a later version; one sentence.
+        """
+        return cls(RecordFile(_file_of(Path(path))))
+
+    # ---------------------------------------------------------------- what it is
+
+    @property
+    def complete(self) -> bool:
+        """Whether the record was closed properly. If not, its end is missing: at most the last second."""
+        return self._file.complete
+
+    @property
+    def damage(self) -> tuple[str, ...]:
+        """Sentences on parts of the file that could not be read so far, and on its end if it is cut off."""
+        return tuple(dict.fromkeys((*self._file.damage, *self._index.damage)))
+
+    @property
+    def t_end(self) -> float:
+        """Latest run time in the record (s)."""
+        return self._file.t_end
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """Names of all agents that were configured, also of those that join later."""
+        return tuple(config.name for config in self.info.agents)
+
+    @property
+    def outcome(self) -> str | None:
+        """Why the run broke; empty after a good end; None if the record ends before the run."""
+        last = _last(self.telemetry())
+        return last.outcome if last is not None and last.final else None
+
+    # ---------------------------------------------------------------- physics and events
+
+    def telemetry(self) -> Iterator[Telemetry]:
+        """Yield the plant's telemetry: rows and events, in the order of time."""
+        return self._index.of_type("telemetry", Telemetry)
+
+    def physics(self) -> History:
+        """Return the rows of the plant: f, P, Q, V, P_set, V_set of every inverter, as in history.csv, to the last bit.
+
+        Raises
+        ------
+        RecordFileError
+            If the record has no rows.
+        """
+        rows: list[tuple[float, ...]] = []
+        inverters = self.info.inverters
+        for message in self.telemetry():
+            inverters = message.inverters
+            rows += message.rows
+        if not rows:
+            raise RecordFileError(f"{self.path}: it has no rows: it ends before the run began")
+        return History.of(inverters, rows)
+
+    def events(self) -> tuple[PlantEvent, ...]:
+        """Return the events of the plant, the roster and the links, in the order of time, as in events.csv."""
+        return tuple(event for message in self.telemetry() for event in message.events)
+
+    # ---------------------------------------------------------------- messages
+
+    def messages(
+        self, sender: str | None = None, *, since: float = 0.0, until: float = inf, kind: str | None = None
+    ) -> Iterator[MessageOnWire]:
+        """Yield messages as they were sent, each once, in the order of the record.
+
+        Parameters
+        ----------
+        sender : str, optional
+            Name of an agent, or "plant"; by default all.
+        since, until : float, optional
+            Run times (s) of the messages, the limits included.
+        kind : str, optional
+            Type of the messages, such as "State" or "Measurement"; by default all.
+        """
+        return self._index.messages(sender, since, until, kind)
+
+    def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
+        """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
+
+        In simulated time without emulated links these are, for each decision, the states of the tick before; with
+        emulated links those that had arrived by then, at the tick that first used them.
+
+        Raises
+        ------
+        RecordFileError
+            If there was no such agent.
+        """
+        self._require(agent)
+        return self._decisions.heard(agent, since, until)
+
+    def entries(self, node: str, *, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
+        """Yield all entries of the journal of an agent, or of "plant": tokens, process events and the rest.
+
+        An entry has no run time of its own: `since` and `until` (s) choose the parts of the journal, of 0.2 s or so.
+        """
+        return self._index.entries(node, since, until)
+
+    def links(self) -> Iterator[LinkTrace]:
+        """Yield the verdicts of the emulated links, as in links.csv: in parts of one link, as they were reported."""
+        for report in self._index.of_type("link_reports", LinkReport):
+            try:
+                yield from data_of(report).traces
+            except ValueError:  # the report of a later version, or a damaged one
+                self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
+
+    def link_requests(self) -> Iterator[LinkRequest]:
+        """Yield the commands to emulated links, in their order."""
+        return self._index.of_type("link_requests", LinkRequest)
+
+    # ---------------------------------------------------------------- decisions
+
+    def decisions(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[RecordedDecision]:
+        """Yield the decisions of an agent between two run times (s), the limits included, in the order of time.
+
+        Raises
+        ------
+        RecordFileError
+            If there was no such agent, or the record has the physics only.
+        """
+        self._require(agent)
+        if self.info.level == "physics":
+            raise RecordFileError(f'{self.path}: it has no decisions: the run was recorded with record = "physics"')
+        return self._decisions.decisions(agent, since, until)
+
+    def decision(self, agent: str, t: float) -> RecordedDecision:
+        """Return the decision of an agent that was in force at a run time (s): its last one up to then.
+
+        Raises
+        ------
+        RecordFileError
+            If there was no such agent, the time is outside of the record, or the agent had not decided by then.
+        """
+        if not 0.0 <= t <= self.t_end + self.info.T_c:
+            raise RecordFileError(
+                f"{self.path}: t = {t:g} s is outside of the record, which has 0 to {self.t_end:.2f} s"
+            )
+        back = 1.0
+        while True:
+            found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
+            if found is not None:
+                return found
+            if back > t:
+                raise RecordFileError(
+                    f"{self.path}: {agent} had not decided anything by t = {t:g} s{self._first(agent)}"
+                )
+            back *= 4.0
+
+    def _first(self, agent: str) -> str:
+        first = next(self.decisions(agent), None)
+        return "" if first is None else f"; its first decision is of t = {first.t:.2f} s"
+
+    def _require(self, agent: str) -> None:
+        if agent != "plant" and agent not in self.agents:
+            raise RecordFileError(f"{self.path}: there was no agent {agent}; agents are {short(self.agents)}")
+
+
+def _last(items: Iterable[T]) -> T | None:
+    """Return the last of some items; None if there is none."""
+    latest = deque(items, maxlen=1)
+    return latest[0] if latest else None
+
+
+def _file_of(path: Path) -> Path:
+    """Return the file of a record, given the file, or the folder of its case or of its run."""
+    if path.is_file() or not path.exists():
+        return path
+    if (path / FILE).exists():
+        return path / FILE
+    found = sorted(path.glob(f"*/{FILE}"))
+    if len(found) == 1:
+        return found[0]
+    if not found:
+        raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
+    cases = ", ".join(file.parent.name for file in found)
+    raise RecordFileError(
+        f"{path}: it has a record of each case, {cases}; give the folder of one, as {found[0].parent}"
+    )

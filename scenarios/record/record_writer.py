@@ -1,0 +1,203 @@
+"""Write the record of one case while it runs: chunks, each on the disk within a second of its first message.
+
+A thread of its own encodes, compresses and writes, so that the run waits for no disk. A full or broken disk ends the
+record with one sentence, and the run goes on. What is in the file can be read whatever ends the process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import threading
+from pathlib import Path
+from time import monotonic
+from typing import Any, NamedTuple, cast
+
+from mcap.writer import CompressionType, Writer
+
+from scenarios.record.record_channels import RecordChannel, Topic
+from scenarios.record.record_info import METADATA, PROFILE, RecordInfo
+
+SYNC = 0.9
+"""Least time (s) between two waits until the disk keeps all against a loss of power; other files wait meanwhile."""
+
+PERIOD = 0.5
+"""Longest time (s) that a message waits for its chunk: with the time that its node has kept it, less than 1 s."""
+
+CHUNK = 1_000_000
+"""Bytes of messages from which on a chunk is written at once."""
+
+BEHIND = 64_000_000
+"""Bytes of messages that may wait for the disk; more end the record, so that the memory of a run is bounded."""
+
+
+class _Item(NamedTuple):
+    """A message to be written."""
+
+    topic: Topic
+    t: int
+    """Run time (ns)."""
+    number: int
+    data: bytes
+
+
+class _WholeWrites:
+    """A file to which all that was written since the last flush goes at once; on a failure none of it stays.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which must not exist.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
+        self._pending: list[bytes] = []
+        self._position = self._written = 0
+
+    def write(self, data: bytes) -> int:
+        """Keep bytes for the next flush."""
+        self._pending.append(data)
+        self._position += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        """Return the position behind all bytes."""
+        return self._position
+
+    def flush(self) -> None:
+        """Write what is kept; if that fails, cut the file where it ended before, and raise OSError."""
+        left = memoryview(b"".join(self._pending))
+        self._pending.clear()
+        try:
+            while left:
+                left = left[os.write(self._file, left) :]
+        except OSError:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._written)
+            raise
+        self._written = self._position
+
+    def sync(self) -> None:
+        """Have the disk keep what is written, also when the machine loses its power."""
+        os.fsync(self._file)
+
+    def close(self) -> None:
+        """Close the file."""
+        os.close(self._file)
+
+
+class RecordWriter:
+    """Write one record: `add` its messages, then `close` it.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder exists, and it does not.
+    info : RecordInfo
+        The run.
+    channels : tuple[RecordChannel, ...]
+        Channels of the record.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be made. Later errors end the record: `failure` has the reason.
+    """
+
+    def __init__(self, path: Path, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
+        self.path = path
+        self.failure = ""
+        """Why the record ended early; empty while it goes on, and after a whole one."""
+        self.ended = 0
+        """Run time (ns) of the last message that was taken."""
+        self._file = _WholeWrites(path)
+        # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
+        compression = CompressionType.LZ4 if info.driver == "inprocess" else CompressionType.ZSTD
+        self._writer = Writer(cast("Any", self._file), chunk_size=CHUNK, compression=compression)
+        self._channels: dict[Topic, int] = {}
+        self._begin(info, channels)
+        self._waiting: list[_Item] = []
+        self._bytes = 0
+        self._wake = threading.Event()
+        self._closing = False
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
+        self._thread.start()
+
+    def _begin(self, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
+        writer = self._writer
+        writer.start(profile=PROFILE, library=f"gridpeers {info.versions.get('gridpeers', '')}".strip())
+        writer.add_metadata(METADATA, info.to_metadata())
+        for channel in channels:
+            schema = writer.register_schema(channel.schema_name, "jsonschema", channel.schema)
+            self._channels[channel.topic] = writer.register_channel(channel.topic, channel.encoding, schema)
+        self._flush()
+
+    def add(self, topic: Topic, t: int, number: int, data: bytes) -> None:
+        """Take a message of run time t (ns); it is on the disk within a second."""
+        if self.failure:
+            return
+        with self._lock:
+            self._waiting.append(_Item(topic, t, number, data))
+            self._bytes += len(data)
+            many = self._bytes
+        if many > BEHIND:
+            self._fail(f"its disk takes too long: {many / 1e6:.0f} MB wait for it")
+        elif many > CHUNK:
+            self._wake.set()
+
+    def close(self) -> None:
+        """Write what is left and the index, and close the file."""
+        if self._closing:
+            return
+        self._closing = True
+        self._wake.set()
+        self._thread.join()
+        if not self.failure:
+            try:
+                self._writer.finish()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
+                self._file.flush()
+            except OSError as error:
+                self._fail(error.strerror or str(error))
+        self._file.close()
+
+    # ---------------------------------------------------------------- the thread
+
+    def _write_all(self) -> None:
+        """Write a chunk every `PERIOD`, or when there is much to write, until the end."""
+        synced = monotonic()
+        while not self.failure:
+            self._wake.wait(PERIOD)
+            self._wake.clear()
+            closing = self._closing
+            try:
+                if self._write_waiting() and not closing and monotonic() - synced >= SYNC:
+                    self._file.sync()
+                    synced = monotonic()
+            except OSError as error:
+                self._fail(error.strerror or str(error))
+            if closing:
+                return
+
+    def _write_waiting(self) -> bool:
+        """Write the messages that wait as one chunk; return whether there were any."""
+        with self._lock:
+            items, self._waiting = self._waiting, []
+            self._bytes = 0
+        for item in items:
+            self._writer.add_message(self._channels[item.topic], item.t, item.data, item.t, item.number)
+        if items:
+            self._flush()
+            self.ended = items[-1].t
+        return bool(items)
+
+    def _flush(self) -> None:
+        self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
+
+    def _fail(self, why: str) -> None:
+        """End the record."""
+        self.failure = self.failure or why
+        with self._lock:
+            self._waiting.clear()
+            self._bytes = 0

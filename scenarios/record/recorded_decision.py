@@ -1,0 +1,134 @@
+"""One decision of an agent as recorded: its inputs, what it left out and why, and the state that came out."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Literal
+
+from agents.agent import neighbour_of, own_of
+from agents.agent_config import AgentConfig, Control, LawChoice
+from agents.carriers.law_registry import LAWS
+from agents.laws.in_force import law_in_force
+from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from wire.messages import Measurement, Nameplate, State
+
+Action = Literal["law", "hold", "off", "idle"]
+"""What an agent does at a tick: its law decides; secondary control is on hold, as the inverter is grid-connected or has
+none; the inverter is out of service; the agent is paused, without a measurement, or its law has failed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NeighbourInput:
+    """An in-neighbour of an agent at a decision."""
+
+    nameplate: Nameplate
+    """Its nameplate."""
+    state: State | None
+    """Its last state that the agent had heard; None if there was none, or the record does not have it."""
+    number: int | None
+    """Number of that state, also if the record does not have it; None if there was none."""
+    age: float | None
+    """Age of that state (s of run time); None if there was none."""
+    weight: float
+    """Weight from 0 to 1 of that state in the sums; 0 if it was left out."""
+    unused: str
+    """Why it was left out: "silent", "stale" or "island" (`wire.journal.UNUSED`); empty if it was used."""
+
+    @property
+    def name(self) -> str:
+        """Name of its inverter."""
+        return self.nameplate.sender
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordedDecision:
+    """One decision of an agent. SI units; `own` and `neighbours_used` have them per unit, as the law saw them."""
+
+    config: AgentConfig
+    """Configuration of the agent."""
+    tick: int
+    """Number of the own state: in simulated time the tick k, at t = k T_c."""
+    at: float | None
+    """Time on the agent's clock (s, monotonic); None in simulated time."""
+    measurement: Measurement
+    """Own measurement as the agent used it. Its `t` is the run time of the decision."""
+    measurement_age: int
+    """Simulated time: age of the values of the measurement in ticks; 0 without an emulated link."""
+    neighbours: tuple[NeighbourInput, ...]
+    """In-neighbours by the graph that the agent had met, in the order in which the law sums over them."""
+    not_met: tuple[str, ...]
+    """Agents of the run that the graph makes in-neighbours, but that were not there: not started, gone, or not met."""
+    before: tuple[float, float]
+    """Set-points (W, V) before the decision."""
+    saturated: tuple[int, int]
+    """Saturated sides of P and V: 1, -1 or 0; see `agents.laws.law.Own`."""
+    action: Action
+    """What the agent did."""
+    state: State
+    """What came out: set-points (W, V), and what it shared."""
+
+    @property
+    def agent(self) -> str:
+        """Name of the agent."""
+        return self.config.name
+
+    @property
+    def t(self) -> float:
+        """Run time of the decision (s): that of its measurement."""
+        return self.measurement.t
+
+    @property
+    def after(self) -> tuple[float, float]:
+        """Set-points (W, V) after the decision."""
+        return self.state.P_set, self.state.V_set
+
+    @property
+    def own(self) -> Own:
+        """The own inverter as the law saw it (pu)."""
+        return own_of(self.config, self.measurement, *self.before, self.saturated)
+
+    @property
+    def neighbours_used(self) -> tuple[Neighbour, ...]:
+        """The neighbours in the sums as the law saw them (pu), in its order."""
+        return tuple(
+            neighbour_of(each.nameplate, each.state, each.age, each.weight)
+            for each in self.neighbours
+            if not each.unused and each.state is not None and each.age is not None
+        )
+
+    @property
+    def T(self) -> float:
+        """Control period (s) that the law was called with."""
+        wall = self.config.clock == "wall"
+        return self.config.T_c if wall else self.config.by_own_clock().T_c
+
+    @property
+    def limits_hit(self) -> tuple[str, ...]:
+        """Limits of the law at which a set-point rests: "P_set_min", "P_set_max", "V_set_min", "V_set_max"."""
+        if self.action != "law":
+            return ()
+        limits, (P_set, V_set) = limits_of(self.config.control), self.after
+        values = {"P_set": (P_set, self.config.P_rated), "V_set": (V_set, self.config.V_nom)}
+        return tuple(name for name in LIMITS if (value := values[name[:5]])[0] == limits[name] * value[1])
+
+
+def limits_of(control: Control) -> dict[str, float]:
+    """Return the limits (pu) to which an agent holds what its law decides, by the name of their parameter.
+
+    Examples
+    --------
+    >>> limits_of(Control(secondary="all", graph="full"))["V_set_max"]
+    1.1
+    """
+    choice = control.law
+    kind: object = Law
+    if choice.use == LawChoice().use and not (choice.command or choice.fmu):
+        kind = law_in_force(control)
+    elif not (choice.command or choice.fmu):
+        with suppress(
+            ValueError
+        ):  # code that is not here: its limits are those of every law, if it has none of its own
+            kind = LAWS.resolve(choice.use, choice.folder)
+    own = limits_in(choice.parameters)
+    return {name: float(own.get(name, getattr(kind, name))) for name in LIMITS}

@@ -1,0 +1,74 @@
+"""The record of one case under way: which message of the run goes to which channel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from scenarios.record.record_channels import TOPICS, channels
+from scenarios.record.record_info import FILE, RecordInfo
+from scenarios.record.record_writer import RecordWriter
+from scenarios.record.viewer_messages import PhysicsTemplate, event_json, nanoseconds
+from wire.codec import payload_of
+from wire.messages import Journal, LinkReport, LinkRequest, Telemetry
+
+VIEW_STEP = 0.2
+"""Least distance (s) of the rows that viewers get in simulated time: each takes as long as a decision, and all rows are
+in the telemetry."""
+
+
+class Recording:
+    """Record one case: give it all that the plant publishes for recorders, then close it.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the case.
+    info : RecordInfo
+        The run.
+    quantities : Sequence[str]
+        Names of the values of each inverter in a row, with their units.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be made.
+    """
+
+    def __init__(self, folder: Path, info: RecordInfo, quantities: Sequence[str]) -> None:
+        self._writer = RecordWriter(folder / FILE, info, channels(info.inverters, tuple(quantities)))
+        self._quantities = quantities
+        self._template: PhysicsTemplate | None = None
+        self._step = 0 if info.clock == "wall" else nanoseconds(VIEW_STEP)
+        self._shown: int | None = None
+        """Time (ns) of the last row for viewers."""
+
+    @property
+    def failure(self) -> str:
+        """One sentence on why the record ended early; empty if it did not."""
+        writer = self._writer
+        if not writer.failure:
+            return ""
+        return f"the record {writer.path.name} ends at {writer.ended / 1e9:.2f} s: {writer.failure}"
+
+    def telemetry(self, message: Telemetry, lines: Sequence[bytes]) -> None:
+        """Record rows and events; `lines` are the rows' lines in history.csv."""
+        writer = self._writer
+        if self._template is None:
+            self._template = PhysicsTemplate(message.inverters, self._quantities)
+        writer.add("telemetry", nanoseconds(message.t), message.seq, payload_of(message))
+        for row, line in zip(message.rows, lines, strict=True):
+            at = nanoseconds(row[0])
+            if self._shown is None or at - self._shown >= self._step:
+                self._shown = at
+                writer.add("physics", at, 0, self._template.of(line, row))
+        for event in message.events:
+            writer.add("events", nanoseconds(event.t), 0, event_json(event))
+
+    def message(self, message: Journal | LinkReport | LinkRequest) -> None:
+        """Record another message of the plant for recorders."""
+        self._writer.add(TOPICS[type(message)], nanoseconds(message.t), message.seq, payload_of(message))
+
+    def close(self) -> None:
+        """Write what is left, and close the file."""
+        self._writer.close()

@@ -1,0 +1,97 @@
+"""A record has everything that a decision was made from: the same core decides the same from it, to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from agents.laws.consensus import Consensus
+from scenarios.record.recomputation import recomputed
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.history import read_history
+from tests.conformance.test_links import STORM
+from tests.record.recorded_runs import recorded_run
+
+
+def assert_decisions_are_recorded(record: RunRecord) -> None:
+    """Each state of each agent is one decision, which gives the same bytes when it is made again."""
+    assert record.complete
+    assert record.damage == ()
+    for agent in record.agents:
+        states = [message.number for message in record.messages(agent, kind="State")]
+        again = list(recomputed(record, agent))
+        assert [each.decision.tick for each in again] == states
+        assert [each.decision.tick for each in again if not each.agrees] == []
+
+
+@pytest.mark.parametrize("messages", [False, True], ids=["direct", "bus"])
+def test_islanding(messages: bool, tmp_path: Path) -> None:
+    """Case IV of the paper's first scenario, with messages and without: 350 decisions of each of nine agents."""
+    record = recorded_run("islanding", "IV", tmp_path / "IV", messages=messages)
+
+    assert_decisions_are_recorded(record)
+    assert sum(1 for _ in record.messages(kind="State")) == 9 * 350
+    history = read_history(tmp_path / "IV" / "history.csv")
+    physics = record.physics()
+    assert physics.inverters == history.inverters
+    assert all(
+        np.array_equal(getattr(physics, name), getattr(history, name))
+        for name in ("t", "f", "P", "Q", "V", "P_set", "V_set")
+    )
+
+
+def test_emulated_links_and_nodes(tmp_path: Path) -> None:
+    """Delays, losses, copies, flipped bits, cuts, pauses, a kill and a slow clock: what arrived is in the record."""
+    (tmp_path / "storm.toml").write_text(STORM, encoding="utf-8")
+    record = recorded_run(tmp_path / "storm.toml", "storm", tmp_path / "storm")
+
+    assert_decisions_are_recorded(record)
+    ages = {each.age for d in record.decisions("inv1") for each in d.neighbours if each.age is not None}
+    assert len(ages) > 10
+    assert {each.unused for d in record.decisions("inv1") for each in d.neighbours} >= {"", "silent", "island"}
+    rows = (tmp_path / "storm" / "links.csv").read_text(encoding="utf-8").splitlines()[1:]
+    assert sum(len(trace.seq) for trace in record.links()) == len([row for row in rows if "copy" not in row]) > 10_000
+
+
+@pytest.mark.parametrize(
+    ("scenario", "case"),
+    [
+        ("partition", "halves-expire"),
+        ("unheard-switches", "frequency"),
+        ("wind-up", "conditional"),
+        ("reduced-communication", "reduced"),
+        ("plug-n-play", "IV"),
+    ],
+)
+def test_agents_with_a_memory(scenario: str, case: str, tmp_path: Path) -> None:
+    """Ages, islands by frequency, saturation, quiet laws, and an agent that leaves and joins again."""
+    assert_decisions_are_recorded(recorded_run(scenario, case, tmp_path / case))
+
+
+def test_with_messages_and_without_the_record_has_the_same(tmp_path: Path) -> None:
+    """The direct way notes what the bus would have carried: each state and measurement, and each decision."""
+    direct = recorded_run("islanding", "III", tmp_path / "direct")
+    bus = recorded_run("islanding", "III", tmp_path / "bus", messages=True)
+
+    for kind in ("Measurement", "State"):
+        assert sorted((each.key, each.number, each.payload) for each in direct.messages(kind=kind)) == sorted(
+            (each.key, each.number, each.payload) for each in bus.messages(kind=kind)
+        )
+    for agent in direct.agents:
+        one, other = list(direct.decisions(agent)), list(bus.decisions(agent))
+        assert [(d.neighbours, d.before, d.action, d.state) for d in one] == [
+            (d.neighbours, d.before, d.action, d.state) for d in other
+        ]
+    assert direct.events() == bus.events()
+
+
+def test_a_difference_would_be_found(tmp_path: Path) -> None:
+    """With another gain the same inputs give another state: the comparison can fail."""
+    record = recorded_run("islanding", "IV", tmp_path / "IV")
+
+    again = list(recomputed(record, "inv4", Consensus(k_p=0.0008)))
+
+    assert {each.decision.action for each in again if each.agrees} == {"hold"}
+    assert not any(each.agrees for each in again if each.decision.t > 2.0)

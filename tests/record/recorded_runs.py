@@ -1,0 +1,54 @@
+"""Runs with a record, by any driver, for tests."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.process_driver import run_processes
+from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.record import Recorder
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of
+from wire.journal import RecordLevel
+
+
+def recorded_run(
+    scenario: str | Path,
+    case: str,
+    folder: Path,
+    *,
+    messages: bool = False,
+    processes: bool = False,
+    level: RecordLevel = "all",
+) -> RunRecord:
+    """Run a case in one process, with or without messages, or in many; return its record."""
+    model, feeder = load_scenario(scenario)
+    plant, agents = configs(model, feeder, case, "tcp/127.0.0.1:0" if processes else "")
+    plant, agents = replace(plant, record=level), tuple(replace(agent, record=level) for agent in agents)
+    info = RecordInfo(
+        level=level,
+        scenario=model.name,
+        case=case,
+        toml="",
+        seed=model.seed,
+        driver="processes" if processes else "inprocess",
+        versions={"gridpeers": "0.1.0"},
+        inverters=tuple(row.name for row in inverters_of(model, feeder)),
+        plant=plant,
+        agents=agents,
+    )
+    with Recorder(folder, record=info) as recorder:
+        if processes:
+            logs = folder / "log"
+            outcome = run_processes(plant, agents, logs, recorder, on_links=recorder, on_journal=recorder, shared=3)
+        else:
+            outcome = run_inprocess(plant, agents, recorder, on_links=recorder, on_journal=recorder, messages=messages)
+        assert outcome.broke == ""
+        recorder.finish(model.time.end_s, model.time.record_s)
+    assert recorder.record_failure == ""
+    return RunRecord.open(folder)

@@ -1,0 +1,150 @@
+"""A record that is cut off, damaged, from a later version, or none of ours: one line says so, and the rest is read."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+from mcap.writer import Writer
+
+from scenarios.record.record_file import RecordFileError
+from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
+from scenarios.record.record_reader import RunRecord
+from tests.record.recorded_runs import recorded_run
+
+CALM = '[time]\nend_s = 1.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A record of 1 s, in several chunks."""
+    folder = tmp_path_factory.mktemp("record")
+    (folder / "calm.toml").write_text(CALM, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
+        return recorded_run(folder / "calm.toml", "calm", folder / "calm").path
+
+
+def read_all(path: Path) -> tuple[RunRecord, int]:
+    """Read everything there is in a record; return it with the number of its messages."""
+    record = RunRecord.open(path)
+    count = sum(1 for _ in record.messages())
+    for agent in record.agents:
+        count += sum(1 for _ in record.decisions(agent))
+    record.events()
+    assert all(len(text) < 300 and "\n" not in text for text in record.damage)
+    return record, count
+
+
+def test_a_whole_record_says_so(whole: Path) -> None:
+    """All of it is there, and nothing is damaged."""
+    record, count = read_all(whole)
+
+    assert record.complete
+    assert record.damage == ()
+    assert record.outcome == ""
+    assert record.t_end == 1.0
+    assert count == 9 * 50 * 3
+
+
+def test_a_record_cut_off_anywhere_is_read_up_to_there(whole: Path, tmp_path: Path) -> None:
+    """At every length, once the file says what it is, it opens, tells that it is cut off, and has what came before."""
+    data, counts = whole.read_bytes(), []
+    opened = 0
+    for length in (*range(1, 4000, 97), *range(4000, len(data), len(data) // 60)):
+        (tmp_path / FILE).write_bytes(data[:length])
+        try:
+            record, count = read_all(tmp_path)
+        except RecordFileError:
+            assert opened == 0
+            continue
+        opened += 1
+        counts.append(count)
+        assert not record.complete
+        assert any("cut off" in text for text in record.damage)
+
+    assert opened > 40
+    assert counts == sorted(counts)
+    assert counts[-1] > counts[len(counts) // 2] > 0
+
+
+def test_a_record_with_changed_bytes_is_read_around_them(whole: Path, tmp_path: Path) -> None:
+    """Whatever byte is wrong, what can be read is read, the rest is told, and nothing else is raised."""
+    data, draws, told = whole.read_bytes(), random.Random(7), 0
+    for _ in range(120):
+        changed = bytearray(data)
+        for _ in range(draws.choice((1, 1, 20))):
+            changed[draws.randrange(len(data))] = draws.randrange(256)
+        (tmp_path / FILE).write_bytes(changed)
+        try:
+            record, _ = read_all(tmp_path)
+            told += bool(record.damage)
+        except RecordFileError:
+            told += 1
+
+    assert told > 60
+
+
+@pytest.mark.parametrize(
+    ("content", "complaint"),
+    [
+        (b"", "this is no record: it does not begin as an MCAP file"),
+        (b"t_s,inv1_f_Hz\n", "this is no record"),
+        (b"\x89MCAP0\r\n", "it ends before it says what was recorded: 8 bytes"),
+    ],
+)
+def test_another_file_is_told_in_one_line(content: bytes, complaint: str, tmp_path: Path) -> None:
+    """An empty file, a table, the beginning of a record."""
+    (tmp_path / FILE).write_bytes(content)
+
+    with pytest.raises(RecordFileError, match=complaint):
+        RunRecord.open(tmp_path)
+
+
+def test_an_mcap_file_of_others_is_told(tmp_path: Path) -> None:
+    """Its profile is another one."""
+    with (tmp_path / FILE).open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        writer.finish()
+
+    with pytest.raises(RecordFileError, match="no record of gridpeers: its profile is 'ros2'"):
+        RunRecord.open(tmp_path)
+
+
+def test_a_later_format_is_refused(tmp_path: Path) -> None:
+    """It names both formats and what to do, before anything else is read."""
+    with (tmp_path / FILE).open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile=PROFILE)
+        writer.add_metadata(METADATA, {"format": str(FORMAT + 1), "gridpeers": "9.9", "info": "?"})
+        writer.finish()
+
+    with pytest.raises(RecordFileError, match=f"of format {FORMAT + 1}, written by gridpeers 9.9; .*install the later"):
+        RunRecord.open(tmp_path)
+
+
+def test_what_was_not_there_is_told(whole: Path, tmp_path: Path) -> None:
+    """A time outside, an agent that was not there, a folder without a record: one line each, with what there is."""
+    record = RunRecord.open(whole)
+
+    with pytest.raises(RecordFileError, match=r"t = 7 s is outside of the record, which has 0 to 1.00 s"):
+        record.decision("inv1", 7.0)
+    with pytest.raises(RecordFileError, match="there was no agent inv77; agents are inv1-9"):
+        record.decision("inv77", 0.5)
+    with pytest.raises(RecordFileError, match=r"there is no run\.mcap"):
+        RunRecord.open(tmp_path)
+    with pytest.raises(RecordFileError, match="cannot be read: No such file"):
+        RunRecord.open(whole.parent / "other.mcap")
+
+
+def test_physics_alone_have_no_decisions(tmp_path: Path) -> None:
+    """A record of the physics has rows and events, and says why it has no decisions."""
+    (tmp_path / "calm.toml").write_text(CALM, encoding="utf-8")
+    record = recorded_run(tmp_path / "calm.toml", "calm", tmp_path / "calm", level="physics")
+
+    assert record.physics().t[-1] == 1.0
+    assert list(record.messages()) == []
+    with pytest.raises(RecordFileError, match='record = "physics"'):
+        record.decision("inv1", 0.5)

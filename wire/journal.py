@@ -1,0 +1,209 @@
+"""A node's journal: what went into its core and what came out, as a stream of entries, for a recorder. Pure.
+
+The record of a run is what went into the pure cores and what came out of them; the same cores compute everything else
+again. A node therefore notes the bytes that it sends, what it hears, tokens that come and go, and the inputs of each
+decision. An entry is a msgpack array whose first value names its kind; entries follow each other without a frame, so a
+journal is cut at any entry and joined to the next part. `wire.messages.Journal` carries one part.
+
+Three rules keep it small, because in simulated time a tick must not wait for its journal:
+
+- A message is noted once with its bytes: by its sender. Who hears it notes sender, epoch and number.
+- In simulated time the plant notes all measurements and states of a tick in one entry, because they all pass it. An
+  agent has heard all states of the tick before from its in-neighbours, unless an emulated link is between.
+- In simulated time an agent notes how it decided only where that changes: `Decision` holds until the next one.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+RecordLevel = Literal["all", "decisions", "physics"]
+"""What nodes note: everything; decisions with their inputs, but no arrivals and no fates on links; or nothing, as the
+plant's telemetry has the physics."""
+
+LOT = 32_000
+"""Bytes of entries from which on a part of a journal is sent: Zenoh sends so many in one piece."""
+
+ROOM = 1_000_000
+"""Bytes that a journal holds at most: what comes beyond, as in a flood of messages, is counted only."""
+
+AT_ONCE = 64
+"""Most messages in one entry: of the longest there are, they fit into a part."""
+
+
+class Entry(msgspec.Struct, frozen=True, array_like=True):
+    """One entry; its tag is the first value of the array."""
+
+
+class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
+    """Measurements that the plant sent and states that it heard in one tick of simulated time, as bytes."""
+
+    tick: int
+    """k."""
+    measurements: list[Any]
+    """Payloads of `Measurement`, in the order in which they were sent. Where plant and agents share a process and send
+    none: the values of each in the order of the fields, which the record names."""
+    states: list[Any]
+    """The same of `State`, in the order in which they came."""
+
+
+class Sent(Entry, frozen=True, array_like=True, tag="sent"):
+    """A message that the node sent."""
+
+    at: float | None
+    """Time on the own clock (s, monotonic); None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`."""
+    payload: bytes
+    """Its bytes."""
+
+
+class Heard(Entry, frozen=True, array_like=True, tag="heard"):
+    """A sound message off the wire whose bytes are in its sender's journal."""
+
+    at: float | None
+    """Time of arrival on the own clock (s, monotonic); None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`."""
+    epoch: int
+    """Epoch of the sender."""
+    seq: int
+    """Number of the message."""
+    rejected: str = ""
+    """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
+
+
+class Received(Entry, frozen=True, array_like=True, tag="received"):
+    """A message off the wire, with its bytes: nobody else has noted them, or they are not sound."""
+
+    at: float | None
+    """Time of arrival on the own clock (s, monotonic); None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`."""
+    payload: bytes
+    """Its bytes."""
+    rejected: str = ""
+    """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
+
+
+class Token(Entry, frozen=True, array_like=True, tag="token"):
+    """A liveliness token that appeared or vanished."""
+
+    at: float | None
+    """Time on the own clock (s, monotonic); None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`."""
+    appeared: bool
+    """Whether it appeared."""
+
+
+class Woken(Entry, frozen=True, array_like=True, tag="woken"):
+    """The node acted because its clock said so, after all entries before this one."""
+
+    at: float
+    """Time on the own clock (s, monotonic)."""
+
+
+class Process(Entry, frozen=True, array_like=True, tag="process"):
+    """An event of the process: its start, a hold, a new session, the end."""
+
+    at: float | None
+    """Time on the own clock (s, monotonic); None in simulated time."""
+    kind: str
+    """"start", "line" (of its log), "session", "lost" (entries, as the journal was full) or "end"."""
+    text: str
+    """One sentence."""
+
+
+class Decision(Entry, frozen=True, array_like=True, tag="decision"):
+    """How an agent decided at a tick; in simulated time also at the following ones, until the next entry.
+
+    The lists run over the in-neighbours of the tick, in the order of the roster.
+    """
+
+    tick: int
+    """Number of the own state that came out."""
+    measurement: int
+    """In simulated time the age of the own measurement in ticks, 0 without an emulated link; in wall-clock time its
+    number."""
+    neighbours: list[str]
+    """In-neighbours by the graph, among those on the roster."""
+    states: list[int | None]
+    """Last state that was heard of each: in simulated time its age in ticks, 1 without an emulated link; in wall-clock
+    time its number. None if no state was heard."""
+    unused: list[str]
+    """Reason why the state of each was left out of the sums: one of `UNUSED`, empty if it was used; no list if all were
+    used."""
+    weights: list[float]
+    """Weight of each, from 0 to 1; no list if all used ones have 1."""
+    saturated: tuple[int, int] = (0, 0)
+    """Saturated sides of P and V; see `agents.laws.law.Own`."""
+    at: float | None = None
+    """Time of the decision on the own clock (s, monotonic); None in simulated time."""
+    ages: list[float | None] = []
+    """Age of each state (s of run time); no list in simulated time, where it is the time between the two ticks."""
+    before: list[float] = []
+    """Set-points (W, V) before the decision; no list in simulated time, where they are those of the state before."""
+
+
+UNUSED = {
+    "silent": "no state was heard",
+    "stale": "its last state was older than max_age",
+    "island": "it was in another island",
+}
+"""Reasons why an agent leaves out an in-neighbour."""
+
+
+ENTRIES = (Exchange, Sent, Heard, Received, Token, Woken, Process, Decision)
+"""All kinds of entries."""
+
+_encode_into = msgspec.msgpack.Encoder().encode_into
+
+
+class JournalBuffer:
+    r"""Entries since the last part.
+
+    Examples
+    --------
+    >>> journal = JournalBuffer()
+    >>> journal.add(Token(None, "alive/agent/inv1/a", True))
+    >>> len(journal), journal.take_parts()[0][:7], len(journal)
+    (29, b'\x94\xa5token', 0)
+    """
+
+    __slots__ = ("_bytes", "_ends", "_lost")
+
+    def __init__(self) -> None:
+        self._bytes = bytearray()
+        self._lost = 0
+        """Entries that found no room."""
+        self._ends: list[int] = []
+        """Ends of the entries that a part may end with."""
+
+    def __len__(self) -> int:
+        return len(self._bytes)
+
+    def add(self, entry: Entry) -> None:
+        """Add an entry at the end, if there is room."""
+        if len(self._bytes) > ROOM:
+            self._lost += 1
+            return
+        _encode_into(entry, self._bytes, -1)
+        if len(self._bytes) - (self._ends[-1] if self._ends else 0) >= LOT:
+            self._ends.append(len(self._bytes))
+
+    def take_parts(self) -> list[bytes]:
+        """Take out all entries, in parts of about `LOT` bytes."""
+        if self._lost:
+            _encode_into(Process(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"), self._bytes, -1)
+            self._lost = 0
+        parts, begin = [], 0
+        for end in (*self._ends, len(self._bytes)):
+            if end > begin:
+                parts.append(bytes(self._bytes[begin:end]))
+            begin = end
+        self._bytes.clear()
+        self._ends.clear()
+        return parts
