@@ -88,6 +88,8 @@ class Inverters:
         Whether each is a GFL of balanced power.
     S_max : float64[n]
         Apparent-power limits (pu); infinite for a GFM.
+    db_UV, db_OV : float64[n]
+        Dead bands of volt-var below and above V_set (pu); 0 for a GFM, infinite for a GFL without volt-var.
     y_f : complex128[n]
         Filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
         "second-order", which solves its filter together with its current controller.
@@ -131,6 +133,9 @@ class Inverters:
         self.direct[self.gfm_at] = ~self.gfm["voltage_control"]
         self.S_max = np.full(n, np.inf)
         self.S_max[self.gfl_at] = self.gfl["S_max"]
+        self.db_UV, self.db_OV = np.zeros(n), np.zeros(n)
+        for band, name in ((self.db_UV, "db_UV"), (self.db_OV, "db_OV")):
+            band[self.gfl_at] = np.where(self.gfl["volt_var"], self.gfl[name], np.inf)
         self.P_set_lim = np.array([unit.parameters.P_set_lim for unit in units])
         self.V_set_min = np.array([unit.parameters.V_set_min for unit in units])
         self.V_set_max = np.array([unit.parameters.V_set_max for unit in units])

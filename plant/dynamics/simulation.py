@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from plant.dynamics import switching
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
-from plant.dynamics.initial import OperatingPoint, equilibrium, set_equilibrium
 from plant.dynamics.inverters import Inverter, Inverters
 from plant.dynamics.kernel.controller_pass import READING, Units
 from plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
@@ -20,6 +19,8 @@ from plant.dynamics.live_network import TOLERANCE, LiveNetwork
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.reduction.island_parts import is_large
 from plant.dynamics.reduction.reduced import Complex, Real
+from plant.dynamics.start.at_rest import set_equilibrium
+from plant.dynamics.start.operating_point import OperatingPoint, equilibrium
 from plant.dynamics.unsettled_island import unsettled_island
 from plant.plant_config import Method
 
@@ -83,7 +84,7 @@ class Dynamics:
         """Start from the equilibrium at real powers `P` (pu), and at reactive powers `Q` or set-points `V_set` (pu).
 
         With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a
-        GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop.
+        GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop and its dead band.
 
         Raises
         ------

@@ -8,10 +8,11 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from plant.dynamics import Dynamics, Inverter, PlantError
-from plant.dynamics.initial import require_within_limits
+from plant.dynamics.start.at_rest import require_within_limits
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
 from plant.feeder.current_limits import CurrentLimits
+from plant.feeder.hunting import hunting_event
 from plant.feeder.in_service import InService
 from plant.feeder.islands import Islands
 from plant.feeder.load_limits import LoadLimits
@@ -127,12 +128,13 @@ class Plant:
             self._settle,
         )
         n = len(self.inverters)
-        self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
+        point = self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
         require_within_limits(self._dynamics.inverters, self._dynamics.network.reduction.online)
         self._load_limits = LoadLimits(network, self._dynamics.network.V_branch)
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
+        self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # scheduled networks are factored now: in wall-clock time an event must not be late
         for closed in self._switches.foreseen():
             self._dynamics.network.reduced(self._circuits.of(closed))

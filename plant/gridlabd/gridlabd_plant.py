@@ -83,6 +83,7 @@ class GridlabdPlant:
         self._set_points = SetPointLimits()
         self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
         self._events = self._schedule.start()
+        self._events += [event for event in ours.take_events() if event.kind == "warning"]
         self._writes: list[Write] = []
         """Values for GridLAB-D's next step."""
         start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}

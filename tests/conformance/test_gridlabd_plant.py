@@ -116,6 +116,20 @@ def test_set_points_beyond_an_inverters_bounds_are_limited_on_gridlabd(three_isl
     ]
 
 
+def test_an_inverter_without_rest_is_a_warning_on_either_plant(islanding: gp.Scenario) -> None:
+    """inv6 hunts on the edge of its dead band from the start; who reads the events of either plant knows."""
+    hunting = islanding.replace({"plant.gfl.db_UV_pu": 0.005, "plant.gfl.db_OV_pu": 0.005})
+    config, _ = configs(hunting.spec, hunting.feeder, "IV")
+    texts = []
+    for simulator in ("gridlabd", "gridpeers"):
+        plant = start_plant(replace(config, settings=replace(config.settings, simulator=simulator)))
+        texts.append([event.text for event in plant.take_events()])
+        plant.close()
+
+    assert texts[0] == texts[1]
+    assert [text.partition(":")[0] for text in texts[0]] == ["inv6 has no rest at t = 0"]
+
+
 def largest_difference(scenario: gp.Scenario, ran: Result, later: dict[str, float] | None = None) -> float:
     """Run our plant through the same, some switches later (s), and return the largest difference (Hz, pu)."""
     config, agents = configs(scenario.spec, scenario.feeder, "IV")

@@ -13,6 +13,9 @@ from plant.plant_config import PlantConfig, SwitchEvent
 ONE_RATING = GflParameters(S_max=1.0, V_set_max=2.0)
 """GridLAB-D has one rating for a GFL's reference and its apparent power (ours: 1 and 1.2 pu), and no bound of V_set."""
 
+DEAD_BANDS = GflParameters(db_UV=0.01, db_OV=0.01, db_UF=0.036, db_OF=0.036)
+"""Some GFL start within their band of voltage, and some beyond it; none is on its edge."""
+
 GFL = ("inv2", "inv3", "inv5", "inv6", "inv8", "inv9")
 """The grid-following inverters of microgrid123."""
 
@@ -117,6 +120,18 @@ RUNS = {
         "islanding",
         "I",
         gfl=GflParameters(mode="balanced_power"),
+    ),
+    "dead-bands": ComparedRun(
+        "as islanding-I, GFL with dead bands of 0.01 pu and 0.036 Hz, whose edges they cross",
+        "islanding",
+        "I",
+        gfl=DEAD_BANDS,
+    ),
+    "dead-bands-IV": ComparedRun(
+        "the same in closed loop", "islanding", "IV", closed_loop=True, gfl=DEAD_BANDS, in_tests=False
+    ),
+    "volt-var-off": ComparedRun(
+        "as islanding-I, GFL without volt-var", "islanding", "I", gfl=GflParameters(volt_var=False), in_tests=False
     ),
     "single-phase-IV": ComparedRun(
         "as islanding-IV, with three GFL and two GFM on single phases, in closed loop too",

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from plant.dynamics import hybrid_root
+from plant.dynamics.start import hybrid_root
 
 Real = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import optimize
 
-from plant.dynamics import initial
+from plant.dynamics.start import by_droop
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import PlantSettings
@@ -37,7 +37,7 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
 
     root = optimize.root
     monkeypatch.setattr(optimize, "root", noted)
-    monkeypatch.setattr(initial, "MOST_BY_DIFFERENCES", 0)
+    monkeypatch.setattr(by_droop, "MOST_BY_DIFFERENCES", 0)
     many = start()
 
     assert methods == ["krylov"]
@@ -47,7 +47,7 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
 def test_many_inverters_that_newton_krylov_does_not_solve_start_as_few_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where Newton-Krylov does not converge, the full Jacobian decides."""
     few = start()
-    monkeypatch.setattr(initial, "MOST_BY_DIFFERENCES", 0)
-    monkeypatch.setattr(initial, "KRYLOV", initial.KRYLOV | {"maxiter": 1})
+    monkeypatch.setattr(by_droop, "MOST_BY_DIFFERENCES", 0)
+    monkeypatch.setattr(by_droop, "KRYLOV", by_droop.KRYLOV | {"maxiter": 1})
 
     assert reactive_powers(start()) == pytest.approx(reactive_powers(few), abs=1e-10)

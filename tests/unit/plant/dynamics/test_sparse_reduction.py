@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.dynamics import initial, live_network
+from plant.dynamics import live_network
 from plant.dynamics.kernel.constant_power import NO_NETWORK
 from plant.dynamics.reduction import reduce_network
+from plant.dynamics.start import power_flow
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import Method, PlantSettings, SwitchEvent
@@ -60,9 +61,9 @@ def test_a_tangent_that_is_renewed_gives_the_same_run_in_fewer_iterations(monkey
 def test_a_start_to_which_the_tangent_does_not_lead_is_found_by_newton(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the frozen tangent fails, e.g. across a limit of the loads' law, the operating point is the same."""
     plain, failures = rows(monkeypatch, 0, "first-order"), iter([True, False] * 3)
-    settle = initial.settle_powers
+    settle = power_flow.settle_powers
     monkeypatch.setattr(
-        initial, "settle_powers", lambda *words: (NO_NETWORK, 0.0) if next(failures, False) else settle(*words)
+        power_flow, "settle_powers", lambda *words: (NO_NETWORK, 0.0) if next(failures, False) else settle(*words)
     )
 
     np.testing.assert_allclose(rows(monkeypatch, 0, "first-order"), plain, rtol=1e-9, atol=1e-3)

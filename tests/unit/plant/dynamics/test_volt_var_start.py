@@ -1,0 +1,131 @@
+"""The start with dead bands of volt-var: inverters rest within them, beyond them, or hunt on their edge."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from plant.dynamics import Dynamics
+from plant.dynamics.reduction.reduced import Real
+from plant.dynamics.start.by_droop import MOST_ROUNDS
+from plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
+from plant.plant_config import GflParameters
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
+
+VOLT_VAR = replace(GFL_D, volt_var=True, F_current=0.6, T_qf=0.1)
+X, M_Q = 0.05, 0.05
+"""Reactance between the source and the inverter (pu), and the inverter's Q-V droop (pu per pu)."""
+
+
+def started(parameters: GflParameters, source: float, P: float = 0.0) -> Dynamics:
+    """Start an inverter with V_set 1 pu behind a reactance X, at a source of so many pu."""
+    y = 1.0 / (1j * X * Z_B)
+    Y = np.kron(np.array([[y, -y], [-y, y]]), np.eye(3))
+    network = circuit(Y, [[3, 4, 5]], source=source * V_B * BALANCED)
+    dynamics = Dynamics(network, (inverter(parameters, m_q=M_Q),), 0.002)
+    dynamics.start(np.array([P]), V_set=np.ones(1))
+    return dynamics
+
+
+def moved(dynamics: Dynamics) -> float:
+    """Return how far f, P, Q and V go from those of the start within 2 s (Hz, W, var, V)."""
+    start = dynamics.readings()
+    return float(np.abs(dynamics.run(1000)[:, :, :4] - start).max())
+
+
+def powers(dynamics: Dynamics) -> tuple[float, float]:
+    """Return the inverter's voltage and reactive power (pu)."""
+    S, v = dynamics.inverters.measured(dynamics.inverters.V, dynamics.inverters.I)
+    return float(v[0]), float(S[0].imag)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("band", [0.0, 0.01])
+def test_an_inverter_beyond_its_dead_band_starts_on_its_droop(band: float, sign: float) -> None:
+    """Half of the source's deviation is left, twice the band of 0.01 pu: Q is (V_set - V) / m_q, and nothing moves."""
+    dynamics = started(replace(VOLT_VAR, db_UV=band, db_OV=band), 1.0 - 0.03 * sign)
+    v, q = powers(dynamics)
+
+    assert q == pytest.approx((1.0 - v) / M_Q, abs=1e-10)
+    assert sign * q == pytest.approx(0.3, abs=0.01)
+    assert moved(dynamics) < 1e-4
+
+
+@pytest.mark.parametrize("source", [0.97, 1.03])
+@pytest.mark.parametrize("parameters", [replace(VOLT_VAR, db_UV=0.04, db_OV=0.04), replace(VOLT_VAR, volt_var=False)])
+def test_an_inverter_within_its_dead_band_starts_without_vars(parameters: GflParameters, source: float) -> None:
+    """Within the band, and without volt-var, Q is Q_set, 0: a start on the droop would move at once, by 0.3 pu."""
+    dynamics = started(parameters, source, P=0.5)
+
+    assert powers(dynamics)[1] == pytest.approx(0.0, abs=1e-12)
+    assert dynamics.inverters.set_points[0, 1:].tolist() == [1.0, 0.0]
+    assert moved(dynamics) < 1e-4
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_inverter_that_rests_nowhere_starts_on_the_edge_of_its_dead_band(sign: float) -> None:
+    """Without vars V is beyond the band of 0.02 pu, with those of the droop within it: Q hunts around the start's."""
+    dynamics = started(replace(VOLT_VAR, db_UV=0.02, db_OV=0.02), 1.0 - 0.03 * sign)
+    v, q = powers(dynamics)
+    Q = dynamics.run(2000)[:, 0, 2] / dynamics.inverters.S_b[0]
+
+    assert v == pytest.approx(1.0 - 0.02 * sign, abs=1e-10)
+    assert sign * q == pytest.approx(0.2, abs=0.01)
+    assert Q[1000:].min() < q < Q[1000:].max()
+    assert abs(Q[1000:].mean() - q) < 0.02
+
+
+def test_an_inverter_at_its_limit_of_vars_keeps_its_set_point() -> None:
+    """0.9 pu of P leave 0.44 pu of Q, where the droop asks for 1 pu: V_set stays 1 pu, and nothing moves."""
+    dynamics = started(VOLT_VAR, 0.9, P=0.9)
+
+    assert powers(dynamics)[1] == pytest.approx(np.sqrt(1.0 - 0.9**2), abs=1e-9)
+    assert dynamics.inverters.set_points[0, 1] == 1.0
+    assert moved(dynamics) < 1e-4
+
+
+def test_there_is_one_rest_and_the_search_finds_it() -> None:
+    """Of all ways to place four coupled inverters within, beyond and on the edges of their bands, one is a rest."""
+    random = np.random.default_rng(1)
+    for _ in range(40):
+        inverters, v0, X = coupled(random)
+        rests = []
+        for place in map(np.array, product((DROOP, INSIDE, UNDER, OVER), repeat=v0.size)):
+            if np.isinf(np.where(place == UNDER, inverters.db_UV, inverters.db_OV)[place >= UNDER]).any():
+                continue
+            v, Q = rest(inverters, v0, X, place)
+            if np.array_equal(inverters.next_places(place, v, Q, 0), place):
+                rests.append(Q)
+        place, found = inverters.first_places(), None
+        for rounds in range(MOST_ROUNDS):
+            v, Q = rest(inverters, v0, X, place)
+            before, place = place, inverters.next_places(place, v, Q, rounds)
+            if np.array_equal(place, before):
+                found = Q
+                break
+
+        assert len(rests) == 1
+        assert found == pytest.approx(rests[0], abs=1e-12)
+
+
+def coupled(random: np.random.Generator) -> tuple[VoltVarAtRest, Real, Real]:
+    """Draw four inverters, their voltages without vars (pu), and what a Q raises each of them by (pu per pu)."""
+    n = 4
+    X = np.cov(random.normal(0.0, 0.3, (n, 6))) + np.diag(random.uniform(0.0, 0.02, n))
+    below, above = random.choice([0.0, 0.005, 0.01, 0.03, np.inf], (2, n))
+    inverters = VoltVarAtRest(np.ones(n), random.uniform(0.02, 0.1, n), below, above, np.full(n, np.inf))
+    return inverters, 1.0 + random.normal(0.0, 0.03, n), X
+
+
+def rest(inverters: VoltVarAtRest, v0: Real, X: Real, place: NDArray[np.int64]) -> tuple[Real, Real]:
+    """Return v and Q (pu) with which inverters rest at these places."""
+    own = np.diag(inverters.m_q)
+    edge = np.where(place == UNDER, inverters.db_UV, -inverters.db_OV)
+    A = np.where((place == DROOP)[:, None], own + X, np.where((place == INSIDE)[:, None], own, X))
+    b = np.where(place == INSIDE, 0.0, inverters.V_set - v0 - np.where(place >= UNDER, edge, 0.0))
+    Q = np.linalg.solve(A, b)
+    return v0 + X @ Q, Q
