@@ -99,7 +99,7 @@ def _draw(results: Sequence[CaseResult]) -> Figure:
         axes.set_ylabel(f"{quantity} ({QUANTITIES[quantity]})")
     for axes in panels[2:]:
         axes.set_xlabel("t (s)")
-    figure.suptitle("Largest difference over the inverters; dotted: the limit, but for current-limit (2e-5)")
+    figure.suptitle("Largest difference over the inverters\ndotted: the limit, but for current-limit (2e-5)")
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper")
     return figure
 
