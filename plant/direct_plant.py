@@ -1,13 +1,13 @@
-"""The plant under simulated time in one process with its agents: ticks without messages, telemetry as ever. Pure."""
+"""The plant under simulated time in one process with its agents and the recorder: ticks without messages. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
-from wire.messages import Measurement, State
+from wire.messages import Measurement, State, Telemetry
 
 
 class DirectPlant(LockstepPlant):
@@ -19,12 +19,15 @@ class DirectPlant(LockstepPlant):
         Names the agents, the control period and the end; without schedule and emulated links.
     plant : PlantLike
         The plant at t = 0.
+    on_telemetry : Callable[[Telemetry], None]
+        Takes the telemetry, as it is.
     """
 
-    def __init__(self, config: PlantConfig, plant: PlantLike) -> None:
+    def __init__(self, config: PlantConfig, plant: PlantLike, on_telemetry: Callable[[Telemetry], None]) -> None:
         assert not config.schedule
         assert not config.links
         super().__init__(config, plant)
+        self._on_telemetry = on_telemetry
         self._roster, self.phase = config.agents, "ticking"
         self._reporter.collect()
 
@@ -46,3 +49,6 @@ class DirectPlant(LockstepPlant):
             if not state.idle:
                 self._states[state.sender] = state
         self._finish_tick(0.0)
+
+    def _send(self, message: Telemetry) -> None:
+        self._on_telemetry(message)

@@ -19,7 +19,7 @@ from wire.codec import encode
 from wire.journal import JournalBuffer
 from wire.keys import check_name
 from wire.links import Links, arrived
-from wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop
+from wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
 from wire.node import Node
 from wire.printable import printable
 from wire.timing.clock import ticks_until, time_of
@@ -222,7 +222,11 @@ class PlantNode(Node):
             others=others,
         )
         for message in messages:
-            self._publish(self.keys.telemetry, encode(message))
+            self._send(message)
+
+    def _send(self, message: Telemetry) -> None:
+        """Send a message of telemetry."""
+        self._publish(self.keys.telemetry, encode(message))
 
     # ---------------------------------------------------------------- the end
 

@@ -50,7 +50,7 @@ def run_direct(
     on_journal : Callable[[Journal], None], optional
         Takes the journals, if the configurations ask for them.
     """
-    core = DirectPlant(config, plant)
+    core = DirectPlant(config, plant, on_telemetry)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
     group = AgentGroup([agents[i] for i in order], [laws[i] for i in order])
@@ -61,9 +61,6 @@ def run_direct(
         for action in core.take_actions():
             if isinstance(action, Publish) and action.key == core.keys.telemetry:
                 message = decode(action.payload)
-                if isinstance(message, Journal):
-                    on_journal(message)
-                    continue
-                assert isinstance(message, Telemetry)
-                on_telemetry(message)
+                assert isinstance(message, Journal)
+                on_journal(message)
     return core

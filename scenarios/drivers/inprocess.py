@@ -7,9 +7,10 @@ decide nothing, `scenarios.drivers.direct` gives the same result without them, i
 
 from __future__ import annotations
 
+import gc
 from collections import defaultdict, deque
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from time import perf_counter
 
 import msgspec
@@ -220,6 +221,7 @@ def run_inprocess(
                 return _not_started(f"plant: cannot start: {error}", perf_counter() - began)
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
+        stack.enter_context(_all_so_far_stays())
         plant_config = msgspec.structs.replace(plant_config, recorders=())
         agents: list[LockstepAgent] = []
         side: LockstepPlant
@@ -240,6 +242,19 @@ def run_inprocess(
         start_s=started - began,
         run_s=perf_counter() - started,
     )
+
+
+@contextmanager
+def _all_so_far_stays() -> Iterator[None]:
+    """Let garbage collection skip what is there by now: with 999 agents, to look at it took 7 % of the time."""
+    if gc.get_freeze_count():  # a process whose memory others share, or a run beside this one
+        yield
+        return
+    gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()
 
 
 def _run_on_bus(
