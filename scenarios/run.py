@@ -24,6 +24,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from scenarios.results.figure_processes import draw_on_all_cores, prepare_figures
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
@@ -162,11 +163,11 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     if request.lasting:
         from scenarios.results.plots.drawing import drawing_of
-        from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
         last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
         histories = {case: record.history for case, record in cases.items()}
-        draw_all(drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events)), folder / "plots")
+        drawing = drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events))
+        draw_on_all_cores(drawing, folder / "plots")
     benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
     report = RunReport(
         scenario=scenario.name,
@@ -216,9 +217,14 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
     plant, agents = _configs(request, case)
     record = _record_info(request, case, plant, agents)
     self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
+    ahead = request.lasting and request.clock == "simulated"  # in real time nothing else may take a core
     with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
 
         def note(telemetry: Telemetry) -> None:
+            nonlocal ahead
+            if ahead:  # from the first row on: before, every core is busy with the start
+                ahead = False
+                prepare_figures()
             recorder(telemetry)
             progress(case, recorder.ended, time.end_s)
 

@@ -23,6 +23,9 @@ _OF_PLANTS = (
 )
 """The same for plants. Agents have another server, because they do not load numpy."""
 
+_OF_FIGURES = ("scenarios.results.plots.drawing_process",)
+"""The same for processes that draw."""
+
 _ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """A server may have no other threads, and the plant uses one anyway."""
 
@@ -53,6 +56,11 @@ def agent_server(module: str = "agents", *, start: bool = True) -> ForkServer | 
 def plant_server() -> ForkServer | None:
     """Return the server that forks plants, and start it if there is none; None where this system cannot fork so."""
     return _kept_server(_OF_PLANTS, _ONE_BLAS_THREAD)
+
+
+def figure_server(*, start: bool = True) -> ForkServer | None:
+    """Return the server that forks processes that draw; if there is none, start it if so wished, else return None."""
+    return _kept_server(_OF_FIGURES, _ONE_BLAS_THREAD) if start or _OF_FIGURES in _kept else None
 
 
 def prepare() -> None:

@@ -56,6 +56,18 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
     tuple of Path
         The files.
     """
+    return draw_share(drawing, folder, 0, 1)
+
+
+def draw_share(drawing: Drawing, folder: Path, first: int, step: int) -> tuple[Path, ...]:
+    """Draw every `step`-th figure of a run into a folder, from number `first` on, counted from 0.
+
+    Returns
+    -------
+    tuple of Path
+        The files.
+    """
     folder.mkdir(parents=True, exist_ok=True)
+    share = list(figures_of(drawing).items())[first::step]
     with mpl.rc_context(PAGE):
-        return tuple(file for name, make in figures_of(drawing).items() for file in save(make(), folder, name))
+        return tuple(file for name, make in share for file in save(make(), folder, name))

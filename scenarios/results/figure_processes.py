@@ -1,0 +1,68 @@
+"""Draw the figures of a run on all cores, by processes that have imported matplotlib while the run went on.
+
+Matplotlib takes 0.25 s to import and 1 s to draw the figures of a case, longer than the case takes. Nothing else is
+left to do then, so that each core draws a part of them.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from scenarios.drivers.forking import ForkedProcess, ForkServerError
+from scenarios.drivers.warm_servers import figure_server
+
+if TYPE_CHECKING:
+    from scenarios.results.plots.drawing import Drawing
+
+MODULE = "scenarios.results.plots.drawing_process"
+
+MOST = 4
+"""Processes, as far as there are cores: a run has eight figures or a few more."""
+
+
+def prepare_figures() -> None:
+    """Start the server of the processes that will draw, unless there is one core: then this process draws."""
+    if _cores() > 1:
+        figure_server()
+
+
+def draw_on_all_cores(drawing: Drawing, folder: Path) -> None:
+    """Draw every figure of a run into a folder.
+
+    What a process cannot draw, this one draws again, and raises what went wrong.
+    """
+    if not _drawn_beside(drawing, folder, _cores()):
+        from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
+
+        draw_all(drawing, folder)
+
+
+def _drawn_beside(drawing: Drawing, folder: Path, number: int) -> bool:
+    """Return whether so many processes have drawn every figure."""
+    server = figure_server(start=False)
+    if number < 2 or server is None:
+        return False
+    started: list[ForkedProcess] = []
+    try:
+        with Path(os.devnull).open("wb") as log:  # what went wrong is said by the process that draws again
+            started += [server.fork([MODULE], log, speaks=False) for _ in range(number)]
+        for first, process in enumerate(started):
+            process.stdin.write(pickle.dumps((drawing, folder, first, number)))
+            process.stdin.close()
+        return all([process.wait() == 0 for process in started])
+    except (ForkServerError, OSError, pickle.PicklingError):
+        return False
+    finally:
+        for process in started:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+
+
+def _cores() -> int:
+    """Return the number of cores for drawing."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(cores, MOST)

@@ -1,0 +1,64 @@
+"""Figures that are drawn by several processes, as a command does after its last case."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from scenarios.drivers.forking import AVAILABLE
+from scenarios.drivers.warm_servers import figure_server, release
+from scenarios.results import figure_processes
+from scenarios.results.figure_processes import draw_on_all_cores, prepare_figures
+from scenarios.results.plots import run_figures
+from tests.processes.terminals import children_of
+from tests.unit.scenarios.results.test_plots import drawing
+
+pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
+
+
+@pytest.fixture(autouse=True)
+def two_cores(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """A machine with two cores, and no server before or after."""
+    monkeypatch.setattr(figure_processes, "_cores", lambda: 2)
+    release()
+    yield
+    release()
+
+
+def test_they_are_the_figures_of_one_process(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same files with the same bytes; this process draws none of them."""
+    run_figures.draw_all(drawing("IV"), tmp_path / "one")
+    monkeypatch.setattr(run_figures, "draw_all", lambda *_: pytest.fail("this process draws"))
+    prepare_figures()
+
+    draw_on_all_cores(drawing("IV"), tmp_path / "two")
+
+    one, two = ({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "two"))
+    assert len(one) >= 8
+    assert two == one
+
+
+def test_without_a_server_this_process_draws(tmp_path: Path) -> None:
+    """In real time, where no server takes a core from the run, the figures come all the same."""
+    assert figure_server(start=False) is None
+
+    draw_on_all_cores(drawing("IV"), tmp_path / "plots")
+
+    assert (tmp_path / "plots" / "overview.png").is_file()
+    assert figure_server(start=False) is None
+
+
+def test_what_goes_wrong_is_raised_here(tmp_path: Path) -> None:
+    """A folder that cannot be written is the error of this process, and no process stays behind."""
+    (tmp_path / "plots").write_text("a file")
+    prepare_figures()
+    before = children_of(os.getpid())
+    assert before  # the server
+
+    with pytest.raises(FileExistsError):
+        draw_on_all_cores(drawing("IV"), tmp_path / "plots")
+
+    assert children_of(os.getpid()) == before
