@@ -11,7 +11,6 @@ from gridpeers.values import plain
 from scenarios.schema import scenario_model as model
 from scenarios.schema.loading import check_tables, find_scenario, read_toml
 from scenarios.schema.scenario_errors import Problems, ScenarioError
-from scenarios.sweep.file.paths import PathError, Tree, put, remove
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -20,6 +19,7 @@ if TYPE_CHECKING:
     from gridpeers.runs.running import How
     from plant.equipment import Feeder
     from scenarios.run import Driver
+    from scenarios.sweep.file.paths import Tree
 
 
 def as_scenario(it: Scenario | str | Path) -> Scenario:
@@ -141,6 +141,8 @@ class Scenario:
             raise ScenarioError(
                 [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
             )
+        from scenarios.sweep.file.paths import PathError, put, remove  # with numpy, which a run starts without
+
         tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
         problems = Problems(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
         for path, value in changes.items():

@@ -11,6 +11,8 @@ import random
 from collections.abc import Sequence
 from itertools import combinations
 
+import numpy as np
+
 Edges = tuple[tuple[int, int], ...]
 """Pairs i < j, sorted."""
 
@@ -66,8 +68,6 @@ def algebraic_connectivity(n: int, edges: Sequence[tuple[int, int]]) -> float:
     >>> round(algebraic_connectivity(3, [(0, 1), (1, 2)]), 9)
     1.0
     """
-    import numpy as np  # a scenario is read through this package, without numpy
-
     L = np.zeros((n, n))
     for i, j in edges:
         L[[i, j], [i, j]] += 1.0
