@@ -11,7 +11,7 @@ import traceback
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import datetime
-from importlib import metadata
+from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import msgspec
@@ -48,6 +48,12 @@ Progress = Callable[[str, float, float], None]
 
 _SHOWN = 3
 """Laws that failed which a report names."""
+
+_AFTER_RUN = (
+    *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
+    *("scenarios.results.report", "scenarios.results.plots.drawing"),
+)
+"""Modules that are used after a run, with numpy, and imported while it goes on: this process has little to do then."""
 
 _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
 
@@ -127,7 +133,6 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = _run_case(request, case, progress)
-        # these bring numpy, which a start does not wait for
         from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
@@ -225,6 +230,8 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             if ahead:  # from the first row on: before, every core is busy with the start
                 ahead = False
                 prepare_figures()
+                for module in _AFTER_RUN:
+                    import_module(module)
             recorder(telemetry)
             progress(case, recorder.ended, time.end_s)
 
