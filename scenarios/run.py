@@ -9,6 +9,7 @@ import dataclasses
 import platform
 import traceback
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import import_module, metadata
@@ -24,7 +25,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.figure_processes import draw_on_all_cores, prepare_figures
+from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
@@ -166,24 +167,26 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
-    if request.lasting:
-        from scenarios.results.plots.drawing import drawing_of
+    with ExitStack() as beside:
+        if request.lasting:
+            from scenarios.results.plots.drawing import drawing_of
 
-        last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
-        histories = {case: record.history for case, record in cases.items()}
-        drawing = drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events))
-        draw_on_all_cores(drawing, folder / "plots")
-    benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
-    report = RunReport(
-        scenario=scenario.name,
-        titles={case: rule.title for case, rule in scenario.cases.items()},
-        findings=findings,
-        verdicts=(*judge(findings, benchmark.claims), *(() if disturbed else judged(findings, claims_of(scenario)))),
-        benchmark=benchmark,
-        notes=[*notes, *_notes(recorded, request.clock)],
-        folder=place + "/" if request.lasting else "",
-    )
-    write_whole(folder / "report.txt", plain(report))
+            last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
+            histories = {case: record.history for case, record in cases.items()}
+            drawing = drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events))
+            beside.enter_context(drawn_on_all_cores(drawing, folder / "plots"))
+        benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
+        own = () if disturbed else judged(findings, claims_of(scenario))
+        report = RunReport(
+            scenario=scenario.name,
+            titles={case: rule.title for case, rule in scenario.cases.items()},
+            findings=findings,
+            verdicts=(*judge(findings, benchmark.claims), *own),
+            benchmark=benchmark,
+            notes=[*notes, *_notes(recorded, request.clock)],
+            folder=place + "/" if request.lasting else "",
+        )
+        write_whole(folder / "report.txt", plain(report))
     set_status(folder, "complete")
     return report
 

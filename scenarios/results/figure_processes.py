@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,36 +32,44 @@ def prepare_figures() -> None:
         figure_server()
 
 
-def draw_on_all_cores(drawing: Drawing, folder: Path) -> None:
-    """Draw every figure of a run into a folder.
+@contextmanager
+def drawn_on_all_cores(drawing: Drawing, folder: Path) -> Iterator[None]:
+    """Draw every figure of a run into a folder, beside what is done in this context; leaving it waits for them.
 
     What a process cannot draw, this one draws again, and raises what went wrong.
     """
-    if not _drawn_beside(drawing, folder, _cores()):
-        from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
+    started = _started(drawing, folder, _cores())
+    try:
+        yield
+        if started and all([process.wait() == 0 for process in started]):
+            return
+    finally:
+        for process in started:
+            process.send_signal(signal.SIGKILL)
+            process.wait()
+    from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
-        draw_all(drawing, folder)
+    draw_all(drawing, folder)
 
 
-def _drawn_beside(drawing: Drawing, folder: Path, number: int) -> bool:
-    """Return whether so many processes have drawn every figure."""
+def _started(drawing: Drawing, folder: Path, number: int) -> list[ForkedProcess]:
+    """Start so many processes that draw, each a share; return none where they cannot be."""
     server = figure_server(start=False)
-    if number < 2 or server is None:
-        return False
     started: list[ForkedProcess] = []
+    if number < 2 or server is None:
+        return started
     try:
         with Path(os.devnull).open("wb") as log:  # what went wrong is said by the process that draws again
             started += [server.fork([MODULE], log, speaks=False) for _ in range(number)]
         for first, process in enumerate(started):
             process.stdin.write(pickle.dumps((drawing, folder, first, number)))
             process.stdin.close()
-        return all([process.wait() == 0 for process in started])
     except (ForkServerError, OSError, pickle.PicklingError):
-        return False
-    finally:
         for process in started:
             process.send_signal(signal.SIGKILL)
             process.wait()
+        started.clear()
+    return started
 
 
 def _cores() -> int:

@@ -1,7 +1,7 @@
 """A process that draws some figures of a run: `python -m scenarios.results.plots.drawing_process` < PICKLE.
 
-On standard input comes, pickled, what to draw, where to, and which share of the figures: number k of n processes draws
-every n-th, from the k-th on. `scenarios.results.figure_processes` writes it.
+On standard input comes, pickled, what to draw, where to, and which share of the figures: the number of the share, from
+0, and that of all shares. `scenarios.results.figure_processes` writes it.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from pathlib import Path
 
@@ -59,8 +59,8 @@ def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
     return draw_share(drawing, folder, 0, 1)
 
 
-def draw_share(drawing: Drawing, folder: Path, first: int, step: int) -> tuple[Path, ...]:
-    """Draw every `step`-th figure of a run into a folder, from number `first` on, counted from 0.
+def draw_share(drawing: Drawing, folder: Path, number: int, of: int) -> tuple[Path, ...]:
+    """Draw share `number`, counted from 0, of so many shares of a run's figures into a folder.
 
     Returns
     -------
@@ -68,6 +68,27 @@ def draw_share(drawing: Drawing, folder: Path, first: int, step: int) -> tuple[P
         The files.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    share = list(figures_of(drawing).items())[first::step]
+    figures = figures_of(drawing)
     with mpl.rc_context(PAGE):
-        return tuple(file for name, make in share for file in save(make(), folder, name))
+        return tuple(file for name in shares(figures, of)[number] for file in save(figures[name](), folder, name))
+
+
+def shares(figures: Iterable[str], number: int) -> list[list[str]]:
+    """Return so many shares of the figures that take about the same time to draw.
+
+    Examples
+    --------
+    >>> shares(["frequency", "voltage", "MPSI", "MQSI", "overview"], 2)
+    [['overview', 'MQSI'], ['frequency', 'voltage', 'MPSI']]
+    """
+    found: list[list[str]] = [[] for _ in range(number)]
+    times = [0.0] * number
+    for name in sorted(figures, key=lambda name: -_TIME.get(name, 1.0)):
+        least = times.index(min(times))
+        found[least].append(name)
+        times[least] += _TIME.get(name, 1.0)
+    return found
+
+
+_TIME = {"overview": 2.5}
+"""Time that a figure takes, in proportion to the others."""

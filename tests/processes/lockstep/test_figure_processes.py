@@ -11,7 +11,7 @@ import pytest
 from scenarios.drivers.forking import AVAILABLE
 from scenarios.drivers.warm_servers import figure_server, release
 from scenarios.results import figure_processes
-from scenarios.results.figure_processes import draw_on_all_cores, prepare_figures
+from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from scenarios.results.plots import run_figures
 from tests.processes.terminals import children_of
 from tests.unit.scenarios.results.test_plots import drawing
@@ -34,7 +34,8 @@ def test_they_are_the_figures_of_one_process(tmp_path: Path, monkeypatch: pytest
     monkeypatch.setattr(run_figures, "draw_all", lambda *_: pytest.fail("this process draws"))
     prepare_figures()
 
-    draw_on_all_cores(drawing("IV"), tmp_path / "two")
+    with drawn_on_all_cores(drawing("IV"), tmp_path / "two"):
+        pass
 
     one, two = ({file.name: file.read_bytes() for file in (tmp_path / name).iterdir()} for name in ("one", "two"))
     assert len(one) >= 8
@@ -45,7 +46,8 @@ def test_without_a_server_this_process_draws(tmp_path: Path) -> None:
     """In real time, where no server takes a core from the run, the figures come all the same."""
     assert figure_server(start=False) is None
 
-    draw_on_all_cores(drawing("IV"), tmp_path / "plots")
+    with drawn_on_all_cores(drawing("IV"), tmp_path / "plots"):
+        pass
 
     assert (tmp_path / "plots" / "overview.png").is_file()
     assert figure_server(start=False) is None
@@ -58,7 +60,18 @@ def test_what_goes_wrong_is_raised_here(tmp_path: Path) -> None:
     before = children_of(os.getpid())
     assert before  # the server
 
-    with pytest.raises(FileExistsError):
-        draw_on_all_cores(drawing("IV"), tmp_path / "plots")
+    with pytest.raises(FileExistsError), drawn_on_all_cores(drawing("IV"), tmp_path / "plots"):
+        pass
+
+    assert children_of(os.getpid()) == before
+
+
+def test_an_error_beside_ends_the_drawing(tmp_path: Path) -> None:
+    """A report that cannot be written is told at once, and no process stays behind."""
+    prepare_figures()
+    before = children_of(os.getpid())
+
+    with pytest.raises(RuntimeError, match="no room"), drawn_on_all_cores(drawing("IV"), tmp_path / "plots"):
+        raise RuntimeError("no room")
 
     assert children_of(os.getpid()) == before
