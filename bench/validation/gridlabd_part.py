@@ -27,9 +27,9 @@ _LEFT_OUT = [f"`{name}`" for name, run in RUNS.items() if not run.in_tests]
 TEXT = f"""
 f, P, Q, V and the held set-points of all inverters on the complete 123-node feeder, in our plant and in
 GridLAB-D's delta mode (`inverter_dyn`, its voltage tolerance 1e-11 pu), after every step of 2 ms. GridLAB-D reads a
-model that `plant/gridlabd/glm.py` writes from the CSV tables without any code of `plant.tables` and `plant.network`.
-Each plant starts from its own equilibrium, which it has held for 0.5 s, and in closed loop has agents of its own. The
-tests go through all cases but {", ".join(_LEFT_OUT[:-1])} and {_LEFT_OUT[-1]}, in a fifth of the time.
+model that `plant/gridlabd/model/glm.py` writes from the CSV tables without any code of `plant.tables` and
+`plant.network`. Each plant starts from its own equilibrium, which it has held for 0.5 s, and in closed loop has agents
+of its own. The tests go through all cases but {", ".join(_LEFT_OUT[:-1])} and {_LEFT_OUT[-1]}, in a fifth of the time.
 `feeder glm` and `--plant gridlabd` have the same model.
 
 - Closed switches and regulators are ideal in both. GridLAB-D needs an impedance for each (1e-4 - j1e-4 and 1e-4 ohm by

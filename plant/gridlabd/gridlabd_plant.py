@@ -16,9 +16,9 @@ from plant.feeder import Plant
 from plant.feeder.plant import Reading
 from plant.feeder.protection import Relays
 from plant.feeder.set_points import SetPointLimits
-from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
-from plant.gridlabd.glm import write_glm
 from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
+from plant.gridlabd.model.glm import write_glm
+from plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.plant_config import PlantSettings
 from wire.messages import PlantEvent
 from wire.timing.clock import time_of

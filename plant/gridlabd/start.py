@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from plant.equipment import Feeder
 from plant.feeder import Plant
-from plant.gridlabd.export_glm import write_tables
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.gridlabd.model.export_glm import write_tables
 from plant.network import Network
 from plant.plant_config import FeederChanges, PlantConfig
 from plant.transient_folder import TransientFolder

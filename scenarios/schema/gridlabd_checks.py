@@ -8,7 +8,7 @@ from itertools import pairwise
 from plant.equipment import Feeder
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
+from plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.supply import supply_states

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.gridlabd.delta_mode import CLOCK_UPDATE, DESIRED, STAY, GridlabdCore
+from plant.gridlabd.process.delta_mode import CLOCK_UPDATE, DESIRED, STAY, GridlabdCore
 
 INTERUPDATE = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_int64, ctypes.c_uint64, ctypes.c_ulong, ctypes.c_uint

@@ -21,8 +21,8 @@ from bench.validation.autotests.gfm_gfl_case import (
     H,
 )
 from bench.validation.autotests.recorded_run import COMPLEX, REAL, Property, RecordedRun, record
-from plant.gridlabd.glm_block import block
-from plant.gridlabd.glm_inverters import inverter_blocks
+from plant.gridlabd.model.glm_block import block
+from plant.gridlabd.model.glm_inverters import inverter_blocks
 
 SOLVER = ("default_maximum_voltage_error 1e-11",)
 

@@ -1,8 +1,8 @@
 """Our plant and GridLAB-D through the same run, step by step.
 
-GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.glm` writes from the feeder's tables
-without the code of `plant.network`. Both plants start from their own equilibrium; in closed loop each has its own
-agents.
+GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.model.glm` writes from the feeder's
+tables without the code of `plant.network`. Both plants start from their own equilibrium; in closed loop each has its
+own agents.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from agents.agent_config import AgentConfig
 from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, SinglePhase, shortened
 from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
-from plant.gridlabd.export_glm import write_tables
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.gridlabd.model.export_glm import write_tables
 from plant.network import Network
 from plant.plant_config import PlantConfig, SwitchEvent
 from plant.plant_interface import PlantLike

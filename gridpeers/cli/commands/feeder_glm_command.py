@@ -38,7 +38,7 @@ def glm(
 
     from gridpeers.feeder import READERS
     from plant.dynamics import PlantError
-    from plant.gridlabd.export_glm import export_glm
+    from plant.gridlabd.model.export_glm import export_glm
     from plant.tables import FeederError
     from scenarios.results.run_files import refusal, shown, write_whole
 

@@ -18,7 +18,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from plant.gridlabd.delta_mode import NotImportableError, end_with, gridlabd_package
+from plant.gridlabd.process.delta_mode import NotImportableError, end_with, gridlabd_package
 from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS
 from plant.imports.gridlabd.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
 

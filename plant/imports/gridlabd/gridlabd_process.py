@@ -1,16 +1,16 @@
-"""Run GridLAB-D's power flow of a model in a process of its own, and understand what it says."""
+"""Run GridLAB-D's power flow of a model in a process of its own."""
 
 from __future__ import annotations
 
 import importlib.util
 import json
 import os
-import re
 import subprocess
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+from plant.gridlabd.process.gridlabd_messages import messages
 from plant.request_process import program
 from plant.tables.read import FeederError
 from plant.transient_folder import TransientFolder, no_room
@@ -25,19 +25,6 @@ USER = "the import of .glm files"
 
 LONGEST = 600.0
 """Time (s) after which a model that does not end is given up."""
-
-PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
-"""A message of the loader: file, line, text."""
-
-LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")
-"""A message of the simulation that ends it."""
-
-FOLLOWING = re.compile(
-    r"load failed at or near|#include failed|unable to load '|failed to load model file|model initialization failed"
-    r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
-    r"|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
-)
-"""Messages that only repeat that something failed."""
 
 
 def solved_model(path: Path) -> dict[str, Any]:
@@ -89,36 +76,3 @@ def solved_model(path: Path) -> dict[str, Any]:
             )
         raise FeederError(path.name, tuple(said))
     return answer
-
-
-def messages(printed: str) -> list[str]:
-    r"""Return what GridLAB-D complains of, each message once; what only repeats that something failed if nothing else.
-
-    Examples
-    --------
-    >>> messages("x.glm(3): class 'foo' is not known\nx.glm(3): load failed at or near 'object foo'\n")
-    ["x.glm:3: class 'foo' is not known"]
-    >>> messages("ERROR    [INIT] : NR: no swing bus found\nWARNING  [INIT] : slow\n")
-    ['GridLAB-D: NR: no swing bus found']
-    """
-    found: list[str] = []
-    following: list[str] = []
-    missing = ""
-    for line in printed.replace("\r", "\n").splitlines():
-        placed, levelled = PLACED.match(line), LEVELLED.match(line)
-        if placed and placed["text"].startswith("include file open failed"):
-            missing = placed["file"]  # its line is that of the file that includes it, which the next message names
-            continue
-        if placed and missing:
-            found.append(f"{Path(placed['file']).name}:{placed['line']}: {missing} is included, and cannot be read")
-            missing = ""
-            continue
-        if placed:
-            text = f"{Path(placed['file']).name}:{placed['line']}: {printable(placed['text'].strip())}"
-        elif levelled:
-            text = f"GridLAB-D: {printable(levelled['text'].strip())}"
-        else:
-            continue
-        (following if FOLLOWING.search(line) else found).append(text)
-    found.sort(key=lambda text: text.startswith("GridLAB-D: "))  # those with a file and a line come first
-    return list(dict.fromkeys(found or following))

@@ -15,7 +15,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
-from plant.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
+from plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.plant_config import PlantConfig, Protection
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.outcome import Outcome

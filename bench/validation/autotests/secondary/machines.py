@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.gridlabd.glm_block import block
+from plant.gridlabd.model.glm_block import block
 
 RATED_V = 4156.0
 """V, line-to-line."""

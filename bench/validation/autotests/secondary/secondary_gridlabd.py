@@ -20,9 +20,9 @@ from bench.validation.autotests.secondary.secondary_case import (
     H,
 )
 from bench.validation.autotests.secondary.secondary_law import AUTOTEST, SecondarySettings
-from plant.gridlabd.glm_block import block
-from plant.gridlabd.glm_inverters import inverter_blocks
-from plant.gridlabd.glm_network import network_blocks
+from plant.gridlabd.model.glm_block import block
+from plant.gridlabd.model.glm_inverters import inverter_blocks
+from plant.gridlabd.model.glm_network import network_blocks
 
 NODE = {
     **{name: f"n{bus}" for name, (_, bus, _) in INVERTERS.items()},

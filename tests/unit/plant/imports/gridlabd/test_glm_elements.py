@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.gridlabd.export_glm import export_glm
+from plant.gridlabd.model.export_glm import export_glm
 from plant.imports.gridlabd.glm_loads import V_MIN
 from plant.imports.gridlabd.read_glm import read_glm
 from plant.network import Network, solve_power_flow

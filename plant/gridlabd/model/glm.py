@@ -12,8 +12,8 @@ from math import sqrt
 from pathlib import Path
 
 from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.glm_inverters import inverter_blocks, node_blocks
-from plant.gridlabd.glm_network import network_blocks
+from plant.gridlabd.model.glm_inverters import inverter_blocks, node_blocks
+from plant.gridlabd.model.glm_network import network_blocks
 
 START = "2000-01-01 00:00:00"
 """GridLAB-D's clock at the start; delta mode begins one second later."""

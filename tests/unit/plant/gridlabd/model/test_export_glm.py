@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from plant.equipment import Feeder, Load
 from plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from plant.feeder import Plant
-from plant.gridlabd.export_glm import export_glm
+from plant.gridlabd.model.export_glm import export_glm
 from plant.network import Network, solve_power_flow
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError, read_feeder

@@ -7,8 +7,8 @@ from math import pi
 
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.glm_block import TableRow, block
-from plant.gridlabd.glm_network import F_NOM
+from plant.gridlabd.model.glm_block import TableRow, block
+from plant.gridlabd.model.glm_network import F_NOM
 
 
 def node_of(bus: str, phases: str) -> str:

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from plant.equipment import Feeder
 from plant.equipment.inverter_parameters import GfmParameters
 from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.glm_inverters import node_of
-from plant.gridlabd.glm_network import F_NOM
+from plant.gridlabd.model.glm_inverters import node_of
+from plant.gridlabd.model.glm_network import F_NOM
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""

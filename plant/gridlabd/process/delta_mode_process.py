@@ -8,7 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from plant.imports.gridlabd.gridlabd_process import messages
+from plant.gridlabd.process.gridlabd_messages import messages
 from plant.request_process import ProcessEndedError, RequestProcess
 from plant.transient_folder import TransientFolder
 from plant.wheels import damaged

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from plant.equipment import Feeder, Regulator
 from plant.feeder import Plant
-from plant.gridlabd.glm import START, read_table, write_glm
-from plant.gridlabd.glm_block import TableRow
-from plant.gridlabd.glm_network import network_blocks
-from plant.gridlabd.unrepresentable import beyond_gridlabd, unrepresentable
+from plant.gridlabd.model.glm import START, read_table, write_glm
+from plant.gridlabd.model.glm_block import TableRow
+from plant.gridlabd.model.glm_network import network_blocks
+from plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from plant.tables import FeederError
