@@ -21,7 +21,7 @@ from bench.harness import machine, options
 from gridpeers.feeder import Feeder
 from plant.build import build_plant
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.feeder_proposal import propose
+from scenarios.proposal.feeder_proposal import propose
 from scenarios.results.record import Recorder
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs

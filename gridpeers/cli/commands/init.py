@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from gridpeers.feeder import Feeder
     from plant.equipment import Feeder as Tables
-    from scenarios.feeder_proposal import Proposal
+    from scenarios.proposal.feeder_proposal import Proposal
     from scenarios.schema import ScenarioModel
 
 TEMPLATE = Path(__file__).parents[1] / "template"
@@ -129,7 +129,8 @@ def _with_proposal(
 ) -> tuple[Feeder, Proposal]:
     """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
     from gridpeers.cli.commands.feeder_commands import read_script
-    from scenarios.feeder_proposal import NoSwitchError, propose
+    from scenarios.proposal.feeder_proposal import propose
+    from scenarios.proposal.proposal_errors import NoSwitchError
 
     feeder = read_script(script, switches, leave_out)
     try:
@@ -145,7 +146,7 @@ def _with_proposal(
 
 def _damp(project: tuple[ScenarioModel, Tables], rewritten: Callable[[str], tuple[ScenarioModel, Tables]]) -> None:
     """Slow the volt-var droop of a project's followers where its plant comes to rest with that alone; say so."""
-    from scenarios.droop_alone import unsteady
+    from scenarios.proposal.droop_alone import unsteady
 
     if not (found := unsteady(*project, "none")):
         return
@@ -164,8 +165,8 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     import msgspec
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
-    from scenarios.feeder_proposal import NoProposalError
     from scenarios.operating_point import start_problem
+    from scenarios.proposal.proposal_errors import NoProposalError
     from scenarios.schema import load_scenario
 
     try:

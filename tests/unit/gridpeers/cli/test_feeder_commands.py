@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from plant.tables import read_feeder
-from scenarios import feeder_proposal
+from scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
 from tests.unit.plant.imports.gridlabd.glm_models import LOADS
 

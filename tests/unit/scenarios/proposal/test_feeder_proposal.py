@@ -6,7 +6,8 @@ import pytest
 
 from plant.equipment import Bus, Feeder, Source, Switch
 from plant.equipment.imported_equipment import LinearElement, LoadPart
-from scenarios.feeder_proposal import NoProposalError, NoSwitchError, propose
+from scenarios.proposal.feeder_proposal import propose
+from scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
 from scenarios.results.plots.feeder_diagram import feeder_diagram, places
 
 

@@ -12,9 +12,11 @@ from msgspec.structs import replace
 from plant.equipment import Bus, Feeder, Source, Switch
 from plant.equipment.imported_equipment import LoadPart
 from plant.tables import read_feeder
-from scenarios.feeder_proposal import GROUP, RATING, NoProposalError, propose
-from scenarios.feeder_walk import cut_off_sums
-from tests.unit.scenarios.test_feeder_proposal import series
+from scenarios.proposal.feeder_proposal import RATING, propose
+from scenarios.proposal.feeder_walk import cut_off_sums
+from scenarios.proposal.inverter_groups import GROUP
+from scenarios.proposal.proposal_errors import NoProposalError
+from tests.unit.scenarios.proposal.test_feeder_proposal import series
 
 
 @pytest.mark.parametrize("count", [None, 3, 7, 20, 50])
