@@ -44,10 +44,10 @@ its lines are no measurements: every driver and every number of processes gives 
 command above runs on a clean clone (`tests/peers` runs it shortly).
 """
 
-LINKS = """A message is a state to a neighbour, or one from or to the plant; its cost is processor time of all but the
-plant. "Dearest size / cheapest" above is the largest of these medians in proportion to the least, on a ring of
-9, 30, 99 and 300 agents: 1 is a cost that does not depend on their number. Its rounds have the noise of one measurement
-a size each, so that they may all be larger.
+LINKS = """A message is a state to a neighbour, or one from or to the plant; in one process it is handed over as it is.
+Its cost is processor time of all but the plant: measurement, law, set-points, history. "Dearest size / cheapest" above
+is the largest of these medians in proportion to the least, on a ring of 9, 30, 99 and 300 agents: 1 is a cost that does
+not depend on their number. Its rounds have the noise of one measurement a size each, so that they may all be larger.
 """
 
 LIMITS = """## Where the limit is
@@ -58,8 +58,10 @@ LIMITS = """## Where the limit is
 - **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link. A
   relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save the
   rest. ZeroMQ over Unix sockets shows what a transport without discovery, routing and TCP costs.
-- **One process.** There is no transport: each message costs its way through the same nodes that processes have
-  (decode, checks, the law's sum), so that the cost grows with links, not with pairs of agents.
+- **One process.** Where a link is emulated, or an agent joins, leaves or dies, each message costs its way through the
+  same nodes that processes have (decode, checks, the law's sum). In all other runs no message decides anything, and
+  there is none ([architecture.md](architecture.md#design-decisions-and-why)): a third of that cost remains. Either way
+  it grows with links, not with pairs of agents.
 - **Start.** Processor time: a command with processes takes 3.7 s of it, so two cores cannot be done before 1.9 s.
   Until the first row, 1.2 s: the process that forks plants 0.43 (numpy and scipy 0.2, our modules and Zenoh 0.16, LLVM
   and the compiled step 0.04, a first plant 0.03), the command itself 0.35, nearly all imports, the process that forks
@@ -77,11 +79,24 @@ of agents in a process of its own so that memory is its own (`python -m bench.sc
 clock, less than 1 is faster than real time. A message is a state to a neighbour, or one from or to the plant.
 """
 
-SCALE_NOTES = """What bounded 999 agents on 2026-11-22, of a network solution of 0.5 to 0.65 ms (1000 a second): solving
-with the factors 0.19 to 0.25 ms (57 000 entries, one iteration a solution), controllers 0.13, branch currents and
-voltages 0.06, first guess and its history 0.03; the rest waited for the memory. The agents, whose objects do not fit
-the cache, needed 63 us each a tick, in Python. Where the copies are islands of their own (`python -m bench.scale
---apart 1`) the plant steps them on both cores: 1.30 s by the clock instead of 1.53 s of processor time that day.
+SCALE_NOTES = """What bounds 999 agents in one island, 2026-11-23 (three rounds beside the state of the day before; load
+6 to 9, held off by a real-time priority): 0.74 s of processor time a simulated second, 0.77 s by the clock; the day
+before 1.27 s. 306 agents at 20 ms took 0.36 s instead of 0.97 s, 99 agents 0.08 s instead of 0.11 s, nine 8 ms instead
+of 11 ms.
+
+- The plant's steps take 0.5 s: 1000 network solutions of 0.32 ms where one iteration suffices, and of 0.51 ms with two,
+  which is usual while the law moves set-points. 13 000 of 17 000 nodes are stepped; the others have no inverter. With
+  all 17 000, solving with the factors (57 000 entries) would take 0.155 ms of an iteration of 0.22 ms. Controllers take
+  0.09 ms a solution. An entry costs as much as with nine agents (1.4 ns each way): instructions are the limit, not the
+  memory.
+- The agents take 13 us each a tick with measurement and set-points, 7 to 9 of them for the law (4.5 where their objects
+  fit the cache). With messages it is 45 us with 300 agents. The rows of the history take 0.08 s.
+- One island has one core. Where the copies are islands of their own (`python -m bench.scale --apart 1`) the plant steps
+  them on both: 0.56 s by the clock, 0.70 s of processor time.
+
+Tried without gain: eliminating nodes level by level or subtree by subtree, a new tangent of the loads sooner, a
+tolerance ten or a hundred times as wide (two iterations remain). LLVM's search for pairs of equal operations makes the
+factors a fifth to a third faster, but numba has it off because its code was wrong at times (numba, pull request 8852).
 """
 
 LONG_RUNS = """## Long runs
