@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from typing import Literal
 
 from wire.driver.leftover import leave
 from wire.driver.output import speaking
@@ -31,10 +32,15 @@ def _main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if runs_processes(sys.argv[1:]):  # what they import takes longer than all that comes before them here
+    driver = driver_of(sys.argv[1:])  # what servers import takes longer than all that comes before them here
+    if driver == "processes":
         from scenarios.drivers.warm_servers import prepare
 
         prepare()
+    elif driver == "inprocess":
+        from scenarios.results.figure_processes import prepare_figures
+
+        prepare_figures()
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
         from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
@@ -49,18 +55,16 @@ def _main() -> None:
             fail([str(error)], BROKEN)
 
 
-def runs_processes(words: Sequence[str]) -> bool:
-    """Return whether a command line looks like a run with processes; if it is none, what was started ends with it.
+def driver_of(words: Sequence[str]) -> Literal["processes", "inprocess", ""]:
+    """Return the driver of a command line that looks like a run; if it is none, what was started ends with it.
 
     Examples
     --------
-    >>> runs_processes(["run", "islanding"]), runs_processes(["run", "islanding", "--driver=inprocess"])
-    (True, False)
-    >>> runs_processes(["run", "--help"]), runs_processes(["check", "islanding"])
-    (False, False)
+    >>> driver_of(["run", "islanding"]), driver_of(["run", "islanding", "--driver=inprocess"])
+    ('processes', 'inprocess')
+    >>> driver_of(["run", "--help"]), driver_of(["check", "islanding"])
+    ('', '')
     """
-    return words[:1] == ["run"] and len(words) > 1 and not any(word.endswith(_NO_PROCESSES) for word in words)
-
-
-_NO_PROCESSES = "inprocess", "-h", "--help"
-"""Ends of words by which `gridpeers run` starts no processes."""
+    if words[:1] != ["run"] or len(words) == 1 or not {"-h", "--help"}.isdisjoint(words):
+        return ""
+    return "inprocess" if any(word.endswith("inprocess") for word in words) else "processes"

@@ -30,8 +30,8 @@ _ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 """A server may have no other threads, and the plant uses one anyway."""
 
 
-_SET_BY_US = {"ZENOH_RUNTIME"}
-"""Variables that loading Zenoh sets here as it does there."""
+_SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
+"""Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""
 
 
 class _Surroundings(NamedTuple):

@@ -134,6 +134,18 @@ def test_a_folder_that_cannot_be_written_costs_time_alone(tmp_path: Path, monkey
     assert into.tolist() == [3.0, 3.0]
 
 
+def test_where_machine_code_cannot_be_linked_numba_runs_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a system whose linker does not take it the function gives the same, and each start loads numba as before."""
+
+    def refuse(*_: object, **__: object) -> None:
+        raise RuntimeError("Symbols not found")
+
+    monkeypatch.setattr(MachineCode, "linked", refuse)
+    outer = Outer(Inner(np.arange(16.0).reshape(8, 2), 2.0), np.array([2, 0]))
+
+    assert Kernel(gather)(outer, -1.0, 2) == gather(outer, -1.0, 2)
+
+
 def test_a_record_by_itself_goes_to_numba(folder: Path) -> None:
     """What has no words here is called as before."""
     record = np.zeros(1, [("a", "f8"), ("b", "f8")])[0]
