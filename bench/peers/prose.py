@@ -69,7 +69,7 @@ LIMITS = """## Where the limit is
   matplotlib 0.37 and eight figures 0.95, on all cores; the rest is forks and ends of processes. In turns with commit
   c71129f, seven rounds at real-time priority on two busy cores (load 4 to 8): to the first row 0.70 s instead of 1.28
   s, to the last 1.40 instead of 1.86, to the end with tables and figures 2.02 instead of 3.39; processor time 3.7 s
-  instead of 4.3 s. The same case with `--driver inprocess`: 1.5 s instead of 3.4 s.
+  instead of 4.3 s. The same case with `--driver inprocess`: 1.6 s instead of 3.4 s.
 """
 
 SCALE = """## From nine agents to 999 in one process
