@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment.imported_equipment import LinearElement, LoadPart
+from plant.equipment.imported_equipment import BEHIND, LinearElement, LoadPart
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
 
@@ -97,6 +97,29 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
         ('13-152', '152-13', 'sw1')
         """
         return (self.name, f"{self.to_bus}-{self.from_bus}", *((self.alias,) if self.alias else ()))
+
+    @property
+    def event_name(self) -> str:
+        """Its name in events: its buses; the alias alone where an import has put a bus behind it.
+
+        Examples
+        --------
+        >>> ends = dict(from_bus="632", to_bus="632~632-671")
+        >>> Switch(name="632-632~632-671", alias="632-671", **ends, phases="ABC", closed=True).event_name
+        '632-671'
+        """
+        return self.alias if self.alias and BEHIND in self.to_bus else self.name
+
+    @property
+    def full_name(self) -> str:
+        """Its name in sentences: both of its names, if it has another one than in events.
+
+        Examples
+        --------
+        >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).full_name
+        'sw1 (13-152)'
+        """
+        return f"{self.alias} ({self.name})" if self.alias not in ("", self.event_name) else self.event_name
 
 
 class Load(msgspec.Struct, frozen=True, kw_only=True):

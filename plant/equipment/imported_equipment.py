@@ -4,6 +4,20 @@ from __future__ import annotations
 
 import msgspec
 
+BEHIND = "~"
+"""Stands in the name of a bus that an import adds, behind the name of the bus whose voltage and place it has."""
+
+
+def bus_behind(bus: str, element: str) -> str:
+    """Return the name of the bus that an import puts between a bus and an element.
+
+    Examples
+    --------
+    >>> bus_behind("632", "632-671")
+    '632~632-671'
+    """
+    return f"{bus}{BEHIND}{element}"
+
 
 class LinearElement(msgspec.Struct, frozen=True, kw_only=True):
     """Anything linear between nodes, by its primitive admittance matrix: a line, a transformer, a capacitor."""

@@ -55,7 +55,7 @@ class Closings:
         if difference is None or difference.within:
             return ""
         return (
-            f"switch {self._switches.shown(name)} not closed: its sides are {difference}; allowed are "
+            f"switch {self._switches.switch(name).full_name} not closed: its sides are {difference}; allowed are "
             f"{difference.limits}; {difference.way_out}, or close it without the check"
         )
 
@@ -108,5 +108,6 @@ class Closings:
         del self.joined[:-20]
 
     def _warning(self, step: int, name: str, text: str) -> PlantEvent:
-        text = f"switch {self._switches.shown(name)} {text}"
-        return PlantEvent(t=time_of(step, self._h), kind="warning", subject=name, text=text)
+        switch = self._switches.switch(name)
+        text = f"switch {switch.full_name} {text}"
+        return PlantEvent(t=time_of(step, self._h), kind="warning", subject=switch.event_name, text=text)

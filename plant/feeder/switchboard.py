@@ -6,6 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from plant.equipment import Switch
 from plant.network import Network
 from plant.plant_config import SwitchEvent
 from wire.messages import PlantEvent
@@ -81,10 +82,9 @@ class Switchboard:
         if not self._at[step]:
             del self._at[step]
 
-    def shown(self, name: str) -> str:
-        """Return the name of a switch for people, with its alias."""
-        alias = self._network.switches[name].alias
-        return f"{alias} ({name})" if alias else name
+    def switch(self, name: str) -> Switch:
+        """Return a switch by its name in the tables."""
+        return self._network.switches[name]
 
     def foreseen(self) -> Iterator[frozenset[str]]:
         """Yield the closed switches after each step with operations to come, in order of time."""
@@ -103,11 +103,9 @@ class Switchboard:
             self.closed = _operated(self.closed, name, action)
             already = known == (action == "close")
             what = f"was {'closed' if known else 'open'} already" if already else _PAST[action]
-            events.append(
-                PlantEvent(
-                    t=t, kind="switch", subject=name, text=f"switch {self.shown(name)} {what}{notes.get(name, '')}"
-                )
-            )
+            switch = self.switch(name)
+            text = f"switch {switch.full_name} {what}{notes.get(name, '')}"
+            events.append(PlantEvent(t=t, kind="switch", subject=switch.event_name, text=text))
         return events
 
 

@@ -78,7 +78,8 @@ def trip_event(
         None,
     )
     if culprit is not None:
-        cause = f"closed out of phase, {culprit.angle:.0f} deg across {culprit.switch} at t = {culprit.t:.3f} s"
+        switch = network.switches[culprit.switch].event_name
+        cause = f"closed out of phase, {culprit.angle:.0f} deg across {switch} at t = {culprit.t:.3f} s"
     elif load > rating and not fed:
         cause = f"overload, {load / 1e3:.0f} kW of load on inverters of {rating / 1e3:.0f} kVA"
     elif load < 0.0:

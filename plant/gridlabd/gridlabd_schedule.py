@@ -75,9 +75,9 @@ class GridlabdSchedule:
         for operation in due[1:]:
             self._switches.drop(step, operation)
             self._switches.put(step + 1, operation.switch, operation.action)
-            shown = self._switches.shown(operation.switch)
-            text = f"GridLAB-D operates one switch a step: {shown} follows {self._h * 1e3:g} ms later"
-            events.append(PlantEvent(t=t, kind="warning", subject=operation.switch, text=text))
+            switch = self._switches.switch(operation.switch)
+            text = f"GridLAB-D operates one switch a step: {switch.full_name} follows {self._h * 1e3:g} ms later"
+            events.append(PlantEvent(t=t, kind="warning", subject=switch.event_name, text=text))
         if due:
             writes.append((f"s{due[0].switch}", "status", due[0].action))
             events += self._switches.operate(step)

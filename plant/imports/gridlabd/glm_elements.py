@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.equipment import Bus, Switch
-from plant.equipment.imported_equipment import LinearElement
+from plant.equipment.imported_equipment import LinearElement, bus_behind
 from plant.imports.gridlabd.glm_classes import SWITCHES
 
 Complex = NDArray[np.complex128]
@@ -85,7 +85,7 @@ class GlmElements:
         Between them is an ideal transformer for each phase: what stands against it is next to no impedance.
         """
         bus = self._buses[at]["name"]
-        stiff = f"{bus}~swing"
+        stiff = bus_behind(bus, "swing")
         self.added[stiff] = at, LETTERS
         r = np.array(ratios)
         blocks = STIFF * np.block([[np.diag(abs(r) ** 2), np.diag(-r.conj())], [np.diag(-r), np.eye(3)]])
@@ -121,7 +121,7 @@ class GlmElements:
     def _add_before(self, name: str, branch: dict[str, Any], letters: str, *, closed: bool, alone: bool = True) -> None:
         """Put an ideal switch before a branch, or before one of its phases."""
         bus, short = self._buses[branch["from"]]["name"], branch["name"] if alone else f"{branch['name']}.{letters}"
-        behind = f"{bus}~{short}"
+        behind = bus_behind(bus, short)
         self.added[behind] = branch["from"], letters
         blocks = _blocks(branch, _conducting(branch), letters) if branch["class"] in SWITCHES else self._matrix(branch)
         self._append(name if alone else f"{name}.{letters}", branch, blocks, behind)

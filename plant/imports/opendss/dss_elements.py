@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from plant.equipment import NODES, Bus, Source, Switch
 from plant.equipment.connectivity import Node
-from plant.equipment.imported_equipment import LinearElement, LoadPart
+from plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
 from plant.imports.opendss.dss_engine import DssEngine
 from plant.tables.feeder_columns import SOURCE_VOLTAGE
 
@@ -89,7 +89,7 @@ class DssElements:
             )
             return
         Y = matrix(element.Yprim)[:3, :3]
-        stiff = self._add_bus(f"{bus}~{name.partition('.')[2]}", bus, "ABC")
+        stiff = self._add_bus(bus_behind(bus, name.partition(".")[2]), bus, "ABC")
         inner = [(stiff, letter) for letter in "ABC"]
         # conductor k leads to node nodes[k], and has the angle of the k-th phase
         self._append(name, [*inner, *nodes[:3]], np.block([[Y, -Y], [-Y, Y]]))
@@ -155,7 +155,7 @@ class DssElements:
         (bus,) = {bus for bus, letter in nodes[:half] if letter}
         letters = "".join(letter for letter in NODES if (bus, letter) in nodes[:half])
         short = name.partition(".")[2]
-        behind = self._add_bus(f"{bus}~{short}", bus, letters)
+        behind = self._add_bus(bus_behind(bus, short), bus, letters)
         moved = [(behind if letter else at, letter) for at, letter in nodes[:half]]
         self._append(name, [*moved, *nodes[half:]], Y)
         self.switches.append(

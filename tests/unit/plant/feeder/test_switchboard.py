@@ -1,5 +1,7 @@
 import pytest
+from msgspec.structs import replace
 
+from plant.equipment.imported_equipment import bus_behind
 from plant.feeder.switchboard import Switchboard
 from plant.network import Network
 from plant.plant_config import SwitchEvent
@@ -24,6 +26,22 @@ def test_a_step_operates_its_switches_together(network: Network) -> None:
         (0.5, "switch", "67s-67", "switch sw1_2 (67s-67) opened"),
         (0.5, "switch", "13-152", "switch 13-152 opened"),
     ]
+
+
+def test_a_switch_of_an_imported_line_is_named_after_the_line(network: Network) -> None:
+    """The bus that an import puts behind a switch is in no drawing of the user's, so events do not name it."""
+    (first, *others) = network.feeder.switches
+    behind = bus_behind(first.from_bus, "head")
+    imported = replace(first, name=f"{first.from_bus}-{behind}", alias="head", to_bus=behind)
+    bus = next(bus for bus in network.feeder.buses if bus.name == first.from_bus)
+    buses = (*network.feeder.buses, replace(bus, name=behind))
+    board = Switchboard(Network(replace(network.feeder, buses=buses, switches=(imported, *others))), (), H)
+
+    board.put(0, "head", "open")
+    (told,) = board.operate(0)
+
+    assert (told.subject, told.text) == ("head", "switch head opened")
+    assert imported.name not in board.closed
 
 
 def test_an_idle_operation_says_so(network: Network) -> None:
