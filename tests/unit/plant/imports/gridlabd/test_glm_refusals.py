@@ -1,5 +1,6 @@
 """What cannot be imported from a model is refused by name, several mistakes at once, each in one line."""
 
+import subprocess
 import sys
 from pathlib import Path
 
@@ -175,6 +176,32 @@ def test_a_file_that_is_not_there_is_told(tmp_path: Path) -> None:
     path = tmp_path / "x.glm"
     path.write_bytes(bytes(range(256)) * 200)
     assert len(problems(path)) <= 4
+
+
+@pytest.mark.parametrize(
+    ("encoding", "told"),
+    [
+        ("utf-8-sig", "begins with a byte order mark, which GridLAB-D cannot read; take it off: tail -c +4"),
+        ("utf-16", "is in UTF-16, which GridLAB-D cannot read; write it in UTF-8: iconv -f UTF-16 -t UTF-8"),
+        ("utf-16-le", "is in UTF-16LE, which GridLAB-D cannot read; write it in UTF-8: iconv -f UTF-16LE -t UTF-8"),
+        ("utf-16-be", "is in UTF-16BE, which GridLAB-D cannot read; write it in UTF-8: iconv -f UTF-16BE -t UTF-8"),
+    ],
+)
+@pytest.mark.parametrize("file", ["feeder.glm", "load 1.glm"], ids=["model", "included"])
+def test_a_model_in_another_encoding_is_one_line_whose_command_mends_it(
+    tmp_path: Path, encoding: str, told: str, file: str
+) -> None:
+    """GridLAB-D reads bytes: a file that it cannot read is named, and the command in the line makes one it can."""
+    models = {"feeder.glm": HEAD + '#include "load 1.glm"\n', "load 1.glm": LOAD}
+    for name, model in models.items():
+        (tmp_path / name).write_text(model, encoding=encoding if name == file else "utf-8")
+
+    (problem,) = problems(tmp_path / "feeder.glm")
+
+    assert problem.startswith(f"{file}: {told}")
+    subprocess.run(problem.rpartition(": ")[2], shell=True, cwd=tmp_path, check=True)
+    (tmp_path / f"plain-{file}").rename(tmp_path / file)
+    assert [part.name for part in read_glm(tmp_path / "feeder.glm").load_parts] == ["load.l1"]
 
 
 def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
