@@ -17,7 +17,14 @@ PATIENCE = 4.0
 
 COMPILING = "still starting: the first run ever compiles the plant's inner loop, which takes some seconds ..."
 
-RESTING = "still starting: GridLAB-D solves the feeder and comes to rest before t = 0, which takes some seconds ..."
+TRYING = (
+    "still at work: the plant is tried; the first use ever compiles its inner loop, which takes some 20 seconds ..."
+)
+
+RESTING = (
+    "still starting: GridLAB-D solves the feeder and comes to rest before t = 0; the first run ever compiles our "
+    "operating point before that, which takes some 10 seconds ..."
+)
 
 
 @contextmanager
@@ -60,6 +67,14 @@ def explained(explain: Callable[[], None]) -> Iterator[Tell]:
         yield tell
     finally:
         timer.cancel()
+
+
+@contextmanager
+def explained_work(explain: Callable[[], None]) -> Iterator[None]:
+    """Explain the work within the context if it takes long."""
+    with explained(explain) as tell:
+        tell("", 0.0, 1.0)
+        yield
 
 
 @contextmanager

@@ -37,9 +37,10 @@ def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[
     """Read and check a scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
     from scenarios.schema import ScenarioError
+    from wire.driver.command_line import command_line
 
     if not name:
-        fail(["no scenario was named; `gridpeers list` shows those of the catalogue"], BAD_INPUT)
+        fail([f"no scenario was named; `{command_line('list')}` shows those of the catalogue"], BAD_INPUT)
 
     try:
         scenario = load_face(name)

@@ -15,6 +15,8 @@ from gridpeers.runs.showing import shown_in_notebooks
 from scenarios.schema.scenario_errors import ScenarioError
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import flatten
+from wire.counted import counted
+from wire.driver.command_line import command_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -69,7 +71,7 @@ def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, 
         raise ScenarioError(
             [
                 f"the runs have no case in common: the first has {', '.join(first)}, the second {', '.join(second)}; "
-                "run one case of each (gridpeers run --case), or choose in Python: "
+                f"run one case of each ({command_line('run')} --case), or choose in Python: "
                 f'gridpeers.compare(a["{next(iter(first))}"], b["{next(iter(second))}"])'
             ]
         )
@@ -127,7 +129,7 @@ class Comparison:
         return "\n\n".join((changes, table, verdict))
 
     def __repr__(self) -> str:
-        return f"<Comparison of {' and '.join(self.names)}: {len(self._pairs)} case(s)>"
+        return f"<Comparison of {' and '.join(self.names)}: {counted(len(self._pairs), 'case')}>"
 
 
 def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from plant.dynamics.switch_state import SwitchState
 from plant.network import Network
+from wire.counted import counted
 from wire.messages import PlantEvent
 
 GRID = "grid"
@@ -76,7 +77,8 @@ class Islands:
         lost = sum(S.real for bus, _, S in network.feeder.demands() if bus in dead) / 1e3
         some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
         idle = [unit.name for unit in network.inverters if unit.bus in new]
-        text = f"dead: {len(new)} buses ({some}) without substation or GFM, {lost:.0f} kW of load not served"
+        count = counted(len(new), "bus", "buses")
+        text = f"dead: {count} ({some}) without substation or GFM, {lost:.0f} kW of load not served"
         text += f", {', '.join(idle)} idle" if idle else ""
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 

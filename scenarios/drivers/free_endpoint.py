@@ -8,6 +8,8 @@ import re
 import socket
 from typing import NamedTuple
 
+from wire.driver.command_line import command_line
+
 _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"
 )
@@ -121,6 +123,7 @@ def _way_out(host: str, error: OSError) -> str:
         return f"{host} is no address of this host; give one that it has, or 0.0.0.0 (IPv6: [::]) for all of them"
     other = "choose another port, or 0 for a free one, here and for those that connect to it"
     if error.errno == errno.EADDRINUSE:
-        ends = "gridpeers down ends a live run; a frozen plant goes on with kill -CONT, or ends by its process id"
+        down = command_line("down")
+        ends = f"{down} ends a live run; a frozen plant goes on with kill -CONT, or ends by its process id"
         return f"end what uses it ({ends}), or {other}"
     return other

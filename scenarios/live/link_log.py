@@ -21,6 +21,7 @@ from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
+from wire.driver.command_line import command_line
 from wire.messages import LinkRequest
 
 
@@ -58,7 +59,7 @@ class LinkLog:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
         file = self._replay or (self._by_the_way if self._orders else None)
-        return [] if file is None else [f"the links as they were: gridpeers run {shown(file)}"]
+        return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
 
     def _write_replay(self, t: float) -> None:
         files = [self._replay, self._by_the_way if self._orders else None]

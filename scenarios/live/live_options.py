@@ -13,6 +13,7 @@ from scenarios.live.run_address import LONGEST, UsageError, check_duration, chec
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.netem_tables import netem_of, setup_of
+from wire.driver.command_line import command_line
 from wire.schema.suggestion import suggestion
 
 SPEEDS = (0.1, 50.0)
@@ -82,7 +83,8 @@ def configure(
     _check(options)
     if scenario.plant.simulator != "gridpeers":
         raise UsageError(
-            f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use gridpeers run, or "gridpeers"'
+            f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
+            'or "gridpeers"'
         )
     case = chosen_case(scenario, options.case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)

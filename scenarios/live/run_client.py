@@ -18,6 +18,7 @@ from scenarios.live.run_address import (
     next_port,
 )
 from wire.codec import RejectedError, decode
+from wire.driver.command_line import command_line
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
 from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
@@ -227,13 +228,13 @@ class RunClient:
                 )
             return (
                 f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
-                "(gridpeers plant SCENARIO), or say by --connect where it is"
+                f"({command_line('plant', 'SCENARIO')}), or say by --connect where it is"
             )
         others = sorted(self._others)
         there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
         return (
             f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
-            f"start one (gridpeers plant SCENARIO --run {self.where.run}), or give another name by --run"
+            f"start one ({command_line('plant', 'SCENARIO', '--run', self.where.run)}), or give another name by --run"
         )
 
 
@@ -254,12 +255,13 @@ def endpoint_for_run(listen: str) -> str:
         there = runs_at(where) if error.in_use and accepting((where,)) else []
         if not there:
             raise
-        first = "" if (there[0], where) == (RUN, ENDPOINT) else f" --run {there[0]} --connect {where}"
+        first = () if (there[0], where) == (RUN, ENDPOINT) else ("--run", there[0], "--connect", where)
+        status, down = command_line("status", *first), command_line("down", *first)
         beside = next_port(listen)
         other = loopback_of(beside)
         raise UsageError(
             f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
-            f"gridpeers status{first} shows it, gridpeers down{first} ends it; to have both, give this one a name and "
+            f"{status} shows it, {down} ends it; to have both, give this one a name and "
             f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {other})"
         ) from None
 
@@ -287,5 +289,5 @@ def check_alone(run: str, beyond: tuple[str, ...]) -> None:
         if client.until(lambda: client.plant, LOOKING):
             raise UsageError(
                 f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
-                f"(gridpeers down --run {run} --connect {beyond[0]}), or give this run another name"
+                f"({command_line('down', '--run', run, '--connect', beyond[0])}), or give this run another name"
             )

@@ -15,6 +15,7 @@ from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
+from wire.driver.command_line import command_line
 from wire.messages import Answer, Command, LinkAcknowledgement
 
 Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
@@ -152,7 +153,7 @@ def check_free(client: RunClient, name: str) -> None:
     if name in plant_status(client).agents:
         raise NobodyError(
             f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
-            f"(gridpeers stop {name}), or start the agent of another inverter"
+            f"({command_line('stop', name)}), or start the agent of another inverter"
         )
 
 

@@ -11,6 +11,7 @@ import typer
 from gridpeers.cli.commands.feeder_glm_command import glm
 from gridpeers.cli.commands.grow_command import grow
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
+from wire.counted import counted
 
 if TYPE_CHECKING:
     from gridpeers.feeder import Feeder
@@ -30,6 +31,9 @@ Switches = Annotated[
 LeaveOut = Annotated[
     list[str] | None,
     typer.Option("--leave-out", metavar="ELEMENT", help='Do without Class.name, * for any: "PVSystem.*"; repeat it.'),
+]
+LoadSet = Annotated[
+    str | None, typer.Option("--load-set", metavar="NAME", help="Load table of a folder of tables; main if left out.")
 ]
 SHOWN = 12
 """Notes that are shown."""
@@ -76,7 +80,7 @@ def import_(
 
 
 @app.command()
-def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = None) -> None:
+def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None, leave_out: LeaveOut = None) -> None:
     """Check a feeder; say what it has, and what opening each switch would cut off.
 
     Exit code: 0 it is sound, 2 it has problems; all of them are named.
@@ -85,7 +89,7 @@ def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = Non
     """
     from plant.equipment.connectivity import Connectivity
 
-    tables = _read(feeder, switch, leave_out)
+    tables = _read(feeder, load_set, switch, leave_out)
     _describe(tables)
     graph, load = Connectivity(tables), tables.load_by_bus()
     for each in tables.switches:
@@ -98,7 +102,9 @@ def check(feeder: FeederName, switch: Switches = None, leave_out: LeaveOut = Non
             typer.echo(f"switch {name}: closed; there is another way around it")
             continue
         inverters = [row.name for row in tables.inverters if row.bus in behind]
-        cut = f"{len(behind)} buses, {sum(load.get(bus, 0.0) for bus in behind) / 1e3:.0f} kW of load"
+        cut = (
+            f"{counted(len(behind), 'bus', 'buses')}, {sum(load.get(bus, 0.0) for bus in behind) / 1e3:.0f} kW of load"
+        )
         typer.echo(f"switch {name}: closed; open, it cuts off {cut}{', ' + ', '.join(inverters) if inverters else ''}")
 
 
@@ -109,6 +115,7 @@ def solve(
         list[str] | None, typer.Option("--open", metavar="SWITCH", help="Open it first; repeat it.")
     ] = None,
     csv: Annotated[Path | None, typer.Option("--csv", help="File for all voltages.")] = None,
+    load_set: LoadSet = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
@@ -121,11 +128,17 @@ def solve(
     from scenarios.results.run_files import refusal, shown, write_whole
 
     try:
-        table = _read(feeder, switch, leave_out).solve(open_ or ())
+        table = _read(feeder, load_set, switch, leave_out).solve(open_ or ())
     except (ValueError, ArithmeticError) as error:
         fail([f"{feeder}: {error}"], BAD_INPUT)
-    live = table[(table["V"] > 0.0) & table["phase"].isin(list("ABC"))].sort_values("V_pu")
-    typer.echo(f"{len(live)} nodes, {len(table) - len(live)} without voltage or no phase")
+    phases = table[table["phase"].isin(list("ABC"))]
+    live = phases[phases["V"] > 0.0].sort_values("V_pu")
+    text = f"{counted(len(live), 'node')} with voltage"
+    if dead := len(phases) - len(live):
+        text += f", {dead} without, as the substation does not reach {'it' if dead == 1 else 'them'}"
+    if others := len(table) - len(phases):
+        text += f"; {counted(others, 'node')} beside phases A, B and C (neutrals) not counted"
+    typer.echo(text)
     for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
         typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
     if csv is not None:
@@ -141,6 +154,7 @@ def plot(
     feeder: FeederName,
     out: Annotated[Path, typer.Option("--out", help="File of the figure: .png, .svg or .pdf.")] = Path("feeder.png"),
     voltages: Annotated[bool, typer.Option("--voltages", help="Colour by voltage instead of by microgrid.")] = False,
+    load_set: LoadSet = None,
     switch: Switches = None,
     leave_out: LeaveOut = None,
 ) -> None:
@@ -154,7 +168,7 @@ def plot(
 
     from scenarios.results.run_files import refusal, shown, write_whole
 
-    tables = _read(feeder, switch, leave_out)
+    tables = _read(feeder, load_set, switch, leave_out)
     try:
         out = out if out.suffix else out.with_suffix(".png")
         drawn = BytesIO()
@@ -208,17 +222,21 @@ def folder_of(name: str) -> str:
     return re.sub(r"[^\w.-]+", "_", name).lstrip(".-") or "feeder"
 
 
-def _read(name: str, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
+def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
     """Read a feeder of tables or a script, or end with every problem in it."""
     from gridpeers.feeder import READERS, Feeder
     from plant.tables import FeederError
 
     if Path(name).suffix.lower() in READERS:
+        if load_set is not None:
+            fail(
+                [f"--load-set is for a folder of tables; {name} has the one set of loads that it describes"], BAD_INPUT
+            )
         return read_script(name, switch or [], leave_out or [])
     if switch or leave_out:
         fail(["--switch and --leave-out are for .dss and .glm files; a folder's tables can be edited"], BAD_INPUT)
     try:
-        return Feeder.read(name)
+        return Feeder.read(name, load_set or "main")
     except FeederError as error:
         refuse(error)
 
@@ -227,7 +245,9 @@ def _describe(feeder: Feeder) -> None:
     load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
     nodes = sum(len(bus.phases) for bus in feeder.buses)
     typer.echo(
-        f"{feeder.name}: {len(feeder.buses)} buses, {nodes} nodes, {load:.0f} kW of load, "
+        f"{feeder.name}: {counted(len(feeder.buses), 'bus', 'buses')}, {counted(nodes, 'node')}, "
+        f"{load:.0f} kW of load, "
         f"{f'{generation:.0f} kW of constant generation, ' if generation else ''}"
-        f"{len(feeder.switches)} switches, {len(feeder.inverters)} inverters, {feeder.f_nom:g} Hz"
+        f"{counted(len(feeder.switches), 'switch', 'switches')}, {counted(len(feeder.inverters), 'inverter')}, "
+        f"{feeder.f_nom:g} Hz"
     )

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
+from wire.counted import counted
 
 SCENARIO = """\
 # {copies} copies of {feeder}, made by `gridpeers feeder grow`: all lose the substation at once and stay joined.
@@ -98,4 +99,5 @@ def grow(
             (out / "islanding.toml").write_text(text, encoding="utf-8")
     except OSError as error:
         fail([refusal(out, error)], BAD_INPUT)
-    typer.echo(f"{len(grown.buses)} buses, {len(grown.inverters)} inverters: {shown(out / 'islanding.toml')}")
+    size = f"{counted(len(grown.buses), 'bus', 'buses')}, {counted(len(grown.inverters), 'inverter')}"
+    typer.echo(f"{size}: {shown(out / 'islanding.toml')}")

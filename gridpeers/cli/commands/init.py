@@ -102,6 +102,7 @@ def init(
 
     from gridpeers.output_folders import whole_folder
     from scenarios.results.run_files import refusal, shown
+    from wire.driver.command_line import command_line
 
     try:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -112,11 +113,12 @@ def init(
                 fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
             with whole_folder(folder):
                 shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-            following = "gridpeers run mine.toml --driver inprocess && pytest"
+            run, test = ("run", "mine.toml", "--driver", "inprocess"), command_line(program="pytest", within=folder)
+            following = f"{command_line(*run, within=folder)} && {test}"
         else:
             with whole_folder(folder):
                 _propose(folder, feeder, switch or [], leave_out or [], inverters)
-            following = "gridpeers run islanding.toml --driver inprocess"
+            following = command_line("run", "islanding.toml", "--driver", "inprocess", within=folder)
     except OSError as error:
         fail([refusal(folder, error)], BAD_INPUT)
     for file in sorted(path.name for path in folder.iterdir()):
@@ -165,9 +167,12 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     import msgspec
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
+    from gridpeers.cli.progress import TRYING, explained_work
     from scenarios.operating_point import start_problem
     from scenarios.proposal.proposal_errors import NoProposalError
     from scenarios.schema import load_scenario
+    from wire.counted import counted
+    from wire.driver.command_line import command_line
 
     try:
         feeder, proposal = _with_proposal(str(script), switches, leave_out, count)
@@ -192,18 +197,20 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         return load_scenario(str(folder / "islanding.toml"))
 
     problem = ""
-    for part in PARTS:
-        found = start_problem(*(project := written(part)))
-        if not found:
-            _damp(project, partial(written, part))
-            break
-        problem = problem or found
-    else:
-        typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then `gridpeers check islanding.toml`")
+    with explained_work(lambda: typer.echo(TRYING)):
+        for part in PARTS:
+            found = start_problem(*(project := written(part)))
+            if not found:
+                _damp(project, partial(written, part))
+                break
+            problem = problem or found
+    if found:
+        check = command_line("check", str(folder / "islanding.toml"))
+        typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then: {check}")
     if count is not None and len(proposal.inverters) < count:
         typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
         f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "
-        f"{len(proposal.inverters)} inverters of {rated:.0f} kW proposed"
+        f"{counted(len(proposal.inverters), 'inverter')}, {rated:.0f} kW in all, proposed"
     )

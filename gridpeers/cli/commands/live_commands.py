@@ -11,6 +11,7 @@ import typer
 
 from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
+from wire.driver.command_line import command_line
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
@@ -91,7 +92,8 @@ def _start(
             replay = None if out is None else out / "replay.toml"
             link_log = LinkLog(spec, feeder, record, replay)
             if agents:
-                say("gridpeers watch, in another terminal, shows it; Ctrl-C here, or gridpeers down there, ends it")
+                watch, down = command_line("watch"), command_line("down")
+                say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log)
             else:
                 if note := manual_node_faults(spec):

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, get_args
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, load, require
+from wire.counted import counted
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "faults", "graphs"]
 """Values of the argument of `doc`."""
@@ -40,17 +41,21 @@ def check(
     spec, feeder = load(file)
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
+    from gridpeers.cli.progress import TRYING, explained_work
     from scenarios.operating_point import start_problem
     from scenarios.results.file_sizes import file_sizes
     from scenarios.schema.supply import supply_notes
 
-    if problem := start_problem(spec, feeder):
+    with explained_work(lambda: typer.echo(TRYING)):
+        problem = start_problem(spec, feeder)
+    if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
     for note in supply_notes(spec, feeder):
         typer.echo(f"NOTE  {note}")
     typer.echo(
-        f"{file}: can be run: {len(spec.cases)} case(s) {', '.join(spec.cases)}; {len(spec.events)} event(s); "
-        f"{spec.time.end_s:g} s; {len(feeder.inverters)} inverters on {len(feeder.buses)} buses"
+        f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "
+        f"{counted(len(spec.events), 'event')}; {spec.time.end_s:g} s; "
+        f"{counted(len(feeder.inverters), 'inverter')} on {counted(len(feeder.buses), 'bus', 'buses')}"
         + (f"; {sentence}" if (sentence := file_sizes(spec, feeder).sentence) else "")
     )
 

@@ -10,6 +10,8 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, refuse, require
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from scenarios.sweep.file import Plan
     from scenarios.sweep.study import Summary
 
@@ -50,18 +52,16 @@ def sweep(
     if dry_run:
         typer.echo(_size(file, plan))
         return
-    import shlex
-
     from scenarios.sweep.sweep_folder import folder_of
 
-    again = f"gridpeers sweep {shlex.quote(file)}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    again = ["sweep", file, *(["--out", str(out)] if out else [])]
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
     for line in _result_lines(summary):
         typer.echo(line)
     raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
 
 
-def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: str) -> Summary:
+def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: Sequence[str]) -> Summary:
     """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
 
     Parameters
@@ -76,8 +76,8 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         Processes; None is one per core.
     dask : str
         Address of a scheduler to use instead, or nothing.
-    again : str
-        The command that goes on with what was interrupted.
+    again : sequence of str
+        Words of the command that goes on with what was interrupted.
     """
     from rich.console import Console
 
@@ -87,6 +87,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     from scenarios.sweep.study import study
     from scenarios.sweep.sweep_folder import SweepFolder
     from scenarios.sweep.workers import WorkersError, cores
+    from wire.driver.command_line import command_line
 
     console = Console()
     try:
@@ -100,7 +101,8 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
 
                     return study(plan, folder, note, jobs=jobs or cores(), dask=dask)
             except (KeyboardInterrupt, OSError, WorkersError) as error:
-                kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {again}"
+                onward = command_line(*again)
+                kept = f"{folder.kept} of {len(plan.runs)} runs are kept in {shown(path)}/; go on with: {onward}"
                 if isinstance(error, KeyboardInterrupt):
                     fail([f"interrupted; {kept}"], exit_code(error))
                 fail([refusal(path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)

@@ -11,6 +11,8 @@ import gridpeers as gp
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from papers.singhal2022.experiments.experiment_output import ExperimentResult
     from papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
 
@@ -38,8 +40,6 @@ def experiment(
     """
     needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
     require(needed)
-    import shlex
-
     from gridpeers.output_folders import RUNS, refusal, shown
     from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS, FromSweep
 
@@ -49,7 +49,7 @@ def experiment(
         return
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
-    again = f"gridpeers experiment {name}" + (f" --out {shlex.quote(str(out))}" if out else "")
+    again = ["experiment", name, *(["--out", str(out)] if out else [])]
     result = (
         _from_sweep(source, folder, jobs, again) if isinstance(source, FromSweep) else _from_scenario(source, folder)
     )
@@ -61,7 +61,7 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: str) -> ExperimentResult:
+def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
     from gridpeers.cli.commands.sweep_command import check_packages, finish
 

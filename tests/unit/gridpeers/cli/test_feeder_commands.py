@@ -9,6 +9,7 @@ from tempfile import gettempdir
 import pandas as pd
 import pytest
 
+from gridpeers import Feeder
 from plant.tables import read_feeder
 from scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
@@ -20,18 +21,25 @@ FEEDERS = Path(__file__).parents[3] / "feeders"
 IEEE13 = str(FEEDERS / "ieee13.dss")
 
 
-@pytest.mark.parametrize("feeder", ["ieee13", "ieee34"])
-def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path, feeder: str) -> None:
-    """After `init --feeder` and `run` the island of the whole feeder is back at 60 Hz, and shares."""
+@pytest.mark.parametrize(("feeder", "switch"), [("ieee13", "rg60-632"), ("ieee34", "800-802")])
+def test_a_script_becomes_an_islanding_that_runs(elsewhere: Path, feeder: str, switch: str) -> None:
+    """After `init --feeder` and `run` the island of the whole feeder is back at 60 Hz, and shares.
+
+    The switch has the line's name everywhere, in events too.
+    """
     code, made = invoke("init", "mine", "--feeder", str(FEEDERS / f"{feeder}.dss"))
     end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--out", "out")
 
     assert code == 0, made
-    assert "inverters of" in made
+    assert " kW in all, proposed" in made
     assert end == 0, ran
     line = next(line for line in ran.splitlines() if line.startswith("ring"))
     assert " 0.000 " in line
     assert float(line.split()[-2]) < 2.0
+    events = pd.read_csv("out/ring/events.csv")
+    assert events[events["kind"] == "switch"][["subject", "text"]].to_numpy().tolist() == [
+        [switch, f"switch {switch} opened"]
+    ]
 
 
 LONG = """New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9
@@ -116,6 +124,42 @@ def test_an_imported_feeder_is_checked_solved_and_drawn(elsewhere: Path) -> None
     assert Path("map.svg").stat().st_size > 1000
 
 
+def test_loads_of_another_set_are_checked_solved_and_drawn(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every command that reads a folder of tables takes its load set, main if none is named."""
+    drawn = []
+    plot = Feeder.plot
+    monkeypatch.setattr(Feeder, "plot", lambda self, **how: drawn.append(self.load_set) or plot(self, **how))
+    said = {}
+    for words in ((), ("--load-set", "main"), ("--load-set", "event2")):
+        for command in ("check", "solve", "plot"):
+            code, said[command, words] = invoke("feeder", command, "microgrid123", *words)
+            assert code == 0
+    of_main, of_main_by_name, of_event2 = (
+        [said[command, words] for command in ("check", "solve")]
+        for words in ((), ("--load-set", "main"), ("--load-set", "event2"))
+    )
+
+    assert of_main == of_main_by_name
+    assert all(one != other for one, other in zip(of_main, of_event2, strict=True))
+    assert drawn == ["main", "main", "event2"]
+
+
+def test_counts_are_words_for_people(elsewhere: Path) -> None:
+    """One switch is no "1 switches"; a node without voltage, and one that is no phase, each say what they are."""
+    Path("four.dss").write_text(
+        "New Circuit.four basekv=12.47\nNew Line.sw bus1=sourcebus bus2=a length=1 switch=y\n"
+        "New Line.l bus1=a.1.2.3.4 bus2=b.1.2.3.4 phases=4 length=1\nNew Reactor.g bus1=b.4 phases=1 r=1 x=0\n"
+        "New Load.l bus1=b.1.4 phases=1 kv=7.2 kw=100\n"
+    )
+
+    checked, closed = invoke("feeder", "check", "four.dss")[1], invoke("feeder", "solve", "four.dss")[1]
+    opened = invoke("feeder", "solve", "four.dss", "--open", "sw")[1]
+
+    assert ", 100 kW of load, 1 switch, 0 inverters, 60 Hz" in checked
+    assert closed.splitlines()[0] == "15 nodes with voltage; 2 nodes beside phases A, B and C (neutrals) not counted"
+    assert opened.startswith("6 nodes with voltage, 9 without, as the substation does not reach them; 2 nodes beside")
+
+
 def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     """A .glm file is checked, imported, solved and drawn, and becomes an islanding at a line near its substation."""
     Path("feeder.glm").write_text(LOADS)
@@ -147,6 +191,8 @@ def test_a_model_for_gridlabd_goes_the_same_ways(elsewhere: Path) -> None:
     (("check", "nothere"), "no such feeder and no such folder"),
     (("solve", "microgrid123", "--open", "sw9"), 'switch "sw9": no such switch'),
     (("plot", "microgrid123", "--switch", "Line.l1"), "--switch and --leave-out are for .dss and .glm files"),
+    (("solve", "microgrid123", "--load-set", "evnt2"), 'load set "evnt2": no such set; there are event2, main'),
+    (("solve", "bad.dss", "--load-set", "main"), "--load-set is for a folder of tables"),
     (("import", "bad.dss"), "3 problems"),
 ])  # fmt: skip
 def test_a_feeder_that_cannot_be_used_is_told_in_lines(elsewhere: Path, words: tuple[str, ...], text: str) -> None:

@@ -77,6 +77,22 @@ def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -
         assert explained.wait(timeout=10.0)
 
 
+def test_work_that_takes_long_is_explained_and_quick_work_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A proposal or a check that compiles says so while it does; else nothing is told, and no timer stays behind."""
+    explained, too_late = threading.Event(), threading.Event()
+    monkeypatch.setattr(progress, "PATIENCE", 0.0)
+    with progress.explained_work(explained.set):
+        assert explained.wait(timeout=10.0)
+    monkeypatch.setattr(progress, "PATIENCE", 3600.0)
+    before = set(threading.enumerate())
+    with progress.explained_work(too_late.set):
+        (timer,) = set(threading.enumerate()) - before
+    timer.join(timeout=10.0)
+
+    assert not timer.is_alive()
+    assert not too_late.is_set()
+
+
 def test_a_start_that_is_quick_is_not_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     """The explanation is called off when time has moved."""
     monkeypatch.setattr(progress, "PATIENCE", 3600.0)

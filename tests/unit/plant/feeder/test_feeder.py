@@ -268,7 +268,7 @@ def test_what_is_dead_from_the_start_is_said() -> None:
     (event,) = Plant(Network(lone), PlantSettings(), T_C, T_C).take_events()
 
     assert (event.t, event.kind) == (0.0, "dead")
-    assert "1 buses (162)" in event.text
+    assert "1 bus (162)" in event.text
     assert "inv3 idle" in event.text
 
 
