@@ -42,7 +42,22 @@ def _here(config: PlantConfig) -> LivePlant:
 
 
 def build_plant(config: PlantConfig) -> Plant:
-    """Read the feeder and find the initial operating point of our own plant.
+    """Read the feeder, find the initial operating point of our own plant, and load its step.
+
+    Raises
+    ------
+    FeederError
+        If the feeder's tables have problems.
+    PlantError
+        If there is no operating point.
+    """
+    plant = plant_at_rest(config)
+    plant.load_step()
+    return plant
+
+
+def plant_at_rest(config: PlantConfig) -> Plant:
+    """Return our plant at its initial operating point, for who takes no step: the step is not compiled.
 
     Raises
     ------

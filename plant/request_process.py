@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from time import monotonic
+from types import MappingProxyType
 from typing import Any
 
 from plant.transient_folder import TransientFolder
@@ -44,6 +45,8 @@ class RequestProcess:
         The program and its arguments.
     folder
         Where it stands, and which stays as long as it does; None: where this process stands.
+    environment
+        Variables that it has beside those of this process.
 
     Raises
     ------
@@ -51,7 +54,12 @@ class RequestProcess:
         If there is no such program.
     """
 
-    def __init__(self, command: Sequence[str], folder: TransientFolder | None = None) -> None:
+    def __init__(
+        self,
+        command: Sequence[str],
+        folder: TransientFolder | None = None,
+        environment: Mapping[str, str] = MappingProxyType({}),
+    ) -> None:
         self._unread = b""
         self._log = tempfile.TemporaryFile()  # noqa: SIM115  closed with the process
         try:
@@ -61,6 +69,7 @@ class RequestProcess:
                 stdout=subprocess.PIPE,
                 stderr=self._log,
                 cwd=folder.path if folder else None,
+                env=os.environ | environment,
                 pass_fds=(folder.user,) if folder else (),
                 start_new_session=True,  # Ctrl-C is for the run, which then ends this process in order
             )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plant.build import build_plant
+from plant.build import plant_at_rest
 from plant.dynamics import PlantError
 from plant.equipment import Feeder
 from scenarios.schema import ScenarioModel
@@ -18,7 +18,7 @@ def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
         return ""
     plant, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     try:
-        build_plant(plant)
+        plant_at_rest(plant)
     except (PlantError, ValueError) as error:
         return str(error)
     return ""

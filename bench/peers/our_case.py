@@ -22,6 +22,7 @@ from agents.lockstep_agent import LockstepAgent
 from plant.build import build_plant
 from plant.feeder import Plant
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
+from plant.gridlabd.process import delta_mode_process
 from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
@@ -66,9 +67,15 @@ class OurCase:
         return {"ours.plant.build": built - began, "ours.plant.steps": process_time() - built}
 
     def gridlabd_alone(self) -> dict[str, float]:
-        """Measure GridLAB-D through the same events: processor time (s) of its steps, its start not counted."""
+        """Measure GridLAB-D through the same events: processor time (s) of its steps, its start not counted.
+
+        It is as it is installed, without the settings of memory that it has as the plant of our runs.
+        """
         ours = build_plant(self.plant)
-        with GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end) as plant:
+        with (
+            patch.object(delta_mode_process, "KEPT_MEMORY", {}),
+            GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end) as plant,
+        ):
             started = _processor_time(plant.process.pid)
             for _ in range(self.ticks):
                 plant.advance()

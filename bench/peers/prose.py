@@ -54,7 +54,8 @@ LIMITS = """## Where the limit is
 
 - **Plant.** The steps are one compiled loop; the limit is the solution with sparse factors, one iteration each, and the
   controllers; the build is limited by one sparse factorisation. GridLAB-D solves the whole network by Newton's method
-  in every step.
+  in every step; it is measured as it is installed. As the plant of our runs it keeps its solver's memory, which saves
+  a quarter of its time ([plant.md](plant.md#gridlab-d-as-the-plant)).
 - **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link. A
   relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save the
   rest. ZeroMQ over Unix sockets shows what a transport without discovery, routing and TCP costs.

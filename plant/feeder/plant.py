@@ -138,6 +138,9 @@ class Plant:
         # scheduled networks are factored now: in wall-clock time an event must not be late
         for closed in self._switches.foreseen():
             self._dynamics.network.reduced(self._circuits.of(closed))
+
+    def load_step(self) -> None:
+        """Compile or load the inner loop now; else the first `advance` does, which takes seconds in its first use."""
         self._dynamics.run(0)
 
     # ---------------------------------------------------------------- for agents

@@ -8,9 +8,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from plant.build import build_plant
+from plant.dynamics import Dynamics
 from plant.dynamics.kernel import compiled
 from plant.dynamics.kernel.compiled import Kernel
 from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode
+from scenarios.operating_point import start_problem
+from scenarios.schema import load_scenario
+from scenarios.schema.configs import configs
 from tests.side_by_side import compile_once
 
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
@@ -158,3 +163,15 @@ def test_a_record_by_itself_goes_to_numba(folder: Path) -> None:
 def take_a(record: Any, factor: float) -> float:
     """Read a field."""
     return float(record.a * factor)
+
+
+def test_only_a_plant_that_takes_steps_compiles_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`check` needs the operating point alone, which compiles in half of the time; a run's plant has its step too."""
+    loaded = []
+    monkeypatch.setattr(Dynamics, "run", lambda self, steps: loaded.append(steps))
+
+    assert start_problem(*load_scenario("islanding")) == ""
+    assert loaded == []
+
+    build_plant(configs(*load_scenario("islanding"), "I")[0])
+    assert loaded == [0]
