@@ -93,11 +93,10 @@ class Federate:
         for key, kind, unit in request["publications"]:
             code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
             self.publications[key] = helics.helicsFederateRegisterGlobalPublication(self.fed, key, code, unit), kind
+        # we tell ourselves which topics nobody publishes; said after the registration, it leaves the broker its warning
+        helics.helicsFederateSetFlagOption(self.fed, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True)
         for key, kind, unit in request["subscriptions"]:
             self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
-            helics.helicsInputSetOption(
-                self.subscriptions[key][0], helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True
-            )
         helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)

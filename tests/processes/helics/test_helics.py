@@ -146,6 +146,27 @@ def test_a_broker_that_is_missing_is_one_line() -> None:
         scenario.run("IV")
 
 
+BROKER = (
+    "import sys, helics\n"
+    "broker = helics.helicsCreateBroker('zmq', '', f'-f 1 --localinterface={sys.argv[1]}')\n"
+    "helics.helicsBrokerWaitForDisconnect(broker, 30000)\n"
+)
+"""A broker that prints its warnings, as `helics_broker` does."""
+
+
+def test_a_broker_of_others_warns_of_no_topic_that_may_be_missing() -> None:
+    """Optional topics that nobody publishes are no warning in its log, where one of theirs would be lost among them."""
+    address = free_broker()
+    with federate("-c", BROKER, address) as broker:
+        me = HelicsFederate(HelicsSettings(broker=address, name="me"), 30.0)
+        federation = me.begin([], [topics.events("grid"), *topics.held("grid", "inv1")], {})
+        me.end({})
+        printed = broker.communicate(timeout=60)[0]
+
+    assert federation["missing"] == ["grid/events", "grid/inv1/P_set_held", "grid/inv1/V_set_held"]
+    assert printed == ""
+
+
 def test_a_wheel_that_cannot_be_imported_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """It says why, and what to install; the command finds out before it starts anything."""
     (tmp_path / "helics.py").write_text("raise ImportError('none')")
