@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import signal
 import subprocess
@@ -93,7 +94,8 @@ def test_a_run_names_the_signal_that_killed_gridlabd() -> None:
 
     outcome = run_inprocess(*run_of(), kill)
 
-    assert outcome.broke.startswith("plant after t = 0 s: GridLAB-D's process was killed by SIGKILL")
+    # the first telemetry, of t = 0, may be handed over before or after the first control period
+    assert re.match(r"plant after t = 0(\.02)? s: GridLAB-D's process was killed by SIGKILL", outcome.broke)
     assert all_of(os.getpid()) == []
 
 
