@@ -11,6 +11,7 @@ from typer import BadParameter
 from typer.core import TyperGroup
 
 from gridpeers.cli.usage import BAD_INPUT, fail
+from wire.driver.command_line import command_line
 from wire.schema.suggestion import suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]
@@ -50,21 +51,26 @@ def _in_one_line() -> Iterator[None]:
 def _line(error: Any) -> str:
     """Return a problem in one line: where it is, what it is, and what would be right."""
     message = error.format_message().rstrip(".")
-    path = error.ctx.command_path if error.ctx is not None else "gridpeers"
+    more = command_line(*_words(error.ctx), "-h")
     param, kind = getattr(error, "param", None), type(error).__name__
     if kind == "NoSuchOption":
         known = [name for each in error.ctx.command.get_params(error.ctx) for name in each.opts if name[:2] == "--"]
         return f'no option "{error.option_name}"; {suggestion(error.option_name, known, "options")}'
     if kind == "MissingParameter" and param is not None:
-        return f"{_name(param)} is missing; {path} -h shows what it is"
+        return f"{_name(param)} is missing; {more} shows what it is"
     if kind == "BadOptionUsage":
         needs = "needs a value" if "requires" in message else "takes no value"
         return f"{error.option_name}: {needs}"
     if extra := re.search(r"unexpected extra arguments?(?:\(s\))? \((.*)\)", message):
-        return f'too much was typed: "{extra[1]}"; {path} -h shows what is expected'
+        return f'too much was typed: "{extra[1]}"; {more} shows what is expected'
     if param is not None:
         return f"{_name(param)}: {_wrong_value(error, message)}"
-    return f"{message[:1].lower()}{message[1:]}; {path} -h shows what can be given"
+    return f"{message[:1].lower()}{message[1:]}; {more} shows what can be given"
+
+
+def _words(ctx: Any) -> list[str]:
+    """Return the words of a command, without the program."""
+    return [] if ctx is None or ctx.parent is None else [*_words(ctx.parent), ctx.info_name]
 
 
 def _name(param: Any) -> str:

@@ -125,6 +125,7 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
+    from plant.equipment.imported_equipment import BEHIND
     from scenarios.results.run_files import refusal, shown, write_whole
 
     try:
@@ -139,6 +140,7 @@ def solve(
     if others := len(table) - len(phases):
         text += f"; {counted(others, 'node')} beside phases A, B and C (neutrals) not counted"
     typer.echo(text)
+    live = live[~live["bus"].str.contains(BEHIND)]  # an import's own buses stand beside one that the script has
     for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
         typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
     if csv is not None:

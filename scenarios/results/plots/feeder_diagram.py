@@ -10,10 +10,15 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
 
 from plant.equipment import Feeder, Switch
 from plant.equipment.connectivity import Connectivity
+from scenarios.results.plots.feeder_places import Places, has_coordinates, places
+from scenarios.results.plots.label_places import Label, label_sides
+from wire.counted import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""
@@ -30,10 +35,11 @@ HALO: Any = [withStroke(linewidth=2.0, foreground="white")]
 MANY = 400
 """Buses beyond which loads are not marked and branches are half as wide."""
 
+MOST_ZONES = 10
+"""Microgrids and other zones that the legend names."""
+
 MOST_LABELS = 15
 """Inverters beyond which their names are left out, which would cover each other."""
-
-Places = Mapping[str, tuple[float, float]]
 
 
 def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figure:
@@ -44,11 +50,12 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
     feeder : Feeder
         Its tables.
     V : Mapping[str, float], optional
-        Voltage (pu) of each bus, by which branches are coloured; else they have their zone's colour.
+        Voltage (pu) of each bus, by which branches are coloured; else branches and inverters have their microgrid's
+        colour.
     """
     picture = Figure(figsize=(10.5, 7.2), layout="constrained")
-    at = places(feeder)
-    axes = picture.add_subplot(aspect="equal" if _has_coordinates(feeder) else "auto")
+    at, on_coordinates = places(feeder), has_coordinates(feeder)
+    axes = picture.add_subplot(aspect="equal" if on_coordinates else "auto")
     few = len(feeder.buses) <= MANY
     zones = _zones(feeder)
     colours = _colours(feeder, zones)
@@ -63,78 +70,21 @@ def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figu
         for bus in feeder.load_by_bus():
             axes.plot(*at[bus], ".", color="black" if V else colours.get(zones[bus], BESIDE), ms=3.5, zorder=2)
     for switch in feeder.switches:
-        _draw_switch(switch, at, axes, named=few)
-    labelled = len(feeder.inverters) <= MOST_LABELS
+        _draw_switch(switch, at, axes)
     for row in (*feeder.inverters, *feeder.spares):
         GFM = row.kind == "GFM"
-        face = "white" if row.spare else colours.get(row.microgrid, BESIDE)
+        face = "white" if row.spare else BESIDE if V else colours.get(row.microgrid, BESIDE)
         axes.plot(*at[row.bus], marker="s" if GFM else "o", ms=10 if GFM else 8, mfc=face, mec="black", zorder=4)
-        if not labelled:
-            continue
-        text = f"{row.name}{' (spare)' if row.spare else ''}"
-        axes.annotate(text, at[row.bus], (6, 6), textcoords="offset points", weight="bold", zorder=5, path_effects=HALO)
     if feeder.source is not None:
         axes.plot(*at[feeder.source.bus], marker="D", ms=10, color="black", zorder=4)
-        axes.annotate("substation", at[feeder.source.bus], (0, -16), textcoords="offset points", ha="center")
-    _legend(feeder, zones, colours if V is None else {}, axes, picture)
+    handles = _zone_handles(feeder, zones, colours) if V is None else []
+    handles += _mark_handles(feeder, coloured=V is None, loads=few)
+    picture.legend(handles=handles, loc="outside lower center", frameon=False, ncols=2)
+    if not on_coordinates:
+        picture.suptitle("The feeder has no coordinates: drawn as a tree, from the substation on the left", size=9)
     axes.set_axis_off()
+    _draw_labels(feeder, at, axes)
     return picture
-
-
-def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
-    """Return where each bus is drawn: its coordinates, else beside a neighbour; a tree if the feeder has none."""
-    if not _has_coordinates(feeder):
-        return _tree(feeder)
-    known = {bus.name: (bus.x, bus.y) for bus in feeder.buses if (bus.x, bus.y) != (0.0, 0.0)}
-    neighbours = _neighbours(feeder)
-    waiting = list(known)
-    for bus in waiting:  # it grows while buses without coordinates take those of a neighbour
-        for other in neighbours[bus]:
-            if other not in known:
-                known[other] = known[bus]
-                waiting.append(other)
-    return {bus.name: known.get(bus.name, (bus.x, bus.y)) for bus in feeder.buses}
-
-
-def _has_coordinates(feeder: Feeder) -> bool:
-    return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
-
-
-def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
-    found: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
-    ends = [(a, b) for a, b, _ in feeder.branches()]
-    for a, b in (*ends, *((switch.from_bus, switch.to_bus) for switch in feeder.switches)):
-        found[a].append(b)
-        found[b].append(a)
-    return found
-
-
-def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
-    """Place each bus by its distance from the substation, and among its like by its first leaf."""
-    neighbours = _neighbours(feeder)
-    root = feeder.source.bus if feeder.source else feeder.buses[0].name
-    children: dict[str, list[str]] = {bus: [] for bus in neighbours}
-    depth, order = {root: 0}, [root]
-    rest = iter(list(neighbours))
-    while len(order) < len(neighbours):
-        for bus in order:
-            for other in neighbours[bus]:
-                if other not in depth:
-                    depth[other] = depth[bus] + 1
-                    children[bus].append(other)
-                    order.append(other)
-        if len(order) < len(neighbours):  # a section that nothing connects
-            other = next(bus for bus in rest if bus not in depth)
-            depth[other] = 0
-            order.append(other)
-    height: dict[str, float] = {}
-    leaves = 0
-    for bus in reversed(order):
-        below = [height[child] for child in children[bus]]
-        if not below:
-            leaves += 1
-        height[bus] = float(np.mean(below)) if below else float(leaves)
-    return {bus: (float(depth[bus]), height[bus]) for bus in order}
 
 
 def _zones(feeder: Feeder) -> dict[str, str]:
@@ -169,38 +119,95 @@ def _draw_branches(feeder: Feeder, at: Places, axes: Axes) -> LineCollection:
     return lines
 
 
-def _draw_switch(switch: Switch, at: Places, axes: Axes, *, named: bool) -> None:
-    """Draw a switch: black when closed, white when open; its name if its sides stand apart or it has another one."""
+def _middle(switch: Switch, at: Places) -> tuple[float, float]:
     a, b = at[switch.from_bus], at[switch.to_bus]
-    middle = (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
+    return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0
+
+
+def _draw_switch(switch: Switch, at: Places, axes: Axes) -> None:
+    """Draw a switch: black when closed, white when open."""
+    a, b = at[switch.from_bus], at[switch.to_bus]
     axes.plot((a[0], b[0]), (a[1], b[1]), color="black", lw=1.0, ls="-" if switch.closed else ":", zorder=1)
-    axes.plot(*middle, marker="s", ms=5, mfc="black" if switch.closed else "white", mec="black", zorder=3)
-    if named:
-        text = switch.alias or switch.name
-        axes.annotate(text, middle, (5, -9), textcoords="offset points", size=7.5, zorder=5, path_effects=HALO)
+    face = "black" if switch.closed else "white"
+    axes.plot(*_middle(switch, at), marker="s", ms=5, mfc=face, mec="black", zorder=3)
 
 
-def _legend(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str], axes: Axes, picture: Figure) -> None:
-    """Say what the marks are, and how much load each zone has."""
+def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:
+    """Write the names of substation, inverters and switches beside their marks, where they cover least."""
+    marked: list[tuple[str, float, tuple[float, float], float, bool]] = []  # text, size, place, gap, bold
+    if feeder.source is not None:
+        marked.append(("substation", 10.0, at[feeder.source.bus], 9.0, False))
+    inverters = (*feeder.inverters, *feeder.spares)
+    if len(feeder.inverters) <= MOST_LABELS:
+        marked += [(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, True) for row in inverters]
+    if len(feeder.buses) <= MANY:
+        marked += [(one.alias or one.name, 7.5, _middle(one, at), 6.0, False) for one in feeder.switches]
+    axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # lays the figure out; subfigures are not used
+    ends = [(a, b) for a, b, _ in feeder.branches()] + [(one.from_bus, one.to_bus) for one in feeder.switches]
+    lines = _on_paper(axes, [at[bus] for pair in ends for bus in pair]).reshape(-1, 4)
+    marks = _on_paper(axes, [at[row.bus] for row in inverters] + [place for _, _, place, _, _ in marked])
+    places_on_paper = marks[len(inverters) :]
+    widths = [5.0] * len(inverters) + [0.6 * gap for _, _, _, gap, _ in marked]
+    labels = [
+        Label(text, size, (float(x), float(y)), gap)
+        for (text, size, _, gap, _), (x, y) in zip(marked, places_on_paper, strict=True)
+    ]
+    sides = label_sides(labels, lines, np.column_stack([marks, widths]))
+    for (text, size, place, gap, bold), (right, up) in zip(marked, sides, strict=True):
+        distance = gap if 0 in (right, up) else 0.7 * gap
+        axes.annotate(
+            text,
+            place,
+            (distance * right, distance * up),
+            textcoords="offset points",
+            ha=("center", "left", "right")[right],
+            va=("center", "bottom", "top")[up],
+            size=size,
+            weight="bold" if bold else "normal",
+            zorder=5,
+            path_effects=HALO,
+        )
+
+
+def _on_paper(axes: Axes, places: list[tuple[float, float]]) -> NDArray[np.float64]:
+    """Return places of the drawing on paper (pt)."""
+    scale = 72.0 / axes.figure.dpi
+    return np.asarray(axes.transData.transform(np.array(places, float).reshape(-1, 2)) * scale)
+
+
+def _zone_handles(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str, str]) -> list[Line2D]:
+    """Return the lines of the legend that say what the colours are: microgrids and other zones, and what they have."""
     load = dict.fromkeys(zones.values(), 0.0)
     for bus, P in feeder.load_by_bus().items():
         load[zones[bus]] += P / 1e3
+    handles = []
     for zone, colour in colours.items():
         rated = sum(row.P_rated for row in feeder.inverters if row.microgrid == zone) / 1e3
-        text = f"{zone or 'no zone'}: {load.get(zone, 0.0):.0f} kW of load" + (
-            f", {rated:.0f} kW of inverters" if rated else ""
-        )
-        if zone in load:
-            axes.plot([], [], color=colour, lw=3, label=text)
+        content = [f"{load[zone]:.0f} kW of load"] if zone in load else []
+        content += [f"{rated:.0f} kW of inverters"] if rated else []
+        if content:
+            text = f"{zone or 'no microgrid'}: {', '.join(content)}"
+            handles.append(Line2D([], [], color=colour, lw=3, label=text))
+    if len(handles) > MOST_ZONES:
+        rest = counted(len(handles) - MOST_ZONES, "more zone")
+        handles = [*handles[:MOST_ZONES], Line2D([], [], ls="", label=f"and {rest}; the colours repeat")]
+    return handles
+
+
+def _mark_handles(feeder: Feeder, *, coloured: bool, loads: bool) -> list[Line2D]:
+    """Return the lines of the legend that say what the marks are, of those that the diagram has."""
     kinds, states = {row.kind for row in feeder.inverters}, {switch.closed for switch in feeder.switches}
+    of = ", in its microgrid's colour" if coloured else ""
     marks = (
-        ("s", 8, BESIDE, "GFM inverter", "GFM" in kinds),
-        ("o", 8, BESIDE, "GFL inverter", "GFL" in kinds),
-        ("o", 8, "white", "spare", bool(feeder.spares)),
-        ("s", 5, "black", "switch, closed", True in states),
-        ("s", 5, "white", "switch, open", False in states),
+        ("s", 8, BESIDE, "", f"GFM inverter{of}", "GFM" in kinds),
+        ("o", 8, BESIDE, "", f"GFL inverter{of}", "GFL" in kinds),
+        ("o", 8, "white", "", "spare inverter", bool(feeder.spares)),
+        ("s", 5, "black", "-", "closed switch: black", True in states),
+        ("s", 5, "white", ":", "open switch: white", False in states),
+        ("o", 2, "black", "", "bus with load", loads and bool(feeder.load_by_bus())),
     )
-    for marker, size, face, text, shown in marks:
-        if shown:
-            axes.plot([], [], marker=marker, ms=size, mfc=face, mec="black", ls="", label=text)
-    picture.legend(loc="outside lower center", frameon=False, ncols=2)
+    return [
+        Line2D([], [], marker=marker, ms=size, mfc=face, mec="black", color="black", ls=line, lw=1.0, label=text)
+        for marker, size, face, line, text, shown in marks
+        if shown
+    ]

@@ -26,7 +26,7 @@ from tests.command_line import invoke
         (["run", "x", "--strict=yes"], "--strict: takes no value"),
         (["run", "x", "y"], 'too much was typed: "y"; '),
         (["link", "cut", "inv1", "inv4", "--for", "long"], '--for: must be a number, got "long"'),
-        (["event", "open"], "SWITCH is missing; "),
+        (["event", "open"], "SWITCH is missing; gridpeers event -h shows what it is"),
     ],
 )
 def test_a_mistyped_word_is_one_line(words: list[str], line: str) -> None:

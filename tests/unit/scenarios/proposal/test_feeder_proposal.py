@@ -8,7 +8,8 @@ from plant.equipment import Bus, Feeder, Source, Switch
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from scenarios.proposal.feeder_proposal import propose
 from scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
-from scenarios.results.plots.feeder_diagram import feeder_diagram, places
+from scenarios.results.plots.feeder_diagram import feeder_diagram
+from scenarios.results.plots.feeder_places import places
 
 
 def series(name: str, start: str, end: str, phases: str) -> LinearElement:
