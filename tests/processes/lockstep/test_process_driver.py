@@ -73,14 +73,14 @@ def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tm
 
 def test_agents_of_a_killed_process_die_together(tmp_path: Path) -> None:
     """Kill -9 of a process that two agents share: the plant goes on with the others, and names both."""
-    run = ProcessRun(*toy_configs(4, end=3.0), tmp_path)
+    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)  # long: the plant goes on while telemetry comes here
     run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
     outcome = run(shared=2)
     deaths = [event for event in outcome.events if event.kind == "roster"]
 
     assert outcome.broke == ""
     assert sorted(event.subject for event in deaths) == ["inv3", "inv4"]
-    assert run.rows[-1][0] == 3.0
+    assert run.rows[-1][0] == 20.0
     assert len(outcome.notes) == 1
 
 
