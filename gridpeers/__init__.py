@@ -24,7 +24,7 @@ check_origin()
 if TYPE_CHECKING:
     from agents.carriers.law_registry import LAWS
     from agents.graphs import GRAPHS
-    from agents.laws.law import Law, Neighbour, Own, SetPoints
+    from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
     from gridpeers.feeder import Feeder
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
@@ -64,6 +64,8 @@ _HOME = {
     "Scenario": "gridpeers.scenario",
     "ScenarioError": "scenarios.schema.scenario_errors",
     "SetPoints": "agents.laws.law",
+    "Term": "agents.laws.law",
+    "Terms": "agents.laws.law",
     "Unit": "wire.schema.plausible",
     "WindowData": "scenarios.results.evaluation.window_metrics",
     "catalogue": "scenarios.schema.loading",
@@ -98,6 +100,8 @@ __all__ = [
     "Scenario",
     "ScenarioError",
     "SetPoints",
+    "Term",
+    "Terms",
     "Unit",
     "WindowData",
     "catalogue",

@@ -14,8 +14,8 @@ CARRIERS = ("use", "command", "fmu")
 KEYS = (*CARRIERS, "folder", "time_limit_s")
 """Keys of the table `law` that are no parameters of the law."""
 
-METHODS = ("start", "close")
-"""What an agent calls of a law, beside `step`."""
+METHODS = ("start", "close", "terms")
+"""What is called of a law, beside `step`."""
 
 
 def _objection(it: Any) -> str:

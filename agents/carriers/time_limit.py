@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 from agents.laws.call import LawError
-from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints
+from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
 from wire.plugins.anybody import ANYTHING, named
 
 FIRST = 10.0
@@ -112,6 +112,11 @@ class TimeLimited(Law):
         """Decide as the law does."""
         with limited(f"step at t = {own.t:.6g} s", self._time_limit, self._limit):
             return self._law.step(own, neighbours, T)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
+        """Return the terms that the law names."""
+        with limited(f"terms at t = {own.t:.6g} s", self._time_limit, self._limit):
+            return self._law.terms(own, neighbours, T)
 
     def close(self) -> None:
         """End the law; the run is over, so that one that fails in it is but named in the log."""

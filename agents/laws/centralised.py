@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from wire.schema.plausible import Range, Unit
 
 
@@ -40,21 +40,57 @@ class Centralised(Law):
         super().__init__(**parameters)
         self._omega = self._E = 0.0
         """Integrals of the centre (pu)."""
+        self._errors = 0.0, 0.0
+        """Errors of frequency and voltage at its last step (pu)."""
 
     def start(self, own: Own) -> None:
         """Set the integrals to the own set-points, for a bumpless start."""
         self._omega, self._E = own.m_p * own.P_set, own.V_set - 1.0
+        self._errors = 0.0, 0.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Compute the corrections, or take over those of the centre."""
         if own.name == self.centre:
-            voltages = [own.V, *(other.shared["V"] for other in neighbours if "V" in other.shared)]
-            error = 1.0 - sum(voltages) / len(voltages)
+            error = self._mean_error(own, neighbours)
             self._omega -= self.k_i * T * own.e
             self._E += self.k_iE * T * error
+            self._errors = own.e, error
             omega, E = self._omega - self.k_p * own.e, self._E + self.k_pE * error
             return SetPoints(omega / own.m_p, 1.0 + E, {"omega": omega, "E": E})
         for other in neighbours:
             if other.name == self.centre and "omega" in other.shared:
                 return SetPoints(other.shared["omega"] / own.m_p, 1.0 + other.shared["E"], {"V": own.V})
         return SetPoints(own.P_set, own.V_set, {"V": own.V})
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the terms of both controllers at the centre, or the step to its corrections."""
+        if own.name == self.centre:
+            error, (e_before, error_before) = self._mean_error(own, neighbours), self._errors
+            # Both are 0 but after a limit: the integrals go on beyond it, while the set-points stay.
+            P_beyond = (self._omega - self.k_p * e_before) / own.m_p - own.P_set
+            V_beyond = 1.0 + self._E + self.k_pE * error_before - own.V_set
+            return Terms(
+                (
+                    Term("integral of frequency error", -self.k_i * T * own.e / own.m_p),
+                    Term("change of frequency error", -self.k_p * (own.e - e_before) / own.m_p),
+                    Term("integral beyond the limit", P_beyond),
+                ),
+                (
+                    Term("integral of voltage error", self.k_iE * T * error),
+                    Term("change of voltage error", self.k_pE * (error - error_before)),
+                    Term("integral beyond the limit", V_beyond),
+                ),
+            )
+        for other in neighbours:
+            if other.name == self.centre and "omega" in other.shared:
+                P, V = other.shared["omega"] / own.m_p, 1.0 + other.shared["E"]
+                return Terms(
+                    (Term("correction of the centre", P - own.P_set, other.name),),
+                    (Term("correction of the centre", V - own.V_set, other.name),),
+                )
+        return Terms()
+
+    def _mean_error(self, own: Own, neighbours: Sequence[Neighbour]) -> float:
+        """Return the error of the mean of the voltages that the centre knows (pu)."""
+        voltages = [own.V, *(other.shared["V"] for other in neighbours if "V" in other.shared)]
+        return 1.0 - sum(voltages) / len(voltages)

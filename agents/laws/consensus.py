@@ -66,7 +66,7 @@ from math import exp, inf
 from typing import Annotated, Any
 
 from agents.agent_config import Gains
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from wire.schema.plausible import Range, Unit
 
 
@@ -285,6 +285,31 @@ class Consensus(Law):
         if (V_set - own.V_set) * own.V_saturated > 0.0:
             V_set = own.V_set
         return SetPoints(P_set, V_set)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the terms of (12) to (15): each neighbour's, the own errors', and what anti-windup takes back."""
+        gains, m_p = self._gains, own.m_p
+        _, _, d = self._means(neighbours)
+        weights = sum(other.weight for other in neighbours)
+        kappa, y = m_p / gains.k_p, m_p * own.P_set
+        share = towards(self.kappa_c or kappa, d, T) / (m_p * weights) if weights else 0.0
+        P = [Term("power sharing", share * n.weight * (n.m_p * n.P_set - y), n.name) for n in neighbours]
+        if own.leader:
+            error = Term("frequency error", -(1.0 - exp(-kappa * T)) * own.e / m_p)
+            P.append(error)
+            if own.e * own.P_saturated < 0.0:
+                P.append(Term("anti-windup", -error.value))
+        alpha, beta = (alpha_in_force(gains, own.V), gains.beta_GFM) if own.leader else (0.0, gains.beta_GFL)
+        a, b = V_factors(alpha, beta, d, k_q=gains.k_q, T=T)
+        share = a / weights if weights else 0.0
+        V = [Term("var sharing", -share * n.weight * (own.z - n.m_q * n.Q), n.name) for n in neighbours]
+        if own.leader:
+            V.append(Term("voltage error", -b * (own.V - 1.0)))
+        change = sum(term.value for term in V)
+        limited = min(max(own.V_set + change, gains.V_set_min), gains.V_set_max)
+        if (limited - own.V_set) * own.V_saturated > 0.0:
+            V.append(Term("anti-windup", -change))
+        return Terms(tuple(P), tuple(V))
 
     def _means(self, neighbours: Sequence[Neighbour]) -> tuple[float, float, float]:
         """Return the neighbours' mean m_p P_set and m_q q (pu), and the sum d of their weights c_ij."""

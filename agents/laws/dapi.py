@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from wire.schema.plausible import Range, Unit
 
 
@@ -48,6 +48,21 @@ class Dapi(Law):
         e = own.V_set - 1.0
         e -= T * self.beta / self.kappa * (own.V - 1.0) + _step(T * self.b / self.kappa, weight) * unequal
         return SetPoints(omega / own.m_p, 1.0 + e)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the terms of both sums."""
+        omega, weight = own.m_p * own.P_set, sum(other.weight for other in neighbours)
+        P, V = _step(T * self.a / self.k, weight) / own.m_p, _step(T * self.b / self.kappa, weight)
+        return Terms(
+            (
+                *(Term("averaging", -P * n.weight * (omega - n.m_p * n.P_set), n.name) for n in neighbours),
+                Term("frequency error", -T / self.k * own.e / own.m_p),
+            ),
+            (
+                *(Term("var sharing", -V * n.weight * (own.z - n.m_q * n.Q), n.name) for n in neighbours),
+                Term("voltage error", -T * self.beta / self.kappa * (own.V - 1.0)),
+            ),
+        )
 
 
 def _step(gain: float, weight: float) -> float:

@@ -22,7 +22,7 @@ from math import exp
 from typing import Annotated, Any
 
 from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own, SetPoints
+from agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
 from wire.schema.plausible import Range, Unit
 
 
@@ -60,3 +60,12 @@ class EventTriggered(Consensus):
         if send:
             self._last_broadcast = P_set, own.z
         return SetPoints(P_set, seen.V_set, send=send)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the paper's terms, from the last broadcast values, the own ones included."""
+        P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
+        P, V = super().terms(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
+        seen = P_hat + sum(term.value for term in P)
+        if not self.P_set_min <= seen <= self.P_set_max:
+            P = (*P, Term("limit of the last broadcast", min(max(seen, self.P_set_min), self.P_set_max) - seen))
+        return Terms(P, V)

@@ -26,7 +26,7 @@ from collections.abc import Sequence
 from math import copysign
 from typing import Annotated
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
 from wire.schema.plausible import Range, Unit
 
 
@@ -53,6 +53,22 @@ class FiniteTime(Law):
             change += self._move(-own.e, T * self.c_P, 1.0)
             V_change += self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)
         return SetPoints((y + change) / own.m_p, own.V_set + V_change)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the terms of both sums."""
+        y, most = own.m_p * own.P_set, 0.5 / max(1, len(neighbours))
+        P = [
+            Term("consensus", n.weight * self._move(n.m_p * n.P_set - y, T * self.c_P, most) / own.m_p, n.name)
+            for n in neighbours
+        ]
+        V = [
+            Term("var sharing", n.weight * self._move(n.m_q * n.Q - own.z, T * self.c_V, most), n.name)
+            for n in neighbours
+        ]
+        if own.leader:
+            P.append(Term("frequency error", self._move(-own.e, T * self.c_P, 1.0) / own.m_p))
+            V.append(Term("voltage error", self._move(1.0 - own.V, T * self.c_V * self.alpha, 0.5)))
+        return Terms(tuple(P), tuple(V))
 
     def _move(self, difference: float, gain: float, most: float) -> float:
         """Return gain sig(difference)^gamma, at most a part of the difference."""

@@ -101,6 +101,26 @@ class SetPoints(NamedTuple):
     """Whether the neighbours get the state. If not, they keep the last one that they heard."""
 
 
+class Term(NamedTuple):
+    """One term of a law's step."""
+
+    name: str
+    """A word or two, such as "frequency error"."""
+    value: float
+    """Its part of the step (pu)."""
+    neighbour: str = ""
+    """Name of the neighbour whose state it comes from; empty if it comes from the own inverter."""
+
+
+class Terms(NamedTuple):
+    """The terms of one step of a law, before its limits: each tuple adds up to the change of a set-point."""
+
+    P_set: tuple[Term, ...] = ()
+    """Terms of the change of P_set (pu of own rating)."""
+    V_set: tuple[Term, ...] = ()
+    """Terms of the change of V_set (pu of own nominal)."""
+
+
 class Law:
     """Base of all laws. Parameters are annotated attributes (`wire.schema.table_schema`).
 
@@ -161,6 +181,14 @@ class Law:
             Control period (s).
         """
         raise NotImplementedError
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
+        """Return the terms of the step that `step` would make now, without making it; None if the law names none.
+
+        `gridpeers why` shows them. They add up to the change before P_set_min, P_set_max, V_set_min and V_set_max act;
+        these are told by themselves. No run calls this.
+        """
+        return None
 
     def close(self) -> None:
         """Release whatever the law has opened."""

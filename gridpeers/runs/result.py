@@ -31,6 +31,9 @@ from wire.schema.suggestion import suggestion
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from scenarios.explanation.explanation import Explanation
+    from scenarios.record.record_reader import RunRecord
+
 
 class _FromFolder:
     """The part of a result that one case and all cases of a run share."""
@@ -226,6 +229,31 @@ class Result(_FromFolder):
     def links(self) -> pd.DataFrame:
         """Fate of every message on emulated links: src, dst, seq, t (s), delay (s; nan: dropped), fate."""
         return self._folder.read(f"{self.case}/links.csv", frames.links_frame)
+
+    @cached_property
+    def run_record(self) -> RunRecord:
+        """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md).
+
+        Raises
+        ------
+        RecordFileError
+            If the run was not recorded, or the file cannot be read.
+        """
+        from scenarios.record.record_reader import RunRecord
+
+        return RunRecord.open(self.folder / self.case)
+
+    def decision(self, agent: str, t: float) -> Explanation:
+        """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.
+
+        Raises
+        ------
+        RecordFileError
+            If the run was not recorded, there was no such agent, or it had not decided by then.
+        """
+        from scenarios.explanation.explanation import explain
+
+        return explain(self.run_record, agent, t)
 
     @cached_property
     def sha256(self) -> str:

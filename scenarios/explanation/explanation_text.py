@@ -1,0 +1,206 @@
+"""An explanation as text: with colours on a terminal, plain in a file or a pipe."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from io import StringIO
+
+from rich.console import Console, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from scenarios.explanation.explanation import Explanation, NeighbourAccount
+from scenarios.explanation.law_step import QuantityStep
+from scenarios.explanation.trail import Quantity, TrailStep
+
+_WIDE = 10_000
+"""Characters of a line that no table reaches: text in a file is not wrapped."""
+
+SHOWN = 12
+"""Most terms that stand in a row of their own: the others are summed."""
+
+_DONE = {
+    "law": "its law decided",
+    "hold": "secondary control was on hold: the set-points follow the plant's",
+    "off": "its inverter was out of service: nothing to control",
+    "idle": "it was idle: paused, without a measurement, or its law has failed",
+}
+
+_SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
+
+
+def text_of(explanation: Explanation, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()) -> str:
+    """Return the plain text of an explanation, and of trails from it."""
+    text = StringIO()
+    print_explanation(explanation, Console(file=text, width=_WIDE, color_system=None), trails)
+    return "\n".join(line.rstrip() for line in text.getvalue().split("\n")).rstrip("\n")
+
+
+def show(
+    explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()
+) -> None:
+    """Print an explanation, with colours on a terminal."""
+    if console.is_terminal:
+        print_explanation(explanation, console, trails)
+    else:
+        console.print(text_of(explanation, trails), markup=False, highlight=False, soft_wrap=True)
+
+
+def print_explanation(
+    explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]]
+) -> None:
+    """Print the blocks of an explanation, with a blank line between them."""
+    blocks = [
+        _head(explanation),
+        _neighbours(explanation),
+        *_steps(explanation),
+        _events(explanation),
+        *(_trail(quantity, steps) for quantity, steps in trails),
+    ]
+    number = 0
+    for block in blocks:
+        lines = list(block)
+        if lines and number:
+            console.print()
+        number += bool(lines)
+        for line in lines:
+            console.print(line, markup=False, highlight=False, soft_wrap=not isinstance(line, Table))
+
+
+def _head(it: Explanation) -> Iterator[RenderableType]:
+    decision, m = it.decision, it.decision.measurement
+    config = decision.config
+    case = f", case {it.case}" if it.case else ""
+    yield Text.assemble(
+        (f"{it.agent} at t = {decision.t:.2f} s", "bold"), f" ({it.scenario}{case}): {_DONE[decision.action]}"
+    )
+    if it.asked - decision.t > 1.5 * config.T_c:
+        yield Text(f"it is the last decision before {it.asked:g} s", style="yellow")
+    where = "grid-connected" if m.grid_connected else f"island {m.island or 'unknown'}"
+    late = f", {decision.measurement_age} ticks old" if decision.measurement_age else ""
+    e = (m.f - config.f_nom) / config.f_nom
+    yield _table(
+        ("measured" + late, "", "pu"),
+        (
+            ("f", f"{m.f:.4f} Hz", f"{e:+.6f} from nominal"),
+            ("P", f"{m.P / 1e3:.2f} kW", f"{m.P / config.P_rated:.5f}"),
+            ("Q", f"{m.Q / 1e3:.2f} kvar", f"{m.Q / config.P_rated:.5f}"),
+            ("V", f"{m.V:.2f} V", f"{m.V / config.V_nom:.5f}"),
+            ("", where, ""),
+        ),
+    )
+
+
+def _neighbours(it: Explanation) -> Iterator[RenderableType]:
+    heard = sum(account.used for account in it.neighbours)
+    if not it.neighbours:
+        yield Text("no neighbours: the graph has no link to it")
+        return
+    which = "neighbours in the sums" if it.step is not None else "neighbours heard, but no law used them"
+    yield Text(f"{heard} of {len(it.neighbours)} {which}", style="bold")
+    yield _table(
+        ("neighbour", "age s", "weight", "P_set pu", "V_set pu", "Q pu", ""),
+        tuple(_neighbour(account) for account in it.neighbours),
+        left=(0, 6),
+        styles=tuple("" if account.used and not account.why else "yellow" for account in it.neighbours),
+    )
+
+
+def _neighbour(account: NeighbourAccount) -> tuple[str, ...]:
+    given = account.input
+    age = "-" if given is None or given.age is None else f"{given.age:.3f}"
+    weight = "-" if given is None else f"{given.weight:.3g}"
+    if given is None or given.state is None:
+        return account.name, age, weight, "-", "-", "-", account.why
+    state, plate = given.state, given.nameplate
+    values = (state.P_set / plate.P_rated, state.V_set / plate.V_nom, state.Q / plate.P_rated)
+    return account.name, age, weight, *(f"{value:.5f}" for value in values), account.why
+
+
+def _steps(it: Explanation) -> Iterator[list[RenderableType]]:
+    decision = it.decision
+    config = decision.config
+    if it.step is None:
+        lines: list[RenderableType] = []
+        for i, (name, base, scale, unit) in enumerate(
+            (("P_set", config.P_rated, 1e3, "kW"), ("V_set", config.V_nom, 1.0, "V"))
+        ):
+            before, after = decision.before[i], decision.after[i]
+            ends = f"{before / scale:.2f} -> {after / scale:.2f} {unit}, {before / base:.6f} -> {after / base:.6f} pu"
+            lines.append(Text.assemble((name, "bold"), f"  {ends}: no step of a law"))
+        yield lines
+        return
+    law = config.control.law.name
+    yield _step(f"P_set of law {law}", it.step.P_set, config.P_rated / 1e3, "kW", decision.saturated[0])
+    yield _step(f"V_set of law {law}", it.step.V_set, config.V_nom, "V", decision.saturated[1])
+    if it.step.problem:
+        yield [Text.assemble(("NOTE", "yellow"), f"  one term: {it.step.problem}")]
+
+
+def _step(title: str, step: QuantityStep, base: float, unit: str, side: int) -> list[RenderableType]:
+    """Return the lines of the step of one set-point."""
+    ends = f"{step.before * base:.2f} -> {step.after * base:.2f} {unit}, {step.before:.6f} -> {step.after:.6f} pu"
+    terms = sorted(step.terms, key=lambda term: -abs(term.value))
+    rows = [(term.name, term.neighbour, _signed(term.value), _share(term.value, step)) for term in terms[:SHOWN]]
+    if more := terms[SHOWN:]:
+        rest = sum(term.value for term in more)
+        rows.append((f"{len(more)} further terms", "", _signed(rest), _share(rest, step)))
+    limits = f"limits {step.low:g} to {step.high:g}"
+    rows.append((limits, "", _signed(step.limits), _share(step.limits, step)))
+    rows.append(("step", "", _signed(step.step), _share(step.step, step)))
+    note: list[RenderableType] = []
+    if side:
+        note = [Text(f"its inverter is saturated: it {_SIDES[side]}", style="yellow")]
+    if step.after in (step.low, step.high) or step.limits:
+        note.append(Text(f"at its {'upper' if step.after >= step.high else 'lower'} limit", style="yellow"))
+    return [
+        Text.assemble((title, "bold"), f"  {ends}"),
+        _table(("term", "from", "pu", "of the step"), tuple(rows), left=(0, 1)),
+        *note,
+    ]
+
+
+def _signed(value: float) -> str:
+    return f"{value:+.3e}" if value else "0"
+
+
+def _share(value: float, step: QuantityStep) -> str:
+    return f"{round(100.0 * value / step.step, 1) + 0.0:.1f} %" if abs(step.step) > 1e-12 else "-"
+
+
+def _events(it: Explanation) -> Iterator[RenderableType]:
+    if it.events:
+        yield Text("events of the second before", style="bold")
+        yield from (Text(f"{event.t:8.2f} s  {event.text}") for event in it.events)
+    yield from (Text.assemble(("NOTE", "yellow"), f"  {text}") for text in it.damage)
+
+
+def _trail(quantity: Quantity, steps: Sequence[TrailStep]) -> Iterator[RenderableType]:
+    yield Text(f"{quantity} followed back, by the largest term of each step", style="bold")
+    rows = []
+    for each in steps:
+        of = None if each.step is None else getattr(each.step, quantity)
+        largest = "-" if each.largest is None else f"{each.largest.name} {_signed(each.largest.value)}"
+        source = each.largest.neighbour if each.largest is not None else ""
+        rows.append(
+            (
+                f"{each.decision.t:.2f}",
+                each.decision.agent,
+                "-" if of is None else f"{of.after:.6f}",
+                "-" if of is None else _signed(of.step),
+                largest,
+                each.end if each.end else f"from {source}",
+            )
+        )
+    yield _table(("t s", "agent", f"{quantity} pu", "step pu", "largest term pu", ""), tuple(rows), left=(1, 4, 5))
+
+
+def _table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], left: Sequence[int] = (0,), styles: Sequence[str] = ()
+) -> Table:
+    table = Table(box=None, padding=(0, 2, 0, 0), header_style="dim")
+    for i, name in enumerate(header):
+        table.add_column(Text(name), justify="left" if i in left else "right")
+    for i, row in enumerate(rows):
+        table.add_row(*map(Text, row), style=styles[i] if styles else "")
+    return table

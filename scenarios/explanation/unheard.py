@@ -1,0 +1,124 @@
+"""What became of the states that an agent did not hear, by the links' verdicts, its journal and their sender."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from math import inf, isfinite
+
+from netem.ledger import Outcome
+from scenarios.record.message_index import MessageOnWire
+from scenarios.record.record_reader import RunRecord
+from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from wire.journal import Heard, Received
+from wire.messages import OFF, PlantEvent, State
+
+WORDS = {
+    "cut": "cut off by a cut link",
+    "partition": "cut off by a partition",
+    "flap": "cut off by a flapping link",
+    "loss": "lost on the link",
+    "queue": "lost in a full queue of the link",
+    "fault": "lost by a fault of the user's",
+    "checksum": "damaged on the link, and dropped",
+    "damaged": "damaged on the link, and rejected: its CRC-32 differs",
+    "late": "still on the way",
+    "kept": "kept by a cut link",
+    "quiet": "not sent to neighbours: its law saw no need",
+    "idle": "idle: its agent is paused, or without a measurement",
+}
+"""Fates of a state that was not heard: netem's reasons, and our own."""
+
+Fates = Mapping[tuple[str, int], list[tuple[float, Outcome]]]
+"""Verdicts by sender and number: when the message was sent (s of run time), and its outcome."""
+
+
+def verdicts(record: RunRecord, agent: str, since: float, until: float) -> Fates:
+    """Return the verdicts of the links into an agent on messages of some run time (s)."""
+    found: dict[tuple[str, int], list[tuple[float, Outcome]]] = {}
+    for trace in record.links():
+        if trace.dst == agent:
+            for seq, t, outcome in zip(trace.seq, trace.t, trace.outcome, strict=True):
+                if since - 1e-9 <= t <= until + 1e-9:
+                    found.setdefault((trace.src, seq), []).append((t, outcome))
+    return found
+
+
+def rejections(record: RunRecord, agent: str, since: float, until: float) -> Mapping[str, list[tuple[int, str]]]:
+    """Return the number and the kind of each message of a neighbour that an agent rejected, by the neighbour."""
+    found: dict[str, list[tuple[int, str]]] = {}
+    for entry in record.entries(agent, since=since, until=until):
+        if isinstance(entry, Heard | Received) and entry.rejected and entry.key.startswith("state/"):
+            number = entry.seq if isinstance(entry, Heard) else -1
+            found.setdefault(entry.key.rpartition("/")[2], []).append((number, entry.rejected))
+    return found
+
+
+def missed(
+    record: RunRecord,
+    decision: RecordedDecision,
+    each: NeighbourInput,
+    fates: Fates,
+    rejected: Mapping[str, list[tuple[int, str]]],
+) -> str:
+    """Return in words what became of a neighbour's states after the last one that was heard.
+
+    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since".
+    """
+    since = 0.0 if each.state is None else each.state.t
+    last = -1 if each.number is None else each.number
+    T = decision.config.T_c
+    counts: Counter[str] = Counter()
+    for message in record.messages(each.name, since=since, until=decision.t - 0.5 * T, kind="State"):
+        if message.number > last or (each.state is not None and message.epoch != each.state.epoch):
+            counts[_fate(message, decision.t, fates)] += 1
+    refused = Counter(kind for number, kind in rejected.get(each.name, ()) if number < 0 or number > last)
+    for kind, count in refused.items():
+        counts[f'rejected as "{kind}"'] += count
+        counts[""] -= min(count, counts[""])
+    total = sum(counts.values())
+    if not total:
+        return "no state since"
+    known = ", ".join(f"{count} {WORDS.get(why, why)}" for why, count in counts.most_common() if why and count)
+    return f"{total} state{'s' if total > 1 else ''} since" + (f": {known}" if known else "")
+
+
+def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:
+    """Return why a state had not been heard by now (s of run time): a key of `WORDS`, or empty if nothing tells."""
+    if isinstance(message.message, State) and (message.message.quiet or message.message.idle):
+        return "quiet" if message.message.quiet else "idle"
+    judged = [outcome for t, outcome in fates.get((message.sender, message.number), ()) if abs(t - message.t) < 1.0]
+    if not judged:
+        return ""
+    outcome = judged[-1]
+    if isinstance(outcome, str):
+        return outcome
+    copies = ((outcome, None),) if isinstance(outcome, int | float) else outcome
+    sound = [delay for delay, bit in copies if bit is None]
+    if not sound:
+        return "damaged"
+    return "late" if isfinite(min(sound, default=inf)) else "kept"
+
+
+def reason(decision: RecordedDecision, each: NeighbourInput) -> str:
+    """Return in words why a neighbour was left out of the sums; empty if it was not."""
+    options = decision.config.control.degraded_communication
+    if each.unused == "silent":
+        return "no state of it was heard"
+    if each.unused == "stale":
+        most = options.max_age or decision.config.max_age
+        return f"stale: older than max_age = {most:g} s"
+    if each.unused == "island":
+        here = decision.measurement.island
+        if each.state is not None and each.state.island == OFF:
+            return "its inverter is out of service"
+        if options.islands == "frequency" or each.state is None:
+            return "in another island: its angle drifts"
+        return f"in another island: {each.state.island}, not {here}"
+    return "" if each.weight > 0.0 else "its state is not new: weight 0"
+
+
+def absence(name: str, events: tuple[PlantEvent, ...], t: float) -> str:
+    """Return in words why an agent that the graph makes a neighbour was not met, from the last event about it."""
+    about = [event for event in events if event.subject == name and event.t <= t + 1e-9 and event.kind == "roster"]
+    return f"not met: {about[-1].text}" if about else "not met: it was not there"

@@ -1,0 +1,267 @@
+"""`gridpeers why` explains what happened to a decision, in numbers that add up to the step taken."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from pathlib import Path
+
+import pytest
+
+from scenarios.explanation.explanation import Explanation, NeighbourAccount, explain
+from scenarios.explanation.law_step import LawStep
+from scenarios.explanation.trail import trail
+from scenarios.record.record_reader import RunRecord
+from tests.command_line import invoke
+from tests.record.recorded_runs import recorded_run
+
+ISLANDED = """
+seed = 7
+[time]
+end_s = {end}
+[[event]]
+label = "event1"
+t_s = 0.2
+open = ["13-152"]
+[case.case]
+secondary = "all"
+graph = "full"
+"""
+
+
+def run(tmp_path: Path, more: str = "", end: float = 0.8) -> RunRecord:
+    """Run nine agents that island at 0.2 s, with more lines of a scenario."""
+    (tmp_path / "it.toml").write_text(ISLANDED.format(end=end) + more, encoding="utf-8")
+    return recorded_run(tmp_path / "it.toml", "case", tmp_path / "case")
+
+
+def account(explanation: Explanation, name: str) -> NeighbourAccount:
+    """A neighbour of an explanation."""
+    return next(each for each in explanation.neighbours if each.name == name)
+
+
+def assert_adds_up(explanation: Explanation, *, named: bool = True) -> LawStep:
+    """The set-points before, the terms and the limits give the recorded set-points after, within 1e-12 pu."""
+    step, decision = explanation.step, explanation.decision
+    assert step is not None
+    assert step.problem == ""
+    for of, before, after, base in zip(
+        (step.P_set, step.V_set),
+        decision.before,
+        decision.after,
+        (decision.config.P_rated, decision.config.V_nom),
+        strict=True,
+    ):
+        total = before / base + sum(term.value for term in of.terms)
+        assert min(max(total, of.low), of.high) == pytest.approx(after / base, rel=0.0, abs=1e-12)
+        assert total + of.limits == pytest.approx(after / base, rel=0.0, abs=1e-12)
+        assert {term.name for term in of.terms} != {"step"} or not named
+    return step
+
+
+def test_a_link_cut(tmp_path: Path) -> None:
+    """The last state before the cut counts in full, at its age; the others are lost on the link, and counted."""
+    record = run(tmp_path, '[[link]]\non = "inv4 <-> inv7"\ncut = true\nfrom_s = 0.5\n')
+
+    explanation = explain(record, "inv4", 0.7)
+
+    step = assert_adds_up(explanation)
+    cut = account(explanation, "inv7")
+    assert cut.input is not None
+    assert (cut.used, cut.input.weight) == (True, 1.0)
+    assert cut.input.age == pytest.approx(0.22)
+    assert cut.why == "10 states since: 10 cut off by a cut link"
+    assert {each.why for each in explanation.neighbours if each.name != "inv7"} == {""}
+    assert {term.neighbour for term in step.P_set.terms} == {"", *(each.name for each in explanation.neighbours)}
+    assert "10 states since: 10 cut off by a cut link" in str(explanation)
+
+
+def test_a_stale_neighbour(tmp_path: Path) -> None:
+    """Beyond max_age the neighbour is in no sum, and has no term."""
+    more = '[degraded_communication]\nmax_age_s = 0.1\n[[link]]\non = "inv4 <-> inv7"\nloss = 1.0\nfrom_s = 0.5\n'
+    record = run(tmp_path, more)
+
+    explanation = explain(record, "inv4", 0.7)
+
+    step = assert_adds_up(explanation)
+    stale = account(explanation, "inv7")
+    assert stale.input is not None
+    assert (stale.used, stale.input.unused) == (False, "stale")
+    assert stale.why == "stale: older than max_age = 0.1 s; 10 states since: 10 lost on the link"
+    assert "inv7" not in {term.neighbour for term in (*step.P_set.terms, *step.V_set.terms)}
+
+
+def test_a_limit_hit(tmp_path: Path) -> None:
+    """The terms would go beyond the limit: what it takes back is a number of its own."""
+    record = run(tmp_path, "[gains]\nP_set_max_pu = 0.68\n", end=0.4)
+
+    explanations = [explain(record, "inv1", t) for t in (0.22, 0.24, 0.26, 0.28, 0.3)]
+    hit = [each for each in explanations if each.step is not None and each.step.P_set.limits]
+
+    assert hit
+    for explanation in hit:
+        step = assert_adds_up(explanation)
+        assert step.P_set.limits < -1e-6
+        assert step.P_set.after == 0.68
+        assert explanation.decision.limits_hit == ("P_set_max",)
+    assert "at its upper limit" in str(hit[0])
+
+
+def test_a_state_held_after_a_partition(tmp_path: Path) -> None:
+    """An agent of one half holds the last states of the other one, at their ages, and says what cut them off."""
+    record = run(tmp_path, '[[partition]]\nby = "halves"\nfrom_s = 0.4\nto_s = 0.7\n')
+
+    explanation = explain(record, "inv1", 0.66)
+
+    assert_adds_up(explanation)
+    held = [each for each in explanation.neighbours if each.why]
+    assert {each.name for each in held} == {"inv6", "inv7", "inv8", "inv9"}
+    assert {each.why for each in held} == {"13 states since: 13 cut off by a partition"}
+    assert all(each.used and each.input is not None and each.input.age == pytest.approx(0.28) for each in held)
+
+
+def test_an_island_change(tmp_path: Path) -> None:
+    """Once microgrid 1 is an island of its own, the others are left out, with both islands by name."""
+    record = run(tmp_path, '[[event]]\nlabel = "event2"\nt_s = 0.5\nopen = ["sw1_2"]\n', end=0.7)
+
+    together, apart = explain(record, "inv4", 0.48), explain(record, "inv4", 0.66)
+
+    for explanation in (together, apart):
+        assert_adds_up(explanation)
+    assert {each.why for each in together.neighbours} == {""}
+    assert {each.name for each in apart.neighbours if not each.used} == {"inv1", "inv2", "inv3"}
+    assert account(apart, "inv2").why == "in another island: inv1, not inv4"
+    assert any(event.kind == "island" for event in apart.events)
+
+
+def test_a_rejected_message(tmp_path: Path) -> None:
+    """States with a flipped bit arrive and are rejected; the last sound one counts."""
+    more = '[[link]]\non = "inv7 -> inv4"\ncorrupt = { p = 1.0, checksum = false }\nfrom_s = 0.5\n'
+    record = run(tmp_path, more)
+
+    explanation = explain(record, "inv4", 0.7)
+
+    assert_adds_up(explanation)
+    assert (
+        account(explanation, "inv7").why == "10 states since: 10 damaged on the link, and rejected: its CRC-32 differs"
+    )
+
+
+def test_an_agent_that_was_not_there(tmp_path: Path) -> None:
+    """A neighbour that has left is not met, and its last event says why; of itself its last decision is shown."""
+    record = run(tmp_path, '[[node]]\nname = "inv9"\nkill = true\nfrom_s = 0.5\n')
+
+    other, own = explain(record, "inv4", 0.7), explain(record, "inv9", 0.7)
+
+    assert_adds_up(other)
+    gone = account(other, "inv9")
+    assert (gone.input, gone.used) == (None, False)
+    assert gone.why.startswith("not met: ")
+    assert "inv9" in gone.why
+    assert own.t < 0.55
+    assert "it is the last decision before 0.7 s" in str(own)
+
+
+@pytest.mark.parametrize("law", ["dapi", "finite-time", "event-triggered", "centralised"])
+def test_published_laws(law: str, tmp_path: Path) -> None:
+    """Each names its terms, and one with a memory is computed from its last start."""
+    record = run(tmp_path, f'law = "{law}"\n', end=0.6)
+
+    for agent in ("inv1", "inv2"):
+        for t in (0.22, 0.4, 0.58):
+            assert_adds_up(explain(record, agent, t))
+    assert explain(record, "inv1", 0.1).step is None
+
+
+FORGETFUL = """
+import gridpeers as gp
+
+class Counts(gp.Law):
+    calls = 0
+
+    def step(self, own, neighbours, T):
+        self.calls += 1
+        return gp.SetPoints(own.P_set + self.calls * 1e-4, own.V_set - 0.02)
+"""
+
+
+def test_a_law_without_terms(tmp_path: Path) -> None:
+    """Its step is one term beside the limits; a memory that it has without `start` is found all the same."""
+    (tmp_path / "counting.py").write_text(FORGETFUL, encoding="utf-8")
+    record = run(tmp_path, 'law = "counting:Counts"\n', end=0.6)
+
+    step = assert_adds_up(explain(record, "inv1", 0.5), named=False)
+
+    assert [term.name for term in step.P_set.terms] == ["step"]
+    assert step.P_set.step == pytest.approx(16e-4, abs=1.1e-4)
+    assert step.V_set.terms[0].value == pytest.approx(-0.02)
+    assert step.V_set.limits == pytest.approx(0.02)
+    (tmp_path / "counting.py").unlink()
+    sys.modules.pop("counting", None)
+    unknown = explain(record, "inv1", 0.5)
+    assert unknown.step is not None
+    assert "the law cannot be made here" in unknown.step.problem
+    assert "the law cannot be made here" in str(unknown)
+
+
+@pytest.fixture(scope="module")
+def islanded(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """A record without faults."""
+    return run(tmp_path_factory.mktemp("why"))
+
+
+def test_a_trail_goes_back_over_neighbours(islanded: RunRecord) -> None:
+    """Each decision is that of the state behind the largest term before it, one period earlier."""
+    steps = trail(islanded, islanded.decision("inv2", 0.7), "P_set", 5)
+
+    assert next(step.decision.agent for step in steps) == "inv2"
+    for step, before in itertools.pairwise(steps):
+        assert step.largest is not None
+        assert step.largest.neighbour == before.decision.agent
+        heard = next(each for each in step.decision.neighbours if each.name == before.decision.agent)
+        assert heard.state == before.decision.state
+    assert len(steps) > 1
+    assert steps[-1].end
+    assert {step.end for step in steps[:-1]} == {""}
+
+
+def test_the_command(islanded: RunRecord) -> None:
+    """It prints the explanation, and the trails below it; no colours in a pipe."""
+    code, printed = invoke("why", str(islanded.path), "inv4", "0.7", "--follow")
+
+    assert code == 0
+    assert printed.startswith(str(explain(islanded, "inv4", 0.7)))
+    assert "P_set followed back" in printed
+    assert "\x1b" not in printed
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        (("inv77", "0.5"), "there was no agent inv77; agents are inv1-9"),
+        (("plant", "0.5"), "there was no agent plant; agents are inv1-9"),
+        (("inv4", "7"), "t = 7 s is outside of the record, which has 0 to 0.80 s"),
+        (("inv4", "nan"), "needs a run time in s"),
+        (("inv4", "0.5", "--case", "V"), "cannot be read: "),
+    ],
+)
+def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunRecord) -> None:
+    """One line says what is wrong, and what there is."""
+    code, printed = invoke("why", str(islanded.path.parent), *arguments)
+
+    assert code == 2
+    assert complaint in printed
+    assert printed.count("\n") == 1
+
+
+def test_a_record_that_is_cut_off(islanded: RunRecord, tmp_path: Path) -> None:
+    """Up to its end it is explained as before, and a note says that it is cut off."""
+    data = islanded.path.read_bytes()
+    cut = tmp_path / "run.mcap"
+    cut.write_bytes(data[: len(data) - 400])
+
+    explanation = explain(RunRecord.open(cut), "inv4", 0.3)
+
+    assert explanation.step == explain(islanded, "inv4", 0.3).step
+    assert any("cut off" in text for text in explanation.damage)
+    assert "cut off" in str(explanation)

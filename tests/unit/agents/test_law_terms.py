@@ -1,0 +1,112 @@
+"""The terms that a law names are its step: with the limits they add up, at every input."""
+
+from __future__ import annotations
+
+from copy import deepcopy
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.carriers.law_registry import LAWS
+from agents.carriers.time_limit import TimeLimited
+from agents.laws.call import decide
+from agents.laws.law import Law, Neighbour, Own, SetPoints
+
+NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised")
+
+VARIANTS: dict[str, tuple[dict[str, float | str], ...]] = {
+    "consensus": ({}, {"kappa_c": 12.0}, {"alpha_min": 0.1, "V_full": 0.02}, {"P_set_max": 0.6, "V_set_max": 1.01}),
+    "dapi": ({}, {"P_set_min": 0.4, "V_set_min": 0.99}),
+    "event-triggered": ({}, {"P_set_max": 0.6}, {"c_0": 0.01, "q_0": 0.01}),
+    "finite-time": ({}, {"gamma": 0.9, "P_set_max": 0.6}),
+    "centralised": ({}, {"centre": "inv2"}, {"P_set_max": 0.6, "V_set_max": 1.01}),
+}
+"""Parameters of each law."""
+
+
+@st.composite
+def owns(draw: st.DrawFn) -> Own:
+    """An inverter at any plausible point, saturated or not."""
+    m_q = draw(st.floats(0.01, 0.1))
+    Q = draw(st.floats(-1.0, 1.0))
+    return Own(
+        name="inv1", leader=draw(st.booleans()), t=draw(st.floats(0.0, 100.0)), P=draw(st.floats(-1.0, 1.0)), Q=Q,
+        V=draw(st.floats(0.8, 1.2)), e=draw(st.floats(-0.05, 0.05)), z=m_q * Q, P_set=draw(st.floats(0.0, 1.0)),
+        V_set=draw(st.floats(0.9, 1.1)), m_p=draw(st.floats(0.005, 0.05)), m_q=m_q, P_rated=6e5, V_nom=277.0,
+        f_nom=60.0, P_saturated=draw(st.sampled_from((-1, 0, 1))), V_saturated=draw(st.sampled_from((-1, 0, 1))),
+    )  # fmt: skip
+
+
+@st.composite
+def neighbours(draw: st.DrawFn, name: str) -> Neighbour:
+    """A neighbour at any plausible point, which shares what a centre does, or nothing."""
+    shared = draw(
+        st.sampled_from(({}, {"V": 1.02}, {"omega": 0.006, "E": 0.01}, {"V": 0.97, "omega": -0.001, "E": -0.02}))
+    )
+    return Neighbour(
+        name=name, leader=draw(st.booleans()), age=draw(st.floats(0.0, 5.0)),
+        weight=draw(st.sampled_from((0.0, 1e-3, 0.4, 1.0))), P_set=draw(st.floats(0.0, 1.0)),
+        V_set=draw(st.floats(0.9, 1.1)), Q=draw(st.floats(-1.0, 1.0)), m_p=draw(st.floats(0.005, 0.05)),
+        m_q=draw(st.floats(0.01, 0.1)), P_rated=3.5e5, shared=shared,
+    )  # fmt: skip
+
+
+@st.composite
+def inputs(draw: st.DrawFn) -> tuple[Own, tuple[Neighbour, ...], float]:
+    """What a law is called with."""
+    count = draw(st.integers(0, 4))
+    return draw(owns()), tuple(draw(neighbours(f"inv{k + 2}")) for k in range(count)), draw(st.floats(1e-3, 0.1))
+
+
+@pytest.mark.parametrize("name", NAMES)
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_terms_and_limits_add_up_to_the_step(name: str, data: st.DataObject) -> None:
+    """Over several steps, so that a memory counts: the set-point before, the terms and the limits give the result."""
+    law = LAWS.resolve(name, "")(**data.draw(st.sampled_from(VARIANTS[name])))
+    steps = data.draw(st.lists(inputs(), min_size=1, max_size=4))
+    law.start(steps[0][0])
+    P_set, V_set = steps[0][0].P_set, steps[0][0].V_set
+    for own, others, T in steps:
+        own = own._replace(P_set=P_set, V_set=V_set)
+        memory = deepcopy(vars(law))
+        terms = law.terms(own, others, T)
+        assert terms is not None
+        assert vars(law) == memory
+        result = decide(law, own, others, T)
+        P = P_set + sum(term.value for term in terms.P_set)
+        V = V_set + sum(term.value for term in terms.V_set)
+        assert min(max(P, law.P_set_min), law.P_set_max) == pytest.approx(result.P_set, rel=0.0, abs=1e-12)
+        assert min(max(V, law.V_set_min), law.V_set_max) == pytest.approx(result.V_set, rel=0.0, abs=1e-12)
+        assert {term.neighbour for term in (*terms.P_set, *terms.V_set)} <= {"", *(other.name for other in others)}
+        P_set, V_set = result.P_set, result.V_set
+
+
+def test_the_paper_s_terms() -> None:
+    """A leader at 59.94 Hz with one neighbour that has more: both raise P_set, each by its own term of (13)."""
+    own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, -0.001, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+    other = Neighbour("inv2", False, 0.02, 1.0, 0.7, 1.0, 0.0, 0.01, 0.05, 3e5)
+
+    terms = LAWS.resolve("consensus", "")().terms(own, (other,), 0.02)
+
+    assert terms is not None
+    sharing, error = terms.P_set
+    assert (sharing.name, sharing.neighbour, error.name) == ("power sharing", "inv2", "frequency error")
+    assert sharing.value == pytest.approx(0.5 * (1 - 2.718281828459045 ** (-2 * 0.01 / 0.0007 * 0.02)) * 0.2)
+    assert error.value == pytest.approx((1 - 2.718281828459045 ** (-0.01 / 0.0007 * 0.02)) * 0.1)
+
+
+def test_a_law_need_not_name_any() -> None:
+    """A law without terms has none, also behind its time limit; one with terms keeps them there."""
+
+    class Plain(Law):
+        def step(self, own, neighbours, T):  # type: ignore[no-untyped-def]
+            return SetPoints(own.P_set, own.V_set)
+
+    own = Own("inv1", True, 1.0, 0.5, 0.0, 1.0, -0.001, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+    assert TimeLimited(Plain(), 1.0).terms(own, (), 0.02) is None
+    limited = TimeLimited(LAWS.resolve("dapi", "")(), 1.0).terms(own, (), 0.02)
+    assert limited is not None
+    assert [term.name for term in limited.P_set] == ["frequency error"]
+    assert limited.P_set[0].value == pytest.approx(0.01)
