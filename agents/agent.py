@@ -182,6 +182,11 @@ class Agent:
         if self._detector is not None:
             self._detector.forget(name)
 
+    @property
+    def set_points(self) -> tuple[float, float] | None:
+        """Own set-points (W, V); None before the first tick and after a pause, when those of the measurement count."""
+        return None if self._P_set is None or self._V_set is None else (self._P_set, self._V_set)
+
     def restart(self) -> None:
         """Let the next tick start from the set-points of its measurement, like the first one."""
         self._P_set = self._V_set = None

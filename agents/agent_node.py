@@ -92,6 +92,7 @@ class AgentNode(PlantFollower):
 
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared."""
+        self._note_token(key, now, appeared=True)
         match self.keys.parts(key):
             case ("alive", "plant", epoch) if self._plant_appeared(epoch):
                 self.plant_seen = True
@@ -102,6 +103,7 @@ class AgentNode(PlantFollower):
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
+        self._note_token(key, now, appeared=False)
         match self.keys.parts(key):
             case ("alive", "plant", epoch) if self._plant_vanished(epoch):
                 self._plant_gone(now)

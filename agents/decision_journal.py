@@ -7,6 +7,7 @@ journal only names the states. In simulated time it does so where their ages in 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import inf
 
 from agents.agent import Agent
 from wire.journal import Decision, JournalBuffer
@@ -78,10 +79,10 @@ class DecisionJournal:
         self,
         tick: int,
         measurement: int,
-        neighbours: Sequence[str],
         ages: Mapping[str, float],
+        max_age: float,
         at: float,
-        before: tuple[float, float],
+        before: tuple[float, float] | None,
     ) -> None:
         """Note a decision in wall-clock time.
 
@@ -91,23 +92,33 @@ class DecisionJournal:
             Number of the own state.
         measurement : int
             Number of the own measurement.
-        neighbours : Sequence[str]
-            In-neighbours by the graph, among those that have been met.
         ages : Mapping[str, float]
-            Age of the last state of each (s of run time), infinite if none was heard.
+            Age of the last state of each in-neighbour (s of run time), infinite if none was heard.
+        max_age : float
+            Age (s) beyond which a state is not used.
         at : float
             Time on the own clock (s, monotonic).
-        before : tuple[float, float]
-            Set-points (W, V) before it.
+        before : tuple[float, float] or None
+            Set-points (W, V) before it; None if the agent starts from those of its measurement.
         """
         agent = self._agent
-        states = [agent.heard[name].seq if name in agent.heard else None for name in neighbours]
-        unused = [] if len(agent.around) == len(neighbours) else self._reasons(neighbours, states)
-        shown = [ages[name] if state is not None else None for name, state in zip(neighbours, states, strict=True)]
-        weights = self._all_weights(neighbours) if self._weighs else []
+        used = {neighbour.name for neighbour in agent.around}
+        unused = [
+            "" if name in used else "silent" if age == inf else "stale" if age > max_age else "island"
+            for name, age in ages.items()
+        ]
         self.journal.add(
             Decision(
-                tick, measurement, list(neighbours), states, unused, weights, agent.saturated, at, shown, list(before)
+                tick,
+                measurement,
+                list(ages),
+                [agent.heard[name].seq if age < inf else None for name, age in ages.items()],
+                unused if any(unused) else [],
+                self._all_weights(tuple(ages)) if self._weighs else [],
+                agent.saturated,
+                at,
+                [age if age < inf else None for age in ages.values()],
+                list(before or ()),
             )
         )
 

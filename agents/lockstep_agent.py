@@ -42,6 +42,9 @@ from wire.timing.tick_barrier import Awaited, TickBarrier
 CLOSING = 2.0
 """Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""
 
+JOURNAL_PERIOD = 0.2
+"""Longest time (s) until a part of the journal is sent, where emulated links change all the time how it decides."""
+
 DEADLINES = 2.0
 """An agent waits this many deadlines, so that the plant reports the error first."""
 
@@ -110,6 +113,8 @@ class LockstepAgent(AgentNode):
         """Roster of the last tick."""
         self._present: tuple[int, dict[str, str], tuple[str, ...]] = -1, {}, ()
         """Changes of the members by then, the roster, and the in-neighbours whose processes on it count."""
+        self._journal_at = 0.0
+        """When the last part of the journal was sent (s on the driver's clock)."""
         self._ending = ""
         """Why the agent is about to close; empty otherwise."""
         self._reported = False
@@ -393,8 +398,11 @@ class LockstepAgent(AgentNode):
             if self.journal is not None:
                 self._note_decision(grant.seq, grant.seq - seq, neighbours)
         self._publish(self.keys.state(self._name), encode(state))
-        if (grant.seq + 1) % REPORT_TICKS == 0:
+        reports = (grant.seq + 1) % REPORT_TICKS == 0
+        if self._links is not None and (reports or now - self._journal_at >= JOURNAL_PERIOD):
+            self._journal_at = now
             self._publish_decisions()
+        if reports:
             self._report_links()
         self._await_next(grant, now)
 

@@ -68,6 +68,8 @@ class PlantNode(Node):
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
             self.journal = JournalBuffer()
+        self._awaits_journals = self.journal is not None and config.clock == "wall"
+        """Whether agents send the end of their journals when they close."""
         self._last_due = False
         """Whether the run has ended and the last telemetry is still to be sent."""
 
@@ -231,9 +233,9 @@ class PlantNode(Node):
     # ---------------------------------------------------------------- the end
 
     def _tell_the_end(self, reason: str) -> None:
-        """Let all nodes close. The last telemetry waits for the agents' accounts of emulated links."""
+        """Let all nodes close. The last telemetry waits for the agents' accounts of emulated links, and journals."""
         self._last_due = True
-        if self._links is None:
+        if self._links is None and not self._awaits_journals:
             self._send_the_last()
         self.stop(self.keys.control, reason)
 

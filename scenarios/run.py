@@ -34,7 +34,6 @@ from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugin_keys import claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
-from wire.journal import RecordLevel
 from wire.messages import Pacing, Telemetry
 
 if TYPE_CHECKING:
@@ -78,8 +77,6 @@ class Request(RunMetrics):
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
     self_check: bool = False
     """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
-    record: RecordLevel = "all"
-    """What the record of each case has; see `wire.journal.RecordLevel`."""
     outside: tuple[str, ...] | None = None
     """Inverters that federates of a HELICS federation control instead of our agents; None for a run without HELICS."""
     lasting: bool = True
@@ -291,8 +288,8 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
     real = request.clock == "wall"
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
-    plant = msgspec.structs.replace(plant, record=request.record)
-    agents = tuple(msgspec.structs.replace(agent, record=request.record) for agent in agents)
+    plant = msgspec.structs.replace(plant, record=request.scenario.record)
+    agents = tuple(msgspec.structs.replace(agent, record=request.scenario.record) for agent in agents)
     if request.outside is not None:
         plant = msgspec.structs.replace(
             plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)

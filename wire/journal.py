@@ -7,7 +7,8 @@ journal is cut at any entry and joined to the next part. `wire.messages.Journal`
 
 Three rules keep it small, because in simulated time a tick must not wait for its journal:
 
-- A message is noted once with its bytes: by its sender. Who hears it notes sender, epoch and number.
+- A message is noted with its bytes by its sender, and each state by the plant too, should its agent be killed before it
+  has sent its journal. Any other that hears it notes sender, epoch and number.
 - In simulated time the plant notes all measurements and states of a tick in one entry, because they all pass it. An
   agent has heard all states of the tick before from its in-neighbours, unless an emulated link is between.
 - In simulated time an agent notes how it decided only where that changes: `Decision` holds until the next one.
@@ -100,10 +101,12 @@ class Token(Entry, frozen=True, array_like=True, tag="token"):
 
 
 class Woken(Entry, frozen=True, array_like=True, tag="woken"):
-    """The node acted because its clock said so, after all entries before this one."""
+    """The node acted because its clock said so, after all entries before this one and before those that follow."""
 
     at: float
     """Time on the own clock (s, monotonic)."""
+    work: bool = False
+    """Whether it did its piece of work (`Node.work`: the plant advances), not what was due (`Node.expire`)."""
 
 
 class Process(Entry, frozen=True, array_like=True, tag="process"):
@@ -145,7 +148,8 @@ class Decision(Entry, frozen=True, array_like=True, tag="decision"):
     ages: list[float | None] = []
     """Age of each state (s of run time); no list in simulated time, where it is the time between the two ticks."""
     before: list[float] = []
-    """Set-points (W, V) before the decision; no list in simulated time, where they are those of the state before."""
+    """Set-points (W, V) before the decision. No list in simulated time, where they are those of the state before, and
+    where the agent starts, or starts again after a pause, from those of its measurement."""
 
 
 UNUSED = {

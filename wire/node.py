@@ -209,4 +209,6 @@ class Node:
 
     def _say(self, text: str) -> None:
         """Log a line."""
+        if self.traffic is not None:
+            self.traffic.line(text)
         self._actions.append(Log(f"{self._name}: {text}"))

@@ -7,9 +7,10 @@ from typing import Any, Protocol
 
 from msgspec.structs import astuple
 
-from wire.journal import AT_ONCE, Exchange, JournalBuffer, Received, Sent, Token
+from wire.codec import RejectedError, decode
+from wire.journal import AT_ONCE, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
 from wire.keys import Keys
-from wire.messages import Measurement, State
+from wire.messages import AnyMessage, Measurement, State
 
 SHOWN = 4_000
 """Most bytes that are noted of a message that was rejected."""
@@ -28,6 +29,10 @@ class Traffic(Protocol):
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""
+        ...
+
+    def line(self, text: str) -> None:
+        """Note a line of the log."""
         ...
 
 
@@ -78,6 +83,10 @@ class TickTraffic:
         """Note a liveliness token that appeared or vanished."""
         self._journal.add(Token(None, key[self._cut :], appeared))
 
+    def line(self, text: str) -> None:
+        """Note a line of the log."""
+        self._journal.add(Process(None, "line", text))
+
     def measured(self, measurements: Sequence[Measurement]) -> None:
         """Note the measurements of a tick where none is sent, as plant and agents share a process."""
         self._measurements += map(astuple, measurements)
@@ -98,3 +107,85 @@ class TickTraffic:
                 self._journal.add(Exchange(tick, measurements[i : i + AT_ONCE], states[i : i + AT_ONCE]))
         measurements.clear()
         states.clear()
+
+
+class TimedTraffic:
+    """The messages and tokens of a node in wall-clock time, each with its time, in the order in which they came.
+
+    What went into the core is noted call by call, so that the core can be given the same again.
+
+    Parameters
+    ----------
+    keys : Keys
+        Keys of the run.
+    journal : JournalBuffer
+        Takes the entries.
+    arrivals : bool, optional
+        Whether tokens and arriving messages are noted too, not only what the node sends.
+    whole : bool, optional
+        Whether states are noted with their bytes, as by the plant, which hears all of them: a killed agent takes the
+        end of its own journal with it, and an agent of others keeps none.
+    """
+
+    def __init__(self, keys: Keys, journal: JournalBuffer, *, arrivals: bool = True, whole: bool = False) -> None:
+        self._journal, self._cut, self._arrivals = journal, len(keys.telemetry) - len("telemetry"), arrivals
+        self._whole = whole
+        self.now = 0.0
+        """Time of the last call of the node (s, monotonic)."""
+
+    def sent(self, key: str, payload: bytes) -> None:
+        """Note a message that the node sends."""
+        name = key[self._cut :]
+        if not name.startswith(_ELSEWHERE):
+            self._journal.add(Sent(self.now, name, payload))
+
+    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
+        """Note a message off the wire, and the kind of its rejection, if it was rejected."""
+        self.now = at
+        name = key[self._cut :]
+        if not (self._arrivals or self._whole) or (name.startswith(_ELSEWHERE) and not rejected):
+            return
+        if (
+            name.startswith(_EACH_TICK)
+            and not self._whole
+            and rejected in ("", "stale")  # any other may be of somebody who keeps no journal
+            and (message := _sound(payload)) is not None
+        ):
+            self._journal.add(Heard(at, name, message.epoch, message.seq, rejected))
+            return
+        self._journal.add(Received(at, name, payload[:SHOWN] if rejected else payload, rejected))
+
+    def token(self, key: str, at: float, *, appeared: bool) -> None:
+        """Note a liveliness token that appeared or vanished."""
+        self.now = at
+        if self._arrivals:
+            self._journal.add(Token(at, key[self._cut :], appeared))
+
+    def woken(self, at: float, *, work: bool = False) -> None:
+        """Note that the node acts by its clock."""
+        self.now = at
+        if self._arrivals:
+            self._journal.add(Woken(at, work))
+
+    def process(self, kind: str, text: str, at: float) -> None:
+        """Note an event of the process."""
+        self.now = at
+        self._journal.add(Process(at, kind, text))
+
+    def line(self, text: str) -> None:
+        """Note a line of the log."""
+        self._journal.add(Process(self.now, "line", text))
+
+
+_ELSEWHERE = ("telemetry", "journal/", "report/", "status/", "answer/")
+"""Beginnings of keys whose messages the record has anyway, or that only say how a node does."""
+
+_EACH_TICK = ("measurement/", "state/", "set_points/")
+"""Beginnings of keys with a message a tick."""
+
+
+def _sound(payload: bytes) -> AnyMessage | None:
+    try:
+        return decode(payload)
+    except RejectedError:
+        return None

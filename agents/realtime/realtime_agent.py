@@ -21,6 +21,7 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from agents.agent_node import AgentNode
+from agents.decision_journal import DecisionJournal
 from agents.laws.law import Law
 from agents.realtime.agent_statistics import AgentStatistics, Phase
 from agents.realtime.link_command_receiver import LinkCommandReceiver
@@ -28,13 +29,19 @@ from agents.realtime.session_health import SessionHealth
 from agents.realtime.tick_timer import TickTimer
 from wire.admission import FASTER
 from wire.codec import encode
+from wire.journal import JournalBuffer
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, AnyMessage, Leave, LinkRequest, Measurement, Nameplate, State, Stop, Waiting
 from wire.node import CLOCK_ALONE, Route
 from wire.timing.timer import Timer
+from wire.traffic import TimedTraffic
 
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
+
+JOURNAL_PERIOD, LINKS_PERIOD = 0.2, 0.5
+"""Time (s, wall) between two parts of the journal, and between two reports on links beside it: a record loses no more
+when a process is killed."""
 
 LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
@@ -51,6 +58,12 @@ class RealtimeAgent(AgentNode):
         self.routes[self.keys.control] = Route(PLANT, (Waiting, Stop), self._on_control)
         self.routes[self.keys.link_request(config.name)] = Route(PLANT, (LinkRequest,), self._on_link_command)
         self._first_routes = dict(self.routes)
+        self._timed: TimedTraffic | None = None
+        if config.record != "physics":
+            self.journal = JournalBuffer()
+            self._timed = TimedTraffic(self.keys, self.journal, arrivals=config.record == "all")
+            self.traffic, self._decisions = self._timed, DecisionJournal(self._agent, self.journal)
+        self._journal_timer = Timer(JOURNAL_PERIOD, 0.0)
         self.phase: Phase = "seeking"
         self.statistics = AgentStatistics()
         """Its counts."""
@@ -59,6 +72,7 @@ class RealtimeAgent(AgentNode):
         self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
         # a clock that is to drift must drift
         self._timer = TickTimer(config.T_c / config.speed / config.clock_rate, keeps_clear=config.clock_rate == 1.0)
+        self._report_ticks = REPORT_TICKS if self.journal is None else max(1, round(LINKS_PERIOD / self._timer.period))
         self._status = Timer(STATUS_PERIOD, 0.0)
         self._give_up: float | None = None
         self._health = SessionHealth(config.name)
@@ -97,7 +111,15 @@ class RealtimeAgent(AgentNode):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         keys, name = self.keys, self._name
-        own = (keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement)
+        own = (
+            keys.state,
+            keys.set_points,
+            keys.leave,
+            keys.status,
+            keys.report,
+            keys.link_acknowledgement,
+            keys.journal,
+        )
         return tuple(key(name) for key in own)
 
     @property
@@ -119,6 +141,9 @@ class RealtimeAgent(AgentNode):
         """Begin to tick, or begin again after a broken session; there is nothing to do yet."""
         self._timer.start(now)
         self._status = Timer(STATUS_PERIOD, now)
+        self._journal_timer = Timer(JOURNAL_PERIOD, now)
+        if self._timed is not None:
+            self._timed.process("session" if self.session_broken else "start", f"instance {self._instance}", now)
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
         if self.session_broken:
@@ -132,6 +157,8 @@ class RealtimeAgent(AgentNode):
         late = now - self._timer.due
         if late < 0.0 or self.finished:
             return
+        if self._timed is not None:
+            self._timed.woken(now)
         skipped = self._timer.take(now)
         if self._leaving:
             self._left += 1
@@ -149,6 +176,9 @@ class RealtimeAgent(AgentNode):
         self._hear_late(at)
         before = self.phase, self._used_neighbours
         self._tick(at)
+        if now >= self._journal_timer.due and self.phase == "running":  # then the plant knows this process
+            self._journal_timer.take(now)
+            self._report_journal()
         self._check_session(now)
         due = now >= self._status.due
         if due:
@@ -177,6 +207,7 @@ class RealtimeAgent(AgentNode):
         """Leave properly: have the own inverter taken off the network, and close once the plant says that it is."""
         if self.finished or self._leaving:
             return
+        self._report_journal()
         self._report_links(final=True)
         name, epoch = self._name, self._config.epoch
         message = Leave(sender=name, epoch=epoch, seq=self.statistics.sent, t=self.states.t)
@@ -301,13 +332,21 @@ class RealtimeAgent(AgentNode):
             return
         limit = self._config.control.degraded_communication.max_age or self._config.max_age
         ages = {name: age for name in self._neighbours if (age := self.states.age(name, at)) <= limit}
+        before = self._agent.set_points
         state = replace(self._agent.tick(measurement, tuple(ages), ages), seq=self.statistics.sent)
+        if self._timed is not None:
+            all_ages = {name: self.states.age(name, at) for name in self._neighbours}
+            self._decisions.live(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
         self._used_neighbours = tuple(name for name in ages if self._agent.shares_island(name))
         self.statistics.ticks += 1
         self.statistics.sent += 1
-        if self.statistics.ticks % REPORT_TICKS == 0:
+        if self.statistics.ticks % self._report_ticks == 0:
             self._report_links()
         self._send(state)
+
+    def _report_journal(self) -> None:
+        """Send the journal since the last report."""
+        self._publish_journal(self.keys.journal(self._name), self._config.epoch, self.states.t)
 
     def _send(self, state: State) -> None:
         """Send a state to everybody, or to the plant alone if the law does not tell the neighbours."""

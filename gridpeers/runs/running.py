@@ -56,7 +56,8 @@ def run(
     if driver == "processes" and (wrong := check_portable(spec)):
         raise ScenarioError(wrong)
     require_room(
-        Path(tempfile.gettempdir()) if folder is None else as_folder(folder), file_sizes(spec, scenario.feeder)
+        Path(tempfile.gettempdir()) if folder is None else as_folder(folder),
+        file_sizes(spec, scenario.feeder, clock=pace.get("clock", "simulated")),
     )
     if folder is None:
         try:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 
-KEPT = 4_000_000
-"""Bytes that are kept: over two minutes of nine inverters at real time, a small part of the process's memory."""
+KEPT, KEPT_RECORDED = 4_000_000, 40_000_000
+"""Bytes that are kept, without and with journals: two minutes of nine inverters at real time, a part of the
+process's memory."""
 
 AT_ONCE = 20
 """Messages that are published again in one control period, so that the plant keeps its pace."""

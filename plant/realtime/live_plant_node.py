@@ -14,14 +14,16 @@ from typing import Literal
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.plant_node import STAYS, PlantNode
+from plant.realtime.kept_telemetry import KEPT, KEPT_RECORDED
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.recorder_feed import RecorderFeed
 from plant.realtime.silence_detector import SilenceDetector
 from wire.admission import FASTER
 from wire.links import Links, is_usable
-from wire.messages import AgentStatus, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
+from wire.messages import AgentStatus, Journal, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
 from wire.node import Route
 from wire.timing.timer import Timer
+from wire.traffic import TimedTraffic
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
@@ -43,7 +45,8 @@ class LivePlantNode(PlantNode):
         self.phase: Phase = "gathering"
         self.plant = plant
         self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
-        self.recorder_feed = RecorderFeed(config.recorders, partial(super()._publish, self.keys.telemetry))
+        publish, kept = partial(super()._publish, self.keys.telemetry), KEPT if self.journal is None else KEPT_RECORDED
+        self.recorder_feed = RecorderFeed(config.recorders, publish, kept)
         self._states: dict[str, State] = {}
         """States that the links let through and that are not held yet."""
         self._state_at: dict[str, float] = {}
@@ -51,12 +54,18 @@ class LivePlantNode(PlantNode):
         self._silence = SilenceDetector(config.max_age, config.T_c, config.T_c / config.speed)
         self._ask_timer = Timer(AGAIN, 0.0)
         self._refusals = 0
+        self.timed: TimedTraffic | None = None
+        """Notes the plant's messages and tokens; None if nobody records them."""
+        if self.journal is not None:
+            arrivals = config.record == "all"
+            self.timed = self.traffic = TimedTraffic(self.keys, self.journal, arrivals=arrivals, whole=True)
         keys = self.keys
         for name in plant.inverters:
             self.routes[keys.state(name)] = self.routes[keys.set_points(name)] = Route(name, (State,), self._on_state)
             self.routes[keys.status(name)] = Route(name, (AgentStatus,), self._on_status, early=True)
             self.routes[keys.leave(name)] = Route(name, (Leave,), self._on_leave)
             self.routes[keys.report(name)] = Route(name, (LinkReport,), self._on_report)
+            self.routes[keys.journal(name)] = Route(name, (Journal,), self._on_journal)
             self.routes[keys.link_acknowledgement(name)] = Route(name, (LinkAcknowledgement,), self._on_link_answer)
 
     @property

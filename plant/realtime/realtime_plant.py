@@ -28,6 +28,9 @@ from wire.timing.timer import Timer
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""
 
+LINKS = 0.5
+"""Time (s, wall) between two reports on links in a recorded run."""
+
 LEAD = 0.25
 """Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
 
@@ -47,6 +50,8 @@ class RealtimePlant(LivePlantNode):
         super().__init__(config, plant, links)
         self.pacer = RealTimePacer(config.T_c / config.speed, 0.0)
         self._telemetry_ticks = max(1, round(TELEMETRY / self.pacer.period))
+        self._report_ticks = REPORT_TICKS if self.journal is None else max(1, round(LINKS / self.pacer.period))
+        """Steps between two reports on the links into the plant."""
         self._step_due = False
         self._deadline = 0.0
         self._waiting_timer = Timer(WAITING, 0.0)
@@ -79,6 +84,8 @@ class RealtimePlant(LivePlantNode):
 
     def start(self, now: float) -> None:
         """Begin to wait for the agents."""
+        if self.timed is not None:
+            self.timed.process("start", f"run {self.config.run}, epoch {self.config.epoch}", now)
         self._deadline = now + max(0.0, self.config.wait_for_agents)
         self._waiting_timer, self._ask_timer = Timer(WAITING, now), Timer(AGAIN, now + AGAIN)
         self._reporter.collect()
@@ -90,6 +97,8 @@ class RealtimePlant(LivePlantNode):
         """Make the step that is due, or end the wait that is over."""
         if now < self.deadline:
             return
+        if self.timed is not None:
+            self.timed.woken(now)
         if self.phase == "gathering" and now >= self._deadline:
             self._begin(now)
         elif self.phase == "gathering":
@@ -200,6 +209,8 @@ class RealtimePlant(LivePlantNode):
         if not self._step_due:
             return False
         self._step_due = False
+        if self.timed is not None:
+            self.timed.woken(now, work=True)
         self.recorder_feed.replay()
         self._states.update((state.sender, state) for state in self._late_states(now * self.config.speed))
         states, self._states = self._states, {}
@@ -213,7 +224,8 @@ class RealtimePlant(LivePlantNode):
         self._reporter.collect()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
             self._report(final=False)
-        if self.tick % REPORT_TICKS == 0:
+            self._report_journal()
+        if self.tick % self._report_ticks == 0:
             self._report_links()
         return True
 

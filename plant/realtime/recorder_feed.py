@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from plant.realtime.kept_telemetry import KeptTelemetry
+from plant.realtime.kept_telemetry import KEPT, KeptTelemetry
 
 
 class RecorderFeed:
@@ -16,13 +16,15 @@ class RecorderFeed:
         Names of the recorders that the run waits for.
     publish : Callable[[bytes], None]
         Publishes bytes on the key of telemetry.
+    limit : int, optional
+        Bytes that are kept.
     """
 
-    def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None]) -> None:
+    def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT) -> None:
         self._needed, self._publish = frozenset(needed), publish
         self._out_of_reach: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""
-        self.kept = KeptTelemetry()
+        self.kept = KeptTelemetry(limit)
         """Messages that recorders can have again."""
         self.paced = False
         """Whether the plant keeps pace, so that `replay` publishes a little in each period; else all goes at once."""

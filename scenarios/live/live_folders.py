@@ -8,13 +8,19 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
+from scenarios.record.record_info import RecordInfo
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_status, write_whole
 from scenarios.run import versions
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 
-LIVE = "live"
+LIVE: Literal["live"] = "live"
 """The driver of a live run, as files name it."""
 
 
@@ -63,3 +69,23 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         raise FolderError(why) from None
     (case,) = scenario.cases
     yield Folders(whole / "log", whole / case, whole)
+
+
+def live_record(
+    scenario: ScenarioModel, plant: PlantConfig, agents: tuple[AgentConfig, ...], inverters: tuple[str, ...]
+) -> RecordInfo:
+    """Return what the record of a live run says about it; the scenario has the one case that runs."""
+    (case,) = scenario.cases
+    return RecordInfo(
+        level=plant.record,
+        scenario=scenario.name,
+        case=case,
+        toml=to_toml(scenario, {"driver": LIVE} | versions()),
+        seed=scenario.seed,
+        driver=LIVE,
+        versions=versions(),
+        inverters=inverters,
+        plant=replace(plant, agent_configs={}),
+        agents=agents,
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds"),
+    )

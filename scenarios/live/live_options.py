@@ -14,6 +14,7 @@ from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.driver.command_line import command_line
+from wire.journal import RecordLevel
 from wire.schema.suggestion import suggestion
 
 SPEEDS = (0.1, 50.0)
@@ -33,6 +34,8 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     """Time (s) for which the plant waits for its agents."""
     duration: float | None = None
     """Run time (s) after which the run ends; None for no end."""
+    recorded: bool = False
+    """Whether the run is recorded, as its scenario says."""
     strict: bool = False
     """Whether the run breaks when the plant cannot keep pace."""
 
@@ -90,7 +93,8 @@ def configure(
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
     # links are emulated even without a fault: gridpeers link may set one during the run
     links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
-    live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links}
+    level: RecordLevel = scenario.record if options.recorded else "physics"
+    live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links, "record": level}
     first = [agent for agent in agents if agent.name in plant.agents]
     everyone = tuple(
         msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))

@@ -30,6 +30,7 @@ from scenarios.live.live_recorder import LiveRecorder
 from scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
 from scenarios.live.run_client import RunClient
 from scenarios.live.run_requests import check_free, configuration, own_code
+from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError
@@ -78,7 +79,9 @@ def meaning(word: str, config: PlantConfig) -> str:
     return ""
 
 
-def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog) -> ProcessOutcome:
+def plant_here(
+    config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo | None = None
+) -> ProcessOutcome:
     """Run the plant in this process until it is told to end.
 
     Parameters
@@ -89,6 +92,8 @@ def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog) -> P
         Where to record the run.
     link_log : LinkLog
         Takes the commands to links.
+    record : RecordInfo, optional
+        The run, for its record.
     """
     signal.signal(signal.SIGTERM, _stop)
     _log()
@@ -105,12 +110,19 @@ def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog) -> P
             _say_end(recorder, config)
             raise
 
-    recorder = LiveRecorder(config.run, loopback_of(config.listen[0]), say, folder, silent=LOGGED, link_log=link_log)
+    recorder = LiveRecorder(
+        config.run, loopback_of(config.listen[0]), say, folder, silent=LOGGED, link_log=link_log, record=record
+    )
     return _follow(recorder, run)
 
 
 def all_here(
-    config: PlantConfig, agents: tuple[AgentConfig, ...], logs: Path, folder: Path | None, link_log: LinkLog
+    config: PlantConfig,
+    agents: tuple[AgentConfig, ...],
+    logs: Path,
+    folder: Path | None,
+    link_log: LinkLog,
+    record: RecordInfo | None = None,
 ) -> ProcessOutcome:
     """Run the plant and all its agents as processes of their own, until the run ends.
 
@@ -126,6 +138,8 @@ def all_here(
         Where to record the run.
     link_log : LinkLog
         Takes the commands to links.
+    record : RecordInfo, optional
+        The run, for its record.
     """
     signal.signal(signal.SIGTERM, _stop)
     config = _recorded(config, folder)
@@ -160,7 +174,7 @@ def all_here(
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
-    recorder = LiveRecorder(config.run, endpoint, say, folder, link_log=link_log)
+    recorder = LiveRecorder(config.run, endpoint, say, folder, link_log=link_log, record=record)
     return _follow(recorder, run)
 
 

@@ -12,6 +12,7 @@ from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from scenarios.drivers.telemetry_stream import Recordable
 from scenarios.live.link_log import LinkLog
 from scenarios.live.show.snapshot import line_of
+from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.messages import LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
@@ -40,6 +41,8 @@ class LiveRecorder:
         Kinds of events that it does not say.
     link_log : LinkLog, optional
         Takes the plant's messages on commands to links.
+    record : RecordInfo, optional
+        The run, for its record run.mcap in the folder; None writes none.
     """
 
     def __init__(
@@ -51,9 +54,10 @@ class LiveRecorder:
         *,
         silent: Collection[str] = (),
         link_log: LinkLog | None = None,
+        record: RecordInfo | None = None,
     ) -> None:
         self._say, self._silent, self._link_log = say, silent, link_log
-        self._recorder = None if folder is None else Recorder(folder, gaps=True)
+        self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
         self.recorded: Recorded | None = None
         """The record, once it is closed, if it is whole."""
         self.failure = ""
@@ -144,13 +148,15 @@ class LiveRecorder:
         recorder = self._recorder
         if recorder is None:
             return
-        known = len(recorder.missing)
+        known, sound = len(recorder.missing), not recorder.record_failure
         try:
             recorder(message)
         except (RecordError, OSError) as error:
             why = getattr(error, "strerror", None) or error
             self._fail(f"the record ends at {recorder.ended:.2f} s: {why}", _ON)
             self._abandon(recorder)
+        if sound and recorder.record_failure:
+            self._say(recorder.record_failure + _ON)
         for before, after in recorder.missing[known:]:
             self._say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
 

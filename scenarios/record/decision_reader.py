@@ -160,6 +160,7 @@ class DecisionReader:
             neighbours=neighbours,
             not_met=tuple(name for name in self._listens(config.name) if name not in met),
             before=self._before(config, state, measured, action, form),
+            restarted=self._own_before(config, state, form) is None,
             saturated=form.saturated if action == "law" else (0, 0),
             action=action,
             state=state,
@@ -169,13 +170,17 @@ class DecisionReader:
         self, config: AgentConfig, state: State, measured: Measurement, action: Action, form: Decision
     ) -> tuple[float, float]:
         """Return the set-points (W, V) before a decision: the agent's own, or those of the plant after a pause."""
-        if len(form.before) == 2:
-            return form.before[0], form.before[1]
-        if action == "law":
-            last = self._index.state(config.name, state.seq - 1, time_of(state.seq - 1, self._info.T_c))
-            if last is not None and last.epoch == state.epoch and not (last.idle or last.island == OFF):
-                return last.P_set, last.V_set
-        return measured.P_set, measured.V_set
+        own = self._own_before(config, state, form)
+        return (measured.P_set, measured.V_set) if own is None or action != "law" else own
+
+    def _own_before(self, config: AgentConfig, state: State, form: Decision) -> tuple[float, float] | None:
+        """Return the agent's own set-points (W, V) before a decision; None where it starts, or starts again."""
+        if self._info.clock == "wall":
+            return (form.before[0], form.before[1]) if len(form.before) == 2 else None
+        last = self._index.state(config.name, state.seq - 1, time_of(state.seq - 1, self._info.T_c))
+        if last is None or last.epoch != state.epoch or last.idle or last.island == OFF:
+            return None
+        return last.P_set, last.V_set
 
     def _all_in_neighbours(self, agent: str) -> tuple[str, ...]:
         """Return the in-neighbours of an agent if all configured agents were there."""

@@ -92,6 +92,8 @@ class _Recomputation:
             return core.idle_state(decision.measurement)
         if self._config.clock == "simulated":
             return core.tick(decision.measurement, [each.name for each in decision.neighbours])
+        if decision.restarted:
+            core.restart()
         ages = {each.name: each.age for each in decision.neighbours if each.age is not None and each.unused != "stale"}
         return replace(core.tick(decision.measurement, tuple(ages), ages), seq=decision.tick)
 

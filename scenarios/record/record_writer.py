@@ -10,7 +10,6 @@ import contextlib
 import os
 import threading
 from pathlib import Path
-from time import monotonic
 from typing import Any, NamedTuple, cast
 
 from mcap.writer import CompressionType, Writer
@@ -19,9 +18,9 @@ from scenarios.record.record_channels import RecordChannel, Topic
 from scenarios.record.record_info import METADATA, PROFILE, RecordInfo
 
 SYNC = 0.9
-"""Least time (s) between two waits until the disk keeps all against a loss of power; other files wait meanwhile."""
+"""Time (s) between two calls that have the disk keep all against a loss of power; other files wait meanwhile."""
 
-PERIOD = 0.5
+PERIOD = 0.25
 """Longest time (s) that a message waits for its chunk: with the time that its node has kept it, less than 1 s."""
 
 CHUNK = 1_000_000
@@ -78,9 +77,9 @@ class _WholeWrites:
             raise
         self._written = self._position
 
-    def sync(self) -> None:
-        """Have the disk keep what is written, also when the machine loses its power."""
-        os.fsync(self._file)
+    def descriptor(self) -> int:
+        """Return another descriptor of the file, for its taker to close."""
+        return os.dup(self._file)
 
     def close(self) -> None:
         """Close the file."""
@@ -124,6 +123,8 @@ class RecordWriter:
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
         self._thread.start()
+        self._closed = threading.Event()
+        threading.Thread(target=self._sync_all, args=(self._file.descriptor(),), name="sync", daemon=True).start()
 
     def _begin(self, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
         writer = self._writer
@@ -153,6 +154,7 @@ class RecordWriter:
             return
         self._closing = True
         self._wake.set()
+        self._closed.set()
         self._thread.join()
         if not self.failure:
             try:
@@ -166,22 +168,29 @@ class RecordWriter:
 
     def _write_all(self) -> None:
         """Write a chunk every `PERIOD`, or when there is much to write, until the end."""
-        synced = monotonic()
         while not self.failure:
             self._wake.wait(PERIOD)
             self._wake.clear()
             closing = self._closing
             try:
-                if self._write_waiting() and not closing and monotonic() - synced >= SYNC:
-                    self._file.sync()
-                    synced = monotonic()
+                self._write_waiting()
             except OSError as error:
                 self._fail(error.strerror or str(error))
             if closing:
                 return
 
-    def _write_waiting(self) -> bool:
-        """Write the messages that wait as one chunk; return whether there were any."""
+    def _sync_all(self, descriptor: int) -> None:
+        """Have the disk keep what is written, also if the machine loses its power, once a `SYNC` until the end.
+
+        A busy disk takes its time for that, and the writer must not wait for it.
+        """
+        with contextlib.suppress(OSError):  # of a full disk, which the writer tells
+            while not self._closed.wait(SYNC):
+                os.fsync(descriptor)
+        os.close(descriptor)
+
+    def _write_waiting(self) -> None:
+        """Write the messages that wait as one chunk."""
         with self._lock:
             items, self._waiting = self._waiting, []
             self._bytes = 0
@@ -190,7 +199,6 @@ class RecordWriter:
         if items:
             self._flush()
             self.ended = items[-1].t
-        return bool(items)
 
     def _flush(self) -> None:
         self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it

@@ -61,6 +61,8 @@ class RecordedDecision:
     """Agents of the run that the graph makes in-neighbours, but that were not there: not started, gone, or not met."""
     before: tuple[float, float]
     """Set-points (W, V) before the decision."""
+    restarted: bool
+    """Whether the agent started, or started again after a pause, from the set-points of its measurement."""
     saturated: tuple[int, int]
     """Saturated sides of P and V: 1, -1 or 0; see `agents.laws.law.Own`."""
     action: Action

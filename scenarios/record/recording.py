@@ -12,9 +12,9 @@ from scenarios.record.viewer_messages import PhysicsTemplate, event_json, nanose
 from wire.codec import payload_of
 from wire.messages import Journal, LinkReport, LinkRequest, Telemetry
 
-VIEW_STEP = 0.2
-"""Least distance (s) of the rows that viewers get in simulated time: each takes as long as a decision, and all rows are
-in the telemetry."""
+VIEW_STEP, LIVE_VIEW_STEP = 0.2, 0.05
+"""Least distance (s) of the rows that viewers get in simulated time, where each takes as long as a decision, and in
+wall-clock time, where they take a quarter of the file at 0.01 s. All rows are in the telemetry."""
 
 
 class Recording:
@@ -39,7 +39,9 @@ class Recording:
         self._writer = RecordWriter(folder / FILE, info, channels(info.inverters, tuple(quantities)))
         self._quantities = quantities
         self._template: PhysicsTemplate | None = None
-        self._step = 0 if info.clock == "wall" else nanoseconds(VIEW_STEP)
+        self._step = nanoseconds(LIVE_VIEW_STEP if info.clock == "wall" else VIEW_STEP)
+        self._t = 0.0
+        """Time (s) of the last telemetry."""
         self._shown: int | None = None
         """Time (ns) of the last row for viewers."""
 
@@ -53,7 +55,7 @@ class Recording:
 
     def telemetry(self, message: Telemetry, lines: Sequence[bytes]) -> None:
         """Record rows and events; `lines` are the rows' lines in history.csv."""
-        writer = self._writer
+        writer, self._t = self._writer, message.t
         if self._template is None:
             self._template = PhysicsTemplate(message.inverters, self._quantities)
         writer.add("telemetry", nanoseconds(message.t), message.seq, payload_of(message))
@@ -66,8 +68,9 @@ class Recording:
             writer.add("events", nanoseconds(event.t), 0, event_json(event))
 
     def message(self, message: Journal | LinkReport | LinkRequest) -> None:
-        """Record another message of the plant for recorders."""
-        self._writer.add(TOPICS[type(message)], nanoseconds(message.t), message.seq, payload_of(message))
+        """Record another message of the plant for recorders; reports on links have no time of their own."""
+        at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
+        self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
 
     def close(self) -> None:
         """Write what is left, and close the file."""

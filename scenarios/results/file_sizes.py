@@ -10,6 +10,7 @@ from agents.graphs import GraphError
 from agents.topology import in_neighbours
 from netem.schema.pattern import Link
 from plant.equipment import Feeder
+from scenarios.results.metrics_file import Clock
 from scenarios.results.record import QUANTITIES
 from scenarios.results.run_files import FolderError, shown
 from scenarios.schema import ScenarioModel
@@ -23,6 +24,16 @@ NUMBER = 18
 
 VERDICT, VERDICT_UNDER_WAY = 36, 26
 """Bytes of a message's row in links.csv, and in the file of the case that gives way to it."""
+
+RECORDED_NUMBER = 6
+"""Bytes of a number of telemetry in run.mcap, compressed: 5.2 to 7.5 measured with the rows for viewers."""
+
+RECORDED_DECISION = {"simulated": 75, "wall": 150}
+"""Bytes of a decision in run.mcap with its measurement and its state, compressed, by kind of time: 50 (75 in one
+process) and 135 measured."""
+
+RECORDED_ARRIVAL, RECORDED_VERDICT = 9, 8
+"""Bytes of a message that arrives in wall-clock time, and of a verdict of an emulated link: 7.7 and 3 to 9 found."""
 
 LONG = 20_000_000
 """Bytes from which on a run's size is told before its start."""
@@ -40,6 +51,8 @@ class FileSizes(NamedTuple):
     """All history.csv."""
     links: int
     """All links.csv."""
+    record: int
+    """All run.mcap."""
     room: int
     """The most that the run takes on the disk at one time."""
 
@@ -49,31 +62,44 @@ class FileSizes(NamedTuple):
 
         Examples
         --------
-        >>> FileSizes(history=60_000_000, links=0, room=60_000_000).sentence
-        'writes about 60 MB: history.csv 60 MB'
-        >>> FileSizes(history=1_000_000, links=0, room=1_000_000).sentence
+        >>> FileSizes(history=60_000_000, links=0, record=30_000_000, room=90_000_000).sentence
+        'writes about 90 MB: history.csv 60 MB, run.mcap 30 MB'
+        >>> FileSizes(history=1_000_000, links=0, record=1_000_000, room=2_000_000).sentence
         ''
         """
-        if self.history + self.links < LONG:
+        whole = self.history + self.links + self.record
+        if whole < LONG:
             return ""
         links = f", links.csv {self.links / MB:.0f} MB" if self.links else ""
-        return f"writes about {(self.history + self.links) / MB:.0f} MB: history.csv {self.history / MB:.0f} MB{links}"
+        parts = f"history.csv {self.history / MB:.0f} MB{links}, run.mcap {self.record / MB:.0f} MB"
+        return f"writes about {whole / MB:.0f} MB: {parts}"
 
 
-def file_sizes(scenario: ScenarioModel, feeder: Feeder, seconds: float | None = None) -> FileSizes:
+def file_sizes(
+    scenario: ScenarioModel, feeder: Feeder, seconds: float | None = None, clock: Clock = "simulated"
+) -> FileSizes:
     """Return the size of the files of all cases of a scenario, which last for their own or other `seconds`.
 
-    Links count where a fault may act on them, each with a message a tick.
+    Links count where a fault may act on them, each with a message a tick. A record is compressed: what it takes depends
+    on the run, by a third or so.
     """
     time, end = scenario.time, scenario.time.end_s if seconds is None else seconds
     rows, ticks = round(end / time.record_s) + 1, round(end / time.T_c_s)
-    history = links = most = 0
+    history = links = record = most = 0
     for case in scenario.cases:
-        history += rows * (1 + len(QUANTITIES) * len(inverters_of(scenario, feeder))) * NUMBER
+        numbers = rows * (1 + len(QUANTITIES) * len(inverters_of(scenario, feeder)))
+        history += numbers * NUMBER
         messages = ticks * _impaired_links(scenario, feeder, case)
         links += messages * VERDICT
         most = max(most, messages * VERDICT_UNDER_WAY)
-    return FileSizes(history, links, history + links + most)
+        record += numbers * RECORDED_NUMBER
+        if scenario.record != "physics":
+            agents = len(with_agent(scenario, feeder, case))
+            record += ticks * agents * RECORDED_DECISION[clock] + messages * RECORDED_VERDICT
+            if clock == "wall" and scenario.record == "all":  # its measurement, and its state at the plant, too
+                links_used = len(_links_of_agents(scenario, feeder, case))
+                record += ticks * (links_used + 2 * agents) * RECORDED_ARRIVAL
+    return FileSizes(history, links, record, history + links + record + most)
 
 
 def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None:
@@ -102,9 +128,17 @@ def _impaired_links(scenario: ScenarioModel, feeder: Feeder, case: str) -> int:
     netem = setup.netem
     if not (netem.links or netem.partitions):
         return 0
+    members = [row.name for row in with_agent(scenario, feeder, case)]
+    used = [link for name in members for link in (Link(PLANT, name), Link(name, PLANT))]
+    used += _links_of_agents(scenario, feeder, case)
+    return sum(bool(netem.spans(link, setup.microgrids)) for link in used)
+
+
+def _links_of_agents(scenario: ScenarioModel, feeder: Feeder, case: str) -> list[Link]:
+    """Return the links between agents that carry messages in a case."""
     members = {row.name: row for row in with_agent(scenario, feeder, case)}
     _, agents = configs(scenario, feeder, case)
-    used = [link for name in members for link in (Link(PLANT, name), Link(name, PLANT))]
+    used: list[Link] = []
     for agent in agents:
         if agent.name not in members:
             continue
@@ -113,4 +147,4 @@ def _impaired_links(scenario: ScenarioModel, feeder: Feeder, case: str) -> int:
         except GraphError:
             heard = tuple(other for other in members if other != agent.name)
         used += [Link(other, agent.name) for other in heard]
-    return sum(bool(netem.spans(link, setup.microgrids)) for link in used)
+    return used

@@ -17,6 +17,7 @@ from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import Method, Protection, SyncCheck
 from plant.simulator import Simulator
+from wire.journal import RecordLevel
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Divides, MultipleOf
 from wire.schema.table_schema import INHERITED, INLINE, Example, Label
@@ -198,6 +199,9 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     "switching", "plug-n-play", "wind-up", those of the paper, or your own as "module:Name"; "" judges nothing."""
     seed: Annotated[int, Plausible("a seed", 0, 2**63 - 1)] = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""
+    record: RecordLevel = "all"
+    """What the record run.mcap of each case has: "all", decisions of agents with their inputs but no arrivals
+    ("decisions"), or rows and events alone ("physics")."""
     metrics: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
     """Metrics of your own, measured in every window: ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05, name =
     "within_50mHz" }] (`gridpeers doc metrics`)."""

@@ -70,9 +70,10 @@ def test_agents_with_a_memory(scenario: str, case: str, tmp_path: Path) -> None:
     assert_decisions_are_recorded(recorded_run(scenario, case, tmp_path / case))
 
 
-def test_with_messages_and_without_the_record_has_the_same(tmp_path: Path) -> None:
-    """The direct way notes what the bus would have carried: each state and measurement, and each decision."""
-    direct = recorded_run("islanding", "III", tmp_path / "direct")
+@pytest.mark.parametrize("way", ["direct", "processes"])
+def test_with_messages_and_without_the_record_has_the_same(way: str, tmp_path: Path) -> None:
+    """Every driver notes what the bus carries: each state and measurement, and each decision."""
+    direct = recorded_run("islanding", "III", tmp_path / "direct", processes=way == "processes")
     bus = recorded_run("islanding", "III", tmp_path / "bus", messages=True)
 
     for kind in ("Measurement", "State"):

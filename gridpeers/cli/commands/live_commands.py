@@ -70,7 +70,7 @@ def _start(
     spec, feeder = load(scenario)
     with usage_errors():
         from scenarios.live.link_log import LinkLog, check_new
-        from scenarios.live.live_folders import LIVE, folders
+        from scenarios.live.live_folders import LIVE, folders, live_record
         from scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
         from scenarios.live.live_processes import all_here, plant_here, say
         from scenarios.live.numbers.live_report import conclude
@@ -79,10 +79,12 @@ def _start(
 
         check_new("--record", record)
         spec = chosen(spec, chosen_case(spec, case), None)
-        options = LiveOptions(run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict)
+        options = LiveOptions(
+            run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict, recorded=out is not None
+        )
         config, everyone = configure(spec, feeder, options, endpoint, beyond)
         watch_readers(quits=False)
-        sizes = file_sizes(spec, feeder, HOUR if duration is None else duration)
+        sizes = file_sizes(spec, feeder, HOUR if duration is None else duration, "wall")
         if out is not None and duration is not None:
             require_room(out, sizes, "--out")
         with folders(out, spec) as kept:
@@ -91,14 +93,15 @@ def _start(
                 say(f"run {run}: {'an hour' if duration is None else f'{duration:g} s'} {sizes.sentence}")
             replay = None if out is None else out / "replay.toml"
             link_log = LinkLog(spec, feeder, record, replay)
+            info = live_record(spec, config, everyone, tuple(row.name for row in (*feeder.inverters, *feeder.spares)))
             if agents:
                 watch, down = command_line("watch"), command_line("down")
                 say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
-                outcome = all_here(config, everyone, kept.logs, kept.record, link_log)
+                outcome = all_here(config, everyone, kept.logs, kept.record, link_log, info)
             else:
                 if note := manual_node_faults(spec):
                     say(note)
-                outcome = plant_here(config, kept.record, link_log)
+                outcome = plant_here(config, kept.record, link_log, info)
             if kept.whole is not None:
                 metrics = RunMetrics(
                     scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=speed

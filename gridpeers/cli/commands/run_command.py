@@ -131,7 +131,7 @@ def carry_out(
     try:
         if driver == "processes":
             free_endpoint(local_endpoint(spec.processes.port), option="processes.port")
-        sizes = file_sizes(spec, feeder)
+        sizes = file_sizes(spec, feeder, clock=pace.get("clock", "simulated"))
         require_room(out or RUNS, sizes, "--out")
         folder = new_folder(out, spec.name, datetime.now().astimezone())
     except (ListenError, FolderError) as error:

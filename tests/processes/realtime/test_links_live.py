@@ -239,7 +239,13 @@ def test_live_links_from_set_to_replay(desk: Desk) -> None:
     plant.expect(r"emulated links: \d+ messages over \d+ links, dropped: .* \(links.json, links.csv\)")
 
     case = desk.folder / "here" / "IV"
-    assert sorted(path.name for path in case.iterdir()) == ["events.csv", "history.csv", "links.csv", "links.json"]
+    assert sorted(path.name for path in case.iterdir()) == [
+        "events.csv",
+        "history.csv",
+        "links.csv",
+        "links.json",
+        "run.mcap",
+    ]
     events = (case / "events.csv").read_text()
     assert events.count(',link,links,"link command ') == 3
     assert (desk.folder / "here" / "replay.toml").read_text() == (desk.folder / "again.toml").read_text()

@@ -188,7 +188,7 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     up.expect(r"NOTE  case IV: ended at .* s, before the end of late \(0.6 to 3600 s\): they have no numbers")
     here = desk.folder / "here"
     assert (here / "status.txt").read_text() == "complete\n"
-    assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv"]
+    assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv", "run.mcap"]
     metrics = json.loads((here / "metrics.json").read_text())
     assert metrics["live"] | {"ended_s": 0.0} == {
         **{"ended_s": 0.0, "windows": {}, "too_short": []},

@@ -14,6 +14,7 @@ from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
 from scenarios.schema.configs import configs
 from tests.command_line import invoke
+from tests.record.recorded_runs import recorded_run
 
 ISLANDING = gp.load("islanding").replace({"paper": None})
 
@@ -60,16 +61,32 @@ def test_links_without_a_fault_write_nothing() -> None:
 
 
 def test_a_live_run_without_an_end_is_told_by_the_hour() -> None:
-    """An hour of nine inverters is 356 MB, whatever the scenario's own end is."""
-    forecast = file_sizes(with_cases(ISLANDING.spec, ["IV"]), ISLANDING.feeder, 3600.0)
+    """An hour of nine inverters is 356 MB of history, whatever the scenario's own end is, and as much of record."""
+    forecast = file_sizes(with_cases(ISLANDING.spec, ["IV"]), ISLANDING.feeder, 3600.0, "wall")
 
-    assert forecast.sentence == "writes about 356 MB: history.csv 356 MB"
+    assert forecast.sentence == "writes about 864 MB: history.csv 356 MB, run.mcap 508 MB"
+
+
+def test_a_record_has_about_the_size_that_was_told(tmp_path: Path) -> None:
+    """In simulated time, with the physics alone, and with emulated links."""
+    delayed = ISLANDING.replace({"link": [{"on": "* <-> *", "delay": 0.05}]})
+    for name, scenario in (
+        ("all", ISLANDING),
+        ("physics", ISLANDING.replace({"record": "physics"})),
+        ("links", delayed),
+    ):
+        file = tmp_path / f"{name}.toml"
+        file.write_text(scenario.to_toml(), encoding="utf-8")
+        written = recorded_run(file, "IV", tmp_path / name, level=scenario.spec.record).path.stat().st_size
+        forecast = file_sizes(with_cases(scenario.spec, ["IV"]), scenario.feeder)
+
+        assert forecast.record == pytest.approx(written, rel=0.35)
 
 
 def test_check_tells_the_size_of_a_long_run(tmp_path: Path) -> None:
-    """Four cases of ten minutes are some 240 MB; the experiment itself is too short to speak of."""
+    """Four cases of ten minutes are some 400 MB; the experiment itself is too short to speak of."""
     code, output = invoke("check", str(long_run(tmp_path)))
-    assert (code, "writes about 238 MB: history.csv 238 MB" in output) == (0, True)
+    assert (code, "writes about 398 MB: history.csv 238 MB, run.mcap 160 MB" in output) == (0, True)
 
     assert "writes" not in invoke("check", "islanding")[1]
 
@@ -80,7 +97,7 @@ def test_a_disk_without_room_refuses_a_run_in_one_line(tmp_path: Path, monkeypat
     monkeypatch.setattr(shutil, "disk_usage", lambda path: Usage())
 
     code, output = invoke("run", str(file), "--driver", "inprocess", "--out", str(out))
-    assert (code, "needs about 238 MB, and its disk has 5 MB left" in output.replace("\n", " ")) == (2, True)
-    with pytest.raises(FolderError, match="needs about 238 MB, and its disk has 5 MB left"):
+    assert (code, "needs about 398 MB, and its disk has 5 MB left" in output.replace("\n", " ")) == (2, True)
+    with pytest.raises(FolderError, match="needs about 398 MB, and its disk has 5 MB left"):
         gp.load(file).run(folder=out)
     assert not out.exists()

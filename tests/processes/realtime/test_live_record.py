@@ -1,0 +1,130 @@
+"""The record of runs in wall-clock time: what arrived when, what came of it, and what a dead process leaves behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from netem.models.delay import Normal
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
+from plant.plant_config import PlantConfig
+from scenarios.drivers.process_driver import run_processes
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.recomputation import recomputed
+from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.record import Recorder
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import TOY
+from wire.journal import Process, Token, Woken
+
+
+def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> RunRecord:
+    """Run the toy in wall-clock time, and return its record."""
+    info = RecordInfo(
+        level=plant.record,
+        scenario="toy",
+        case="wall",
+        toml="",
+        seed=7,
+        driver="processes",
+        versions={},
+        inverters=plant.agents,
+        plant=plant,
+        agents=tuple(agents),
+    )
+    with Recorder(folder / "wall", gaps=True, record=info) as recorder:
+        outcome = run_processes(
+            plant, agents, folder / "log", recorder, on_links=recorder, on_journal=recorder, plant_command=TOY
+        )
+        assert outcome.broke == ""
+        recorder.finish(recorder.ended, recorder.record_step)
+    return RunRecord.open(folder / "wall")
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """Four agents for 3 s, with losses and delays, a partition, a pause, and a kill."""
+    faults = (
+        Fault(on="inv1 -> *", loss=0.2, delay=Normal(mean_s=0.05, std_s=0.02), duplicate=0.1),
+        Fault(on="plant -> inv2", loss=0.1),
+    )
+    netem = Netem(
+        seed=7,
+        links=faults,
+        partitions=(Partition(groups=(("inv1", "inv2"), ("inv3", "inv4")), from_s=0.5, to_s=1.1),),
+        nodes=(NodeFault(name="inv3", pause=True, from_s=1.3, to_s=2.1), NodeFault(name="inv4", kill=True, from_s=2.4)),
+    )
+    microgrids = {f"inv{k}": "mg1" for k in (1, 2, 3, 4)}
+    links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
+    plant, agents = toy_configs(4, end=3.0)
+    wall = {"clock": "wall", "links": links, "record": "all"}
+    folder = tmp_path_factory.mktemp("wall")
+    return recorded(folder, replace(plant, **wall), [replace(agent, **wall) for agent in agents])
+
+
+def test_every_decision_can_be_made_again(record: RunRecord) -> None:
+    """From what had arrived by then the same core decides the same to the byte; also around a pause and a restart."""
+    assert record.complete
+    for agent in record.agents:
+        again = list(recomputed(record, agent))
+        assert len(again) > 60
+        assert [each.decision.tick for each in again if not each.agrees] == []
+        assert sum(each.decision.restarted for each in again) >= 1
+
+
+def test_a_decision_says_whom_it_left_out_and_why(record: RunRecord) -> None:
+    """In the partition the states of the other side grow old; of a killed neighbour no more is known."""
+
+    def reasons(agent: str, other: str, since: float, until: float) -> set[str]:
+        return {
+            each.unused
+            for decision in record.decisions(agent, since=since, until=until)
+            for each in decision.neighbours
+            if each.name == other
+        }
+
+    assert reasons("inv2", "inv3", 0.85, 1.05) == {"stale"}
+    assert reasons("inv2", "inv1", 0.85, 1.05) == {""}
+    assert reasons("inv1", "inv3", 1.7, 2.0) == {"stale"}
+    assert all("inv4" in decision.not_met for decision in record.decisions("inv1", since=2.7, until=2.9))
+
+
+def test_what_was_heard_is_there_with_its_time(record: RunRecord) -> None:
+    """Arrivals are in order on the receiver's clock, each with the message that its sender noted."""
+    for agent in ("inv1", "inv2", "plant"):
+        heard = [each for each in record.heard(agent) if each.kind in ("State", "Measurement")]
+        assert len(heard) > 200
+        times = [each.at for each in heard if each.at is not None]
+        assert len(times) == len(heard)
+        assert sum(each.message is None for each in heard) <= 12  # the last of the killed one
+    fates = {outcome if isinstance(outcome, str) else "passed" for trace in record.links() for outcome in trace.outcome}
+    assert fates >= {"passed", "loss", "partition"}
+
+
+def test_a_journal_has_what_a_core_is_to_be_given_again(record: RunRecord) -> None:
+    """Start, tokens and each time at which it was woken, in the order in which they came."""
+    entries = list(record.entries("inv1"))
+    first = entries[0]
+    assert isinstance(first, Process)
+    assert first.kind == "start"
+    assert sum(isinstance(entry, Woken) for entry in entries) > 100
+    assert {entry.key.split("/")[1] for entry in entries if isinstance(entry, Token)} >= {"agent", "plant"}
+    assert [entry.appeared for entry in entries if isinstance(entry, Token) and "inv4" in entry.key] == [True, False]
+
+
+def test_decisions_alone_leave_arrivals_out(tmp_path: Path) -> None:
+    """With "decisions" the inputs of each decision are there, and nothing of what else arrived."""
+    plant, agents = toy_configs(3, end=0.6)
+    wall = {"clock": "wall", "record": "decisions"}
+    record = recorded(tmp_path, replace(plant, **wall), [replace(agent, **wall) for agent in agents])
+
+    assert all(each.agrees for each in recomputed(record, "inv1"))
+    assert sum(1 for _ in record.decisions("inv1")) > 15
+    assert list(record.heard("inv1")) == []

@@ -1,0 +1,119 @@
+"""Kill commands at random moments and see what their records lack: ``python -m tests.record.killed_commands 20``."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Literal, NamedTuple
+
+from scenarios.record.recomputation import recomputed
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.record import PARTIAL
+
+LONG = """
+[time]
+end_s = 600.0
+[[event]]
+label = "event1"
+t_s = 1.0
+open = ["13-152"]
+[case.IV]
+secondary = "all"
+graph = "full"
+[[link]]
+on = "inv1 -> *"
+loss = 0.1
+"""
+
+
+class Left(NamedTuple):
+    """What a killed command has left behind."""
+
+    record: RunRecord
+    history: float
+    """Last run time in the history (s)."""
+    lost: float
+    """Wall time (s) by which the record ends before the history, at the pace of the run."""
+
+
+def killed(folder: Path, clock: Literal["simulated", "wall"], after: float, who: str = "command") -> Left:
+    """Run a case until its first row is there, kill a process some time (s) later, and open what is left."""
+    folder.mkdir(parents=True)
+    (folder / "long.toml").write_text(LONG, encoding="utf-8")
+    words = [sys.executable, "-m", "gridpeers", "run", "long.toml", "--clock", clock, "--out", "out"]
+    command = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    history = folder / "out" / "IV" / PARTIAL
+    try:
+        began = _wait_for_rows(command, history)
+        sleep(after)
+        process = command.pid if who == "command" else _process(command.pid, who)
+        first, t = began
+        os.kill(process, signal.SIGKILL)
+        killed_at = monotonic()
+        if who != "command":  # the run goes on, or ends by itself; what it records meanwhile is of no interest
+            sleep(0.3)
+    finally:
+        command.kill()
+        command.wait()
+    last = _last_time(history)
+    record = RunRecord.open(folder / "out" / "IV")
+    pace = 1.0 if clock == "wall" else max((last - t) / (killed_at - first), 1e-9)
+    return Left(record, last, max(0.0, last - record.t_end) / pace)
+
+
+def _wait_for_rows(command: subprocess.Popen[bytes], history: Path) -> tuple[float, float]:
+    """Wait for the first rows; return when they came, and their run time."""
+    deadline = monotonic() + 120.0
+    while monotonic() < deadline:
+        assert command.poll() is None, "the command ended by itself"
+        if history.exists() and history.stat().st_size > 5000:
+            return monotonic(), _last_time(history)
+        sleep(0.02)
+    raise AssertionError("no rows within 120 s")
+
+
+def _last_time(history: Path) -> float:
+    rows = history.read_bytes().split(b"\n")
+    return float(rows[-2].split(b",")[0])
+
+
+def _process(parent: int, name: str) -> int:
+    """Return the process of the run with a name, a child of the command."""
+    found = subprocess.run(["pgrep", "-P", str(parent), "-f", name], capture_output=True, text=True, check=False)
+    return int(found.stdout.split()[0])
+
+
+def assert_usable(left: Left) -> None:
+    """The record opens, lacks at most the last second, and decisions are made again from all that it has."""
+    record = left.record
+    assert not record.complete
+    assert any("cut off" in text for text in record.damage)
+    assert left.lost <= 1.0, f"{left.lost:.2f} s lost: history to {left.history:.2f} s, record to {record.t_end:.2f} s"
+    assert len(record.physics().t) > 1
+    for agent in record.agents[:2]:
+        again = list(recomputed(record, agent))
+        assert all(each.agrees for each in again)
+        assert left.history < 1.0 or again
+
+
+def main() -> None:
+    """Kill as many commands of each clock as asked for."""
+    draws = random.Random(15)
+    for number in range(int(sys.argv[1])):
+        for clock in ("simulated", "wall"):
+            after = draws.uniform(0.0, 4.0)
+            with tempfile.TemporaryDirectory() as folder:
+                left = killed(Path(folder) / "run", "wall" if clock == "wall" else "simulated", after)
+                assert_usable(left)
+                reach = f"history to {left.history:.2f} s, record to {left.record.t_end:.2f} s"
+                print(f"{number} {clock}: killed after {after:.2f} s; {reach}: {left.lost:.2f} s lost", flush=True)
+
+
+if __name__ == "__main__":
+    main()
