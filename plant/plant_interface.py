@@ -75,6 +75,11 @@ class PlantLike(Protocol):
 class LivePlant(PlantLike, Protocol):
     """The further part that wall-clock time uses: switches that people operate."""
 
+    @property
+    def switches(self) -> Mapping[str, bool]:
+        """Position of each switch, by its name: whether it is closed. Empty where another program has the switches."""
+        ...
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.
 

@@ -88,6 +88,8 @@ def run_plant(
             session.prepare(key)
         for name, agent_config in config.agent_configs.items():
             session.answer(node.keys.config(name), msgspec.json.encode(agent_config))
+        if config.feeder_map:
+            session.answer(node.keys.feeder_map, msgspec.json.encode(config.feeder_map))
         gc.freeze()  # the plant stays: later collections can skip it
         on_word(READY)
         try:

@@ -84,6 +84,11 @@ class Reporter:
         self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
         """The latest events, for late clients."""
 
+    @property
+    def has_events(self) -> bool:
+        """Whether events wait for the next report."""
+        return bool(self._events)
+
     def collect(self) -> None:
         """Take the plant's new rows and events."""
         self._rows += self._plant.take_rows()

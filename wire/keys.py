@@ -74,6 +74,7 @@ class Keys:
         self.control = f"{self._root}/control"
         self.telemetry = f"{self._root}/telemetry"
         self.command = f"{self._root}/command"
+        self.feeder_map = f"{self._root}/feeder_map"
         self.any_alive = f"{self._root}/alive/**"
 
     def measurement(self, inverter: str) -> str:
@@ -267,6 +268,10 @@ def describe() -> tuple[KeySpec, ...]:
         row(
             keys.config(agent), "queryable", "-", "plant", "an agent of a live run",
             "wall-clock: asked once the plant's token is there; its AgentConfig as JSON",
+        ),
+        row(
+            keys.feeder_map, "queryable", "-", "plant", "a client that draws the feeder",
+            "wall-clock: asked once the plant's token is there; buses, branches, switches, inverters as JSON",
         ),
         row(
             keys.command, "publication", "Command", "command line", "plant",

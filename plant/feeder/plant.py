@@ -176,6 +176,11 @@ class Plant:
         if events := self._set_points.held(name, t, "V_set", V_set, V * V_nom):
             self._events += events
 
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Position of each switch now, by its name: whether it is closed."""
+        return self._switches.positions
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch now ("open" or "close"), by its name or alias, from the next step on.
 

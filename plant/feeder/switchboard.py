@@ -57,6 +57,11 @@ class Switchboard:
             self.put(round(event.t / h), event.switch, event.action, synchronised=event.synchronised)
 
     @property
+    def positions(self) -> dict[str, bool]:
+        """Position of each switch now, by its name: whether it is closed."""
+        return {name: name in self.closed for name in self._network.switches}
+
+    @property
     def steps(self) -> Collection[int]:
         """Steps with operations to come."""
         return self._at.keys()

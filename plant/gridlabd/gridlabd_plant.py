@@ -160,6 +160,11 @@ class GridlabdPlant:
             self._writes.append((name, "Pref", P_set if own.P_set_lim == own.S_max else P * unit.P_rated))
         self._writes.append((name, "Vset", V))
 
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Position of each switch now, by its name: whether it is closed."""
+        return self._schedule.positions
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already."""
         if synchronised:

@@ -57,6 +57,11 @@ class GridlabdSchedule:
         """Return the later steps at which something happens."""
         return (at for at in (*self._switches.steps, *self._limits) if at > step)
 
+    @property
+    def positions(self) -> dict[str, bool]:
+        """Position of each switch now, by its name: whether it is closed."""
+        return self._switches.positions
+
     def put(self, step: int, name: str, action: str) -> bool:
         """Operate a switch ("open" or "close") at a step; return whether it is in that state already."""
         known = self._network.switch_name(name)

@@ -86,6 +86,11 @@ class BridgedPlant:
         """Connect or disconnect an inverter."""
         self._plant.connect(name, on)
 
+    @property
+    def switches(self) -> Mapping[str, bool]:
+        """Position of each switch."""
+        return self._plant.switches
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch."""
         return self._plant.switch(name, action, synchronised=synchronised)

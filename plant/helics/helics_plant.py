@@ -100,6 +100,11 @@ class HelicsPlant:
         """Refuse: there is no topic for it."""
         raise HelicsError(f"{name} cannot {'join' if on else 'leave'}: a HELICS plant has its inverters all the time")
 
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Return none: the outside plant has the switches."""
+        return {}
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Refuse: the outside plant has the switches."""
         raise ValueError(f"{name}: the outside plant has the switches, and HELICS no topic for them")

@@ -11,6 +11,8 @@ nothing is applied to a time that is past.
 
 from __future__ import annotations
 
+from math import inf
+
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.plant_node import CLOSING
@@ -53,6 +55,8 @@ class RealtimePlant(LivePlantNode):
         self._report_ticks = REPORT_TICKS if self.journal is None else max(1, round(LINKS / self.pacer.period))
         """Steps between two reports on the links into the plant."""
         self._step_due = False
+        self._next_event_report = -inf
+        """Time (s) before which events wait for the next telemetry: many events must not be many messages."""
         self._deadline = 0.0
         self._waiting_timer = Timer(WAITING, 0.0)
         self._warnings = RateLimit(burst=5)
@@ -222,7 +226,7 @@ class RealtimePlant(LivePlantNode):
         for name, text in self._silence.take(now):
             self._note(name, text)
         self._reporter.collect()
-        if self.tick % self._telemetry_ticks == 0 or self.tick == 1:
+        if self.tick % self._telemetry_ticks == 0 or self.tick == 1 or self._event_is_due(now):
             self._report(final=False)
             self._report_journal()
         if self.tick % self._report_ticks == 0:
@@ -230,6 +234,13 @@ class RealtimePlant(LivePlantNode):
         return True
 
     # ---------------------------------------------------------------- events and telemetry
+
+    def _event_is_due(self, now: float) -> bool:
+        """Return whether events are to be reported before the next telemetry, so that watchers see them at once."""
+        if not self._reporter.has_events or now < self._next_event_report:
+            return False
+        self._next_event_report = now + TELEMETRY
+        return True
 
     @property
     def events(self) -> tuple[PlantEvent, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -12,6 +13,10 @@ from wire.timing.clock import time_of
 
 if TYPE_CHECKING:
     from plant.realtime.realtime_plant import RealtimePlant
+
+
+MOST_SWITCHES = 500
+"""Most switches in a status, which must fit into an answer."""
 
 
 class RunCommands:
@@ -118,6 +123,7 @@ class RunCommands:
             "agents": self._agents(present=True),
             "absent": self._agents(present=False),
             "events": msgspec.to_builtins(node.events),
+            "switches": dict(islice(node.plant.switches.items(), MOST_SWITCHES)),
             "impaired": list(node.link_commands.impaired(node.t)),
             "rejected": sum(node.rejects.counts.values()),
         }

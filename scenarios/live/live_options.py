@@ -9,6 +9,7 @@ import msgspec
 from agents.agent_config import AgentConfig
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
+from scenarios.live.feeder_map import feeder_map
 from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
@@ -109,6 +110,7 @@ def configure(
         connect=beyond,
         wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
         strict=options.strict,
+        feeder_map=msgspec.to_builtins(feeder_map(feeder)),
         agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
     )
     return plant, everyone

@@ -84,6 +84,11 @@ class ToyPlant:
             self._events.append(PlantEvent(t=self._t, kind="switch", subject="toy", text="the grid is lost"))
         self._rows.append(self._row())
 
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Position of the only switch."""
+        return {"sw1": self._stands == "close"}
+
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate the only switch there is; it does nothing but tell, and stands as it was told last."""
         if name != "sw1":

@@ -41,6 +41,8 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     """The latest, oldest first."""
     impaired: tuple[str, ...] = ()
     """Agents whose link to or from the plant has an emulated fault."""
+    switches: dict[str, bool] = {}
+    """Position of each switch, by its name: whether it is closed."""
 
 
 class RunMonitor:
@@ -93,7 +95,7 @@ class RunMonitor:
         self._plant_status, self._impaired = status, status.impaired
         if status.phase != "gathering":
             self._t, self._pacing = status.t, status.pacing
-        self._events.extend(status.events)
+        self._events.extend(event for event in status.events if event not in self._events)
 
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Note the plant's telemetry; `now` is the client's clock (s)."""
@@ -119,7 +121,7 @@ class RunMonitor:
         """Note the status of an agent."""
         self._status[message.sender] = (message, now)
 
-    def snapshot(self, present: Collection[str], now: float) -> Snapshot:
+    def snapshot(self, present: Collection[str], now: float, *, current: bool = True) -> Snapshot:
         """Return a snapshot.
 
         Parameters
@@ -128,8 +130,10 @@ class RunMonitor:
             Inverters whose agents have a token.
         now : float
             The client's clock (s).
+        current : bool, optional
+            Whether the plant's values are of now; it is decided here too.
         """
-        pace, current = self._pace(), True
+        pace = self._pace()
         if self._end is not None:
             pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
         elif self._heard_at is not None and now - self._heard_at > SILENT:

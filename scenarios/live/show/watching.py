@@ -8,10 +8,12 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from time import monotonic
+from typing import Protocol
 
 from rich.console import Console
 from rich.live import Live
 
+from agents.agent_config import AgentConfig
 from scenarios.live.run_client import RunClient
 from scenarios.live.run_requests import plant_status, read_config
 from scenarios.live.show.render import plain, table
@@ -36,6 +38,31 @@ QUIT = ("q", "Q", "\x1b")
 """Keys that end it."""
 
 
+class TakesMessages(Protocol):
+    """The part of a `RunMonitor` that takes messages; the page's view has it too."""
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of all inverters in the messages so far."""
+        ...
+
+    def config(self, config: AgentConfig) -> None:
+        """Take the configuration of an agent."""
+        ...
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        """Take the plant's telemetry."""
+        ...
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Take the status of an agent."""
+        ...
+
+
+def leave_out(key: str, payload: bytes) -> None:
+    """Leave out what is neither telemetry nor the status or configuration of an agent."""
+
+
 class RunSubscriber:
     """Feed the messages of a run into a monitor.
 
@@ -43,12 +70,16 @@ class RunSubscriber:
     ----------
     client : RunClient
         At the run.
-    monitor : RunMonitor
+    monitor : TakesMessages
         Takes the messages.
+    on_other : Callable[[str, bytes], None], optional
+        Called with key and payload of every other message.
     """
 
-    def __init__(self, client: RunClient, monitor: RunMonitor) -> None:
-        self._client, self._monitor = client, monitor
+    def __init__(
+        self, client: RunClient, monitor: TakesMessages, on_other: Callable[[str, bytes], None] = leave_out
+    ) -> None:
+        self._client, self._monitor, self._on_other = client, monitor, on_other
         self._subscribed: set[str] = set()
         self._plant = client.plant
         self._heard_at: dict[str, float] = {}
@@ -74,6 +105,7 @@ class RunSubscriber:
                 self._monitor.status(message, at)
                 self._used[message.sender] = message.used
             else:
+                self._on_other(key, payload)
                 continue
             self._heard_at[message.sender] = at
             heard.append(message)

@@ -301,6 +301,25 @@ def test_what_cannot_be_done_is_answered_with_what_there_is(verb: str, argument:
     assert (answer.ok, answer.text) == (False, text)
 
 
+def test_who_watches_hears_of_an_event_at_once() -> None:
+    """An event comes with the step in which it happens, not with the next telemetry; a flood of them waits for that."""
+    lab = running()
+    lab.step(2)
+    lab.take(Telemetry)
+
+    lab.ask("open", "sw1")
+    lab.step()
+    first = lab.take(Telemetry)
+    lab.ask("close", "sw1")
+    lab.step()
+
+    assert [event.text for message in first for event in message.events] == ["sw1: open"]
+    assert lab.take(Telemetry) == []
+    lab.step(10)
+    assert "sw1: close" in [event.text for message in lab.take(Telemetry) for event in message.events]
+    assert lab.ask("status").data["switches"] == {"sw1": True}
+
+
 def test_an_interrupted_plant_leaves_its_agents_to_the_next_one() -> None:
     """SIGTERM: the last telemetry goes out, but no Stop."""
     lab = running()

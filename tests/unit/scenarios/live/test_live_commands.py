@@ -16,7 +16,7 @@ from scenarios.live.live_options import LiveOptions, configure
 from scenarios.schema import load_scenario
 from tests.command_line import invoke
 
-COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "stop", "event")
+COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "view", "stop", "event")
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -101,6 +101,20 @@ def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
         f"gridpeers: nothing answers at {endpoint} within 0.2 s; start a plant there (gridpeers plant SCENARIO), "
         "or say by --connect where it is"
     ]
+
+
+def test_a_view_seeks_its_run_first() -> None:
+    """A page without a run would show nothing."""
+    pytest.importorskip("starlette", reason="the extra view is not installed")
+    pytest.importorskip("websockets", reason="the extra view is not installed")
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+        code, text = invoke("view", "--port", "0", "--connect", endpoint, "--wait", "0.2")
+
+    assert code == 2
+    assert f"gridpeers: nothing answers at {endpoint} within 0.2 s" in text
 
 
 def test_something_that_listens_in_silence_is_told() -> None:

@@ -1,0 +1,90 @@
+"""The one-line diagram of a feeder as the plant hands it out: places of buses, branches, switches and inverters."""
+
+from __future__ import annotations
+
+import msgspec
+
+from plant.equipment import Feeder
+from scenarios.results.plots.feeder_places import has_coordinates, places
+
+
+class MapSwitch(msgspec.Struct, frozen=True):
+    """A switch on the map."""
+
+    name: str
+    alias: str
+    a: int
+    """Number of the bus at one side."""
+    b: int
+    closed: bool
+    """Position before the run."""
+
+
+class MapInverter(msgspec.Struct, frozen=True):
+    """An inverter on the map."""
+
+    name: str
+    bus: int
+    """Number of its bus."""
+    kind: str
+    """GFM or GFL."""
+    microgrid: str
+    spare: bool = False
+
+
+class FeederMap(msgspec.Struct, frozen=True):
+    """A feeder's one-line diagram."""
+
+    buses: tuple[tuple[str, float, float], ...] = ()
+    """Name and place of each bus, in the units of its coordinates."""
+    branches: tuple[tuple[int, int, int], ...] = ()
+    """Numbers of the two buses of each branch, and its number of phases."""
+    switches: tuple[MapSwitch, ...] = ()
+    inverters: tuple[MapInverter, ...] = ()
+    source: int = -1
+    """Number of the substation's bus; -1 if there is none."""
+    to_scale: bool = True
+    """Whether both axes have the same unit: not if the places are those of a tree."""
+
+
+def feeder_map(feeder: Feeder) -> FeederMap:
+    """Return the one-line diagram of a feeder.
+
+    Examples
+    --------
+    >>> from plant.tables import read_feeder
+    >>> diagram = feeder_map(read_feeder("microgrid123"))
+    >>> diagram.inverters[0].name, diagram.buses[diagram.inverters[0].bus][0], diagram.switches[0].name
+    ('inv1', '160', '13-152')
+    """
+    at = places(feeder)
+    number = {bus.name: i for i, bus in enumerate(feeder.buses)}
+    return FeederMap(
+        buses=tuple((bus.name, float(at[bus.name][0]), float(at[bus.name][1])) for bus in feeder.buses),
+        branches=tuple((number[a], number[b], phases) for a, b, phases in feeder.branches()),
+        switches=tuple(
+            MapSwitch(row.name, row.alias, number[row.from_bus], number[row.to_bus], row.closed)
+            for row in feeder.switches
+        ),
+        inverters=tuple(
+            MapInverter(row.name, number[row.bus], row.kind, row.microgrid, row.spare)
+            for row in (*feeder.inverters, *feeder.spares)
+        ),
+        source=-1 if feeder.source is None else number[feeder.source.bus],
+        to_scale=has_coordinates(feeder),
+    )
+
+
+def read_feeder_map(payload: bytes) -> FeederMap | None:
+    """Return the map in a plant's answer; None if the bytes are something else, or name a bus that is not there."""
+    try:
+        found = msgspec.json.decode(payload, type=FeederMap)
+    except msgspec.DecodeError:
+        return None
+    numbers = [
+        *(end for a, b, _ in found.branches for end in (a, b)),
+        *(end for switch in found.switches for end in (switch.a, switch.b)),
+        *(inverter.bus for inverter in found.inverters),
+    ]
+    fits = all(0 <= number < len(found.buses) for number in numbers) and -1 <= found.source < len(found.buses)
+    return found if fits else None

@@ -1,0 +1,122 @@
+"""State of each communication link, from the receivers' statuses and the accounts of emulated links. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import msgspec
+
+from scenarios.emulation.link_reports import LinkStatus
+from wire.messages import AgentStatus
+
+State = Literal["used", "old", "apart", "unused"]
+"""In the receiver's sums; older than it uses; of another island; left out for another reason."""
+
+AGE_STEP = 0.05
+"""Step of shown ages (s)."""
+
+
+class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One link, as the page shows it."""
+
+    src: str
+    state: State
+    age: float
+    """Age (s) of the sender's last state at the receiver, in steps of `AGE_STEP`; -1 if none was heard."""
+    rate: float = 0.0
+    """Messages per s of wall time that come over it: what the sender sends, less what an emulated link drops."""
+    holds: tuple[str, ...] = ()
+    """Emulated faults that it has now, in words; "impaired" if they are not known yet."""
+    cut: bool = False
+    lost: float = 0.0
+    """Part of the messages that an emulated link dropped since the account before."""
+
+
+class LinkStates:
+    """Collect what is known of the links of a run."""
+
+    def __init__(self) -> None:
+        self._sent: dict[str, tuple[float, int, float]] = {}
+        """Of each sender: when its last status came (s), its count of sent states, messages per s."""
+        self._status: dict[str, AgentStatus] = {}
+        self._accounts: dict[str, Mapping[str, LinkStatus]] = {}
+        self._lost: dict[tuple[str, str], float] = {}
+
+    def clear(self) -> None:
+        """Forget all: another run has begun."""
+        self.__init__()  # type: ignore[misc]
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Take an agent's status; `now` is the client's clock (s)."""
+        at, sent, rate = self._sent.get(message.sender, (now, message.sent, 0.0))
+        if message.sent < sent:
+            self._sent[message.sender] = now, message.sent, 0.0  # another process of that name
+        elif now - at > 0.3:  # statuses that a change causes come close together
+            self._sent[message.sender] = now, message.sent, _two_digits((message.sent - sent) / (now - at))
+        else:
+            self._sent[message.sender] = at, sent, rate
+        self._status[message.sender] = message
+
+    def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
+        """Take the states of the emulated links into a receiver, by sender."""
+        for src, now in statuses.items():
+            before = self._accounts.get(receiver, {}).get(src)
+            if now.counts is None or before is None or before.counts is None:
+                continue
+            sent = now.counts.sent - before.counts.sent
+            dropped = sum(now.counts.dropped.values()) - sum(before.counts.dropped.values())
+            self._lost[src, receiver] = dropped / sent if sent > 0 else self._lost.get((src, receiver), 0.0)
+        self._accounts[receiver] = statuses
+
+    @property
+    def any_impaired(self) -> bool:
+        """Whether any receiver says that a link to it has an emulated fault."""
+        return any(status.impaired for status in self._status.values())
+
+    def into(self, receiver: str, islands: Mapping[str, str], max_age: float) -> tuple[LinkView, ...]:
+        """Return the links into an agent.
+
+        Parameters
+        ----------
+        receiver : str
+            Its name.
+        islands : Mapping[str, str]
+            Island of each agent, as far as it is known.
+        max_age : float
+            Age (s) beyond which it uses no state.
+        """
+        status = self._status.get(receiver)
+        if status is None:
+            return ()
+        views = []
+        for src, age in zip(status.neighbours, status.ages, strict=True):
+            state: State = "used"
+            if src not in status.used:
+                apart = islands.get(src, "") not in ("", status.island)
+                state = "apart" if apart else "old" if age < 0.0 or age > max_age else "unused"
+            views.append(self._view(src, receiver, state, age, impaired=src in status.impaired))
+        return tuple(views)
+
+    def _view(self, src: str, receiver: str, state: State, age: float, *, impaired: bool) -> LinkView:
+        rate, lost = self._sent.get(src, (0.0, 0, 0.0))[2], 0.0
+        holds: tuple[str, ...] = ()
+        if impaired:
+            account = self._accounts.get(receiver, {}).get(src)
+            holds = (account.holds if account is not None else ()) or ("impaired",)
+            lost = _two_digits(self._lost.get((src, receiver), 0.0))
+        cut = any(hold.startswith(("cut", "partition")) for hold in holds)
+        return LinkView(
+            src=src,
+            state=state,
+            age=-1.0 if age < 0.0 else round(round(age / AGE_STEP) * AGE_STEP, 2),
+            rate=0.0 if cut or state == "old" else _two_digits(rate * (1.0 - lost)),
+            holds=holds,
+            cut=cut,
+            lost=lost,
+        )
+
+
+def _two_digits(value: float) -> float:
+    """Round, so that what hardly changes is not sent again."""
+    return float(f"{value:.2g}")

@@ -1,0 +1,130 @@
+// The feeder's one-line diagram with its switches and inverters, and the communication links on top.
+const SVG = "http://www.w3.org/2000/svg";
+const make = (name, attributes = {}, parent) => {
+  const element = document.createElementNS(SVG, name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  if (parent) parent.append(element);
+  return element;
+};
+const set = (element, key, value) => { if (element.getAttribute(key) !== value) element.setAttribute(key, value); };
+const pairOf = (a, b) => a < b ? `${a}|${b}` : `${b}|${a}`;
+
+export class Diagram {
+  // on(kind, subject): a click; look(event, kind, subject): the pointer is above something, or above nothing
+  constructor(svg, on, look) {
+    this.svg = svg; this.on = on; this.look = look; this.map = null; this.inverters = new Map(); this.switches = new Map(); this.pairs = new Map();
+    new ResizeObserver(() => this.layout()).observe(svg.parentElement);
+  }
+  setMap(map, colourOf) { this.map = map; this.colourOf = colourOf; this.layout(); }
+
+  layout() {
+    const map = this.map, W = this.svg.parentElement.clientWidth, H = this.svg.parentElement.clientHeight;
+    if (!map || !W || !map.buses.length) return;
+    this.svg.setAttribute("viewBox", `0 0 ${W} ${H}`); this.svg.replaceChildren();
+    const xs = map.buses.map(b => b[1]), ys = map.buses.map(b => b[2]), few = map.inverters.length <= 24;
+    const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+    const px = few ? 56 : 24, py = few ? 34 : 20;
+    let sx = (W - 2 * px) / (x1 - x0 || 1), sy = (H - 2 * py) / (y1 - y0 || 1);
+    if (map.to_scale) sx = sy = Math.min(sx, sy);
+    const ox = (W - sx * (x1 - x0)) / 2, oy = (H - sy * (y1 - y0)) / 2;
+    const at = map.buses.map(([, x, y]) => [ox + sx * (x - x0), H - oy - sy * (y - y0)]);
+    const wires = make("g", {}, this.svg), thin = map.buses.length > 400 ? .6 : 1;
+    const byPhases = new Map();
+    for (const [a, b, phases] of map.branches) byPhases.set(phases, (byPhases.get(phases) || "") + `M${at[a].map(r1)}L${at[b].map(r1)}`);
+    for (const [phases, d] of byPhases) make("path", { d, class: "branch", "stroke-width": thin * [1, 1, 1.7, 2.8][phases] }, wires);
+    this.links = make("g", { class: "links" }, this.svg);
+    const marks = make("g", {}, this.svg);
+    this.marks = make("g", { class: "links" }, this.svg);
+    this.switches.clear();
+    for (const s of map.switches) {
+      const [a, b] = [at[s.a], at[s.b]], x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2;
+      const g = make("g", { class: "switch", "data-switch": s.name }, marks);
+      make("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] }, g);
+      make("rect", { class: "grab", x: x - 11, y: y - 11, width: 22, height: 22 }, g);
+      make("rect", { x: x - 4.5, y: y - 4.5, width: 9, height: 9, rx: 1.5 }, g);
+      if (map.switches.length <= 40) make("text", { x: x + 8, y: y + 13 }, g).textContent = s.alias || s.name;
+      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, state: null });
+    }
+    if (map.source >= 0) { const [x, y] = at[map.source]; make("path", { class: "substation", d: `M${x} ${y - 9}l9 9l-9 9l-9-9z` }, marks); }
+    const nodes = make("g", {}, this.svg), r = few ? 9 : map.inverters.length > 60 ? 5 : 6.5, taken = new Map();
+    this.inverters.clear();
+    for (const row of map.inverters) {
+      let [x, y] = at[row.bus];
+      const here = `${Math.round(x / 4)},${Math.round(y / 4)}`, others = taken.get(here) || 0;
+      taken.set(here, others + 1); x += others * 2.4 * r;
+      const g = make("g", { class: "inverter", "data-agent": row.name, transform: `translate(${r1(x)} ${r1(y)})` }, nodes);
+      const fill = this.colourOf(row.name);
+      make("circle", { class: "halo", r: r + 5 }, g);
+      if (row.kind === "GFM") make("rect", { class: "body", x: -r, y: -r, width: 2 * r, height: 2 * r, rx: 3, style: `fill:${fill}` }, g);
+      else make("circle", { class: "body", r, style: `fill:${fill}` }, g);
+      this.hear(g, "agent", row.name);
+      this.inverters.set(row.name, { g, value: null, x, y });
+    }
+    if (few) this.label(r, W);
+    this.pairs.clear();
+    if (this.last) this.update(...this.last);
+  }
+
+  // Each label goes where it covers least of the marks and of the labels before it.
+  label(r, W) {
+    const covered = [...this.inverters.values()].map(({ x, y }) => [x - r - 2, y - r - 2, x + r + 2, y + r + 2]);
+    for (const { g } of this.switches.values()) { const box = g.querySelector(".grab"); covered.push([+box.getAttribute("x") + 4, +box.getAttribute("y") + 4, +box.getAttribute("x") + 18, +box.getAttribute("y") + 18]); }
+    const shared = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
+    for (const [name, drawn] of this.inverters) {
+      const w = 50, h = 27, gap = r + 6, { x, y } = drawn;
+      const choices = [["start", gap, -3, x + gap, y - h / 2], ["end", -gap, -3, x - gap - w, y - h / 2], ["middle", 0, -gap - 12, x - w / 2, y - gap - h], ["middle", 0, gap + 8, x - w / 2, y + gap - 2]]
+        .map(([anchor, dx, dy, left, top], k) => { const box = [left, top, left + w, top + h]; return { anchor, dx, dy, box, cost: k + covered.reduce((sum, other) => sum + shared(box, other), 0) + (left < 2 || left + w > W - 2 ? 9999 : 0) }; });
+      const best = choices.reduce((a, b) => b.cost < a.cost ? b : a);
+      covered.push(best.box);
+      make("text", { class: "name", x: best.dx, y: best.dy, "text-anchor": best.anchor }, drawn.g).textContent = name;
+      drawn.value = make("text", { class: "value values", x: best.dx, y: best.dy + 13, "text-anchor": best.anchor }, drawn.g);
+    }
+  }
+
+  hear(element, kind, subject) {
+    element.addEventListener("click", () => this.on(kind, subject));
+    element.addEventListener("pointermove", event => this.look(event, kind, subject));
+    element.addEventListener("pointerleave", event => this.look(event, "", ""));
+  }
+
+  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V }
+  update(links, switches, states, pending, lit) {
+    this.last = [links, switches, states, pending, lit];
+    if (!this.links) return;
+    set(this.links, "class", links.size > 120 ? "links many" : "links");
+    for (const [key, link] of links) {
+      let drawn = this.pairs.get(key);
+      const from = this.inverters.get(link.a), to = this.inverters.get(link.b);
+      if (!from || !to) continue;
+      if (!drawn) {
+        const dx = to.x - from.x, dy = to.y - from.y, bend = .11, mx = (from.x + to.x) / 2 - bend * dy, my = (from.y + to.y) / 2 + bend * dx;
+        const d = `M${r1(from.x)} ${r1(from.y)}Q${r1(mx)} ${r1(my)} ${r1(to.x)} ${r1(to.y)}`;
+        const hit = make("path", { class: "hit", d, "data-link": key }, this.links), path = make("path", { d }, this.links);
+        this.hear(hit, "link", key);
+        drawn = { hit, path, mark: null, x: (from.x + 2 * mx + to.x) / 4, y: (from.y + 2 * my + to.y) / 4 };
+        this.pairs.set(key, drawn);
+      }
+      const bright = lit && (link.a === lit || link.b === lit) ? " lit" : "";
+      set(drawn.path, "class", `link ${link.kind}${pending.has(key) ? " pending" : ""}${bright}`);
+      set(drawn.path, "stroke-width", String(r1(link.kind === "impaired" || link.kind === "cut" ? 2.2 : .7 + 1.9 * Math.min(1, link.rate / 50))));
+      const mark = link.kind === "cut" ? "cut" : link.kind === "impaired" ? link.text : "";
+      if (drawn.marked !== mark) {
+        drawn.mark?.remove(); drawn.mark = null; drawn.marked = mark;
+        const { x, y } = drawn;
+        if (mark === "cut") drawn.mark = make("path", { class: "cross", d: `M${r1(x - 5)} ${r1(y - 5)}l10 10m0-10l-10 10` }, this.marks);
+        else if (mark) { drawn.mark = make("text", { class: "badge", x: r1(x), y: r1(y + 3) }, this.marks); drawn.mark.textContent = mark; }
+      }
+    }
+    for (const [key, drawn] of this.pairs) if (!links.has(key)) { drawn.hit.remove(); drawn.path.remove(); drawn.mark?.remove(); this.pairs.delete(key); }
+    for (const [name, drawn] of this.switches) set(drawn.g, "class", `switch ${switches[name] ?? true ? "closed" : "open"}${pending.has(name) ? " pending" : ""}`);
+    for (const [name, drawn] of this.inverters) {
+      const state = states.get(name) || { absent: true };
+      const off = state.V !== null && state.V !== undefined && (state.V < .95 || state.V > 1.05);
+      set(drawn.g, "class", `inverter${state.absent ? " absent" : ""}${off ? " off-voltage" : ""}${pending.has(name) ? " pending" : ""}${name === lit ? " lit" : ""}`);
+      if (drawn.value) { const text = state.V === null || state.V === undefined ? "" : `${state.V.toFixed(3)} pu`; if (drawn.value.textContent !== text) drawn.value.textContent = text; }
+    }
+  }
+}
+
+export { pairOf };
+function r1(value) { return Math.round(value * 10) / 10; }

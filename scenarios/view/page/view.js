@@ -1,0 +1,201 @@
+// The page of a run: takes frames from the server, shows them, and sends what is clicked.
+import { Diagram, pairOf } from "./diagram.js";
+import { Strips } from "./strips.js";
+
+const $ = id => document.getElementById(id);
+const SILENT = 1000; // ms without a frame after which the numbers are old: the server sends four a second
+const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null };
+window.gridpeersView = S;
+
+const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases"));
+const number = (value, digits) => value === null || value === undefined ? "–" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
+const COLUMNS = [
+  ["agent", "", i => i.name], ["island", "", i => i.island || "–", "text"], ["f", "Hz", i => number(i.f, 3)], ["P", "kW", i => number(i.P, 1)],
+  ["P_set", "kW", i => number(i.P_set, 1)], ["P", "pu", i => number(i.P_share, 3)], ["Q", "kvar", i => number(i.Q, 1)], ["V", "pu", i => number(i.V, 4)],
+  ["V_set", "pu", i => number(i.V_set, 4)], ["hears", "", i => i.received === null ? "–" : String(Object.keys(i.ages).length)],
+  ["age", "s", i => { const ages = Object.values(i.ages); return ages.length ? number(Math.max(...ages), 2) : "–"; }, "age"],
+  ["in", "", i => i.received ?? "–"], ["out", "", i => i.sent ?? "–"], ["lost", "", i => i.lost ?? "–", "lost"], ["", "", i => i.note, "text note"],
+];
+
+// ---- colours: a hue for each microgrid
+function colourOf(name) {
+  const row = S.map?.inverters.find(one => one.name === name);
+  const groups = [...new Set((S.map?.inverters || []).map(one => one.microgrid))];
+  return getComputedStyle(document.documentElement).getPropertyValue(`--mg${Math.max(0, groups.indexOf(row?.microgrid)) % 6}`).trim();
+}
+// lines of one microgrid differ in lightness
+function lineColours() {
+  const count = new Map(), total = new Map();
+  const group = name => S.map?.inverters.find(one => one.name === name)?.microgrid ?? "";
+  for (const name of strips.names) total.set(group(name), (total.get(group(name)) || 0) + 1);
+  return strips.names.map(name => {
+    const mine = group(name), k = count.get(mine) || 0, n = total.get(mine);
+    count.set(mine, k + 1);
+    return `color-mix(in oklab, ${colourOf(name)} ${n === 1 ? 100 : Math.round(100 - 45 * k / (n - 1))}%, ${matchMedia("(prefers-color-scheme: dark)").matches ? "white" : "black"})`;
+  });
+}
+let colours = [];
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { recolour(); render(); });
+function recolour() { colours = lineColours(); if (S.map) diagram.setMap(S.map, colourOf); document.querySelectorAll(".dot").forEach(dot => { dot.style.background = colourOf(dot.dataset.name); }); }
+
+// ---- the connection
+function connect() {
+  const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/frames`);
+  S.socket = socket;
+  socket.onmessage = event => { S.heard = performance.now(); take(JSON.parse(event.data)); };
+  socket.onclose = event => { if (event.code === 4403) { location.reload(); return; } render(); setTimeout(connect, 1000); };
+}
+function take(message) {
+  if (message.hello) {
+    S.hello = message.hello; $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
+    $("control").hidden = $("tools").hidden = !S.hello.control;
+    $("rights").textContent = S.hello.control ? "" : "looks only; start it with --control to act";
+    document.body.classList.toggle("can-act", S.hello.control); heads();
+    S.links.clear(); strips.clear(); S.events = []; $("event-list").replaceChildren();
+  } else if (message.map) {
+    S.map = message.map; recolour(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
+  } else if (message.done) { done(message.done); }
+  else if (message.frame) { takeFrame(message.frame); }
+}
+function takeFrame(frame) {
+  if (frame.reset) { S.links.clear(); strips.clear(); S.events = []; $("event-list").replaceChildren(); }
+  S.frame = frame;
+  if (frame.names && String(frame.names) !== String(strips.names)) { strips.clear(); strips.names = frame.names; colours = lineColours(); for (const id of ["link-a", "link-b"]) fill($(id), frame.names.map(name => [name, name])); $("link-b").selectedIndex = Math.min(1, frame.names.length - 1); }
+  if (frame.points) strips.add(frame.points);
+  for (const [dst, links] of Object.entries(frame.links || {})) S.links.set(dst, links);
+  if (frame.switches) { S.switches = frame.switches; for (const name of Object.keys(frame.switches)) S.pending.delete(name); }
+  S.inverters = new Map(frame.inverters.map(one => [one.name, one]));
+  for (const event of frame.events || []) {
+    S.events.push(event);
+    const line = document.createElement("li"), time = document.createElement("span"), text = document.createElement("span");
+    time.className = "time"; time.textContent = `${event.t.toFixed(2)} s`; text.textContent = event.text.replace(/, at t = [0-9.e+]+ s$/, ""); text.className = `kind-${event.kind}`;
+    line.append(time, text); $("event-list").prepend(line);
+  }
+  while (S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
+  render();
+}
+
+// ---- links in pairs: the worse direction gives the look
+const RANK = { cut: 6, impaired: 5, old: 4, unused: 3, apart: 2, ageing: 1, used: 0 };
+function pairs() {
+  const found = new Map();
+  for (const [dst, links] of S.links) for (const link of links) {
+    const kind = link.cut ? "cut" : link.holds ? "impaired" : link.state === "used" && link.age > 0.1 ? "ageing" : link.state, key = pairOf(link.src, dst);
+    const pair = found.get(key) || { a: key.split("|")[0], b: key.split("|")[1], kind, rate: 0, text: "", ways: [] };
+    if (RANK[kind] >= RANK[pair.kind]) pair.kind = kind;
+    if (link.holds) pair.text = link.holds.join(", ");
+    pair.rate = Math.max(pair.rate, link.rate || 0); pair.ways.push({ ...link, dst }); found.set(key, pair);
+  }
+  return found;
+}
+
+// ---- showing
+let due = false;
+function render() { if (!due) { due = true; requestAnimationFrame(() => { due = false; draw(); }); } }
+function draw() {
+  const frame = S.frame, lost = S.heard && (performance.now() - S.heard > SILENT || S.socket.readyState !== 1);
+  const live = lost ? "lost" : frame ? frame.live.word : "waiting", current = live === "live";
+  if (document.body.dataset.live !== live) document.body.dataset.live = live;
+  put($("live-text"), lost ? "no word from this page's server: nothing here is of now" : frame ? frame.live.text : "connecting");
+  if (!frame) return;
+  put($("time"), frame.t === null ? "" : `t = ${frame.t.toFixed(2)} s`); put($("pace"), current ? frame.pace : "");
+  const inverters = frame.inverters.map(one => current ? one : stale(one));
+  const islands = [...new Set(inverters.map(one => one.island).filter(Boolean))];
+  put($("islands"), islands.length ? `islands: ${islands.join(", ")}` : "");
+  S.pairs = pairs();
+  const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V }]));
+  for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
+  diagram.update(S.pairs, S.switches, states, S.pending, S.lit);
+  const speed = Number((frame.pace.match(/speed ([0-9.]+)/) || [0, 1])[1]);
+  const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
+  strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), S.events.map(event => [event.t, event.kind]), colours);
+  rows(inverters);
+  if (S.tip) showTip();
+}
+const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, received: null, sent: null, lost: null, island: "" });
+const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
+function heads() {
+  const head = document.querySelector("thead tr"); head.replaceChildren(); document.querySelector("tbody").replaceChildren();
+  for (const [title, unit, , kind] of [COLUMNS[0], ...(S.hello.control ? [["", "", null, ""]] : []), ...COLUMNS.slice(1)]) {
+    const cell = document.createElement("th"); cell.scope = "col"; cell.textContent = title; if (kind?.includes("text") || title === "agent") cell.className = "text";
+    if (unit) { const small = document.createElement("small"); small.textContent = unit; cell.append(small); } head.append(cell);
+  }
+}
+const tableRows = new Map();
+function rows(inverters) {
+  const body = document.querySelector("tbody");
+  if (!body.children.length) tableRows.clear();
+  for (const one of inverters) {
+    let row = tableRows.get(one.name);
+    if (!row) {
+      const line = body.insertRow(), cells = COLUMNS.map(([, , , kind], c) => { const cell = c ? line.insertCell() : line.appendChild(document.createElement("th")); cell.className = kind?.includes("text") || !c ? `text ${kind || ""}` : ""; return cell; });
+      cells[0].scope = "row"; cells[0].style.position = "static"; cells[0].style.boxShadow = "none";
+      const dot = document.createElement("span"); dot.className = "dot"; dot.dataset.name = one.name; dot.style.cssText = `display:inline-block;width:9px;height:9px;border-radius:3px;margin-right:8px;background:${colourOf(one.name)}`;
+      const text = document.createElement("span"); cells[0].append(dot, text); cells[0].style.color = "var(--ink)"; cells[0].style.fontWeight = "600";
+      let button = null;
+      if (S.hello.control) { const cell = line.insertCell(1); cell.className = "act"; button = document.createElement("button"); button.type = "button"; cell.append(button); button.addEventListener("click", () => click("agent", one.name)); }
+      line.addEventListener("pointerenter", () => light(one.name)); line.addEventListener("pointerleave", () => light(""));
+      row = { line, cells, text, button }; tableRows.set(one.name, row);
+    }
+    COLUMNS.forEach(([, , value], c) => put(c ? row.cells[c] : row.text, String(value(one))));
+    row.cells[10].classList.toggle("warn", Math.max(0, ...Object.values(one.ages)) >= 0.2); row.cells[13].classList.toggle("warn", one.lost > 0);
+    row.line.classList.toggle("lit", S.lit === one.name);
+    if (row.button) { const absent = one.note === "no agent"; put(row.button, absent ? "Start" : "Stop"); row.button.setAttribute("aria-label", `${absent ? "Start" : "Stop"} the agent of ${one.name}`); row.button.disabled = S.pending.has(one.name); }
+  }
+  for (const [name, row] of tableRows) if (!inverters.some(one => one.name === name)) { row.line.remove(); tableRows.delete(name); }
+}
+function light(name) { if (S.lit !== name) { S.lit = name; render(); } }
+function fill(select, options) { select.replaceChildren(...options.map(([value, text]) => new Option(text, value))); }
+
+// ---- what the pointer is above
+function look(event, kind, subject) { S.tip = kind ? { x: event.clientX, y: event.clientY, kind, subject } : null; light(kind === "agent" ? subject : ""); showTip(); }
+function showTip() {
+  const tip = $("tip"), text = S.tip ? tipText(S.tip.kind, S.tip.subject) : "";
+  tip.hidden = !text; if (!text) return;
+  put(tip, text); const box = tip.getBoundingClientRect();
+  tip.style.left = `${Math.min(S.tip.x + 14, innerWidth - box.width - 8)}px`; tip.style.top = `${Math.min(S.tip.y + 14, innerHeight - box.height - 8)}px`;
+}
+function tipText(kind, subject) {
+  const does = verb => S.hello?.control ? `\nclick: ${verb}` : "";
+  if (kind === "switch") return `switch ${subject}: ${S.switches[subject] ?? true ? "closed" : "open"}${does(S.switches[subject] ?? true ? "open it" : "close it")}`;
+  if (kind === "agent") {
+    const one = S.inverters.get(subject);
+    if (!one) return subject;
+    return `${one.name}${one.note ? `: ${one.note}` : ""}\nP ${number(one.P_share, 3)} pu, Q ${number(one.Q, 1)} kvar\nV ${number(one.V, 4)} pu, f ${number(one.f, 3)} Hz${does(one.note === "no agent" ? "start its agent" : "stop its agent")}`;
+  }
+  const pair = S.pairs?.get(subject);
+  if (!pair) return "";
+  const lines = pair.ways.map(way => `${way.src} → ${way.dst}: ${way.holds ? way.holds.join(", ") : way.state}, ${way.age < 0 ? "never heard" : `age ${way.age.toFixed(2)} s`}, ${way.rate || 0} msg/s${way.lost ? `, lost ${Math.round(100 * way.lost)} %` : ""}`);
+  const tool = document.querySelector("input[name=tool]:checked").value;
+  return lines.join("\n") + (tool === "look" ? "" : does(tool === "cut" ? (pair.kind === "cut" || pair.kind === "impaired" ? "heal it" : "cut it") : tool === "delay" ? `delay it by ${$("delay").value} s` : `lose ${100 * $("loss").value} %`));
+}
+
+// ---- what is clicked
+function click(kind, subject) {
+  if (!S.hello?.control || S.pending.has(subject)) return;
+  if (kind === "switch") act({ verb: S.switches[subject] ?? true ? "open" : "close", subject }, subject);
+  else if (kind === "agent") act({ verb: S.inverters.get(subject)?.note === "no agent" ? "start" : "stop", subject }, subject);
+  else {
+    const [a, b] = subject.split("|"), tool = document.querySelector("input[name=tool]:checked").value, hurt = ["cut", "impaired"].includes(S.pairs.get(subject)?.kind);
+    if (tool !== "look") act(tool === "cut" ? { verb: hurt ? "heal" : "cut", subject: a, other: b } : { verb: tool, subject: a, other: b, value: Number($(tool).value) }, subject);
+  }
+}
+const waiting = [];
+function act(action, key) { S.socket.send(JSON.stringify(action)); waiting.push(key); S.pending.set(key, action.verb); setTimeout(() => { S.pending.delete(key); render(); }, 8000); render(); }
+function done(result) {
+  const key = result.command ? waiting.shift() : null, verb = S.pending.get(key);
+  if (key && !(result.ok && (verb === "stop" || verb === "start"))) S.pending.delete(key);
+  const line = document.createElement("li"), text = document.createElement("span");
+  if (result.command) { const code = document.createElement("code"); code.textContent = result.command; line.append(code); }
+  text.textContent = result.text; line.append(text); line.className = result.ok ? "" : "bad"; $("command-list").prepend(line);
+  while ($("command-list").children.length > 100) $("command-list").lastChild.remove();
+  render();
+}
+$("link-form").addEventListener("submit", event => {
+  event.preventDefault(); const verb = event.submitter.value, a = $("link-a").value, b = $("link-b").value;
+  act(verb === "heal all" ? { verb } : { verb, subject: a, other: b, value: Number($(verb)?.value || 0) }, verb === "heal all" ? "heal all" : pairOf(a, b));
+});
+$("switch-form").addEventListener("submit", event => { event.preventDefault(); act({ verb: event.submitter.value, subject: $("switch").value }, $("switch").value); });
+
+setInterval(() => { if (performance.now() - S.heard > SILENT) render(); }, 250);
+connect();

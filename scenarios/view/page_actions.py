@@ -1,0 +1,149 @@
+"""What a page may do to a run: each action is a command that can be typed, and is carried out as that command does."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Literal
+
+import msgspec
+
+from netem.models.delay import Constant
+from netem.models.gates import Cut
+from netem.models.loss import Bernoulli
+from netem.schema.change import Heal
+from netem.schema.fault import Fault
+from scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from scenarios.live.link_requests import check_link_command, command_links, links_of_run
+from scenarios.live.run_address import ENDPOINT, RUN, RunAddress, UsageError, check_name
+from scenarios.live.run_client import NobodyError, RunClient
+from scenarios.live.run_requests import ask
+from wire.bounds import Text
+
+Verb = Literal["open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all"]
+
+FIND = 1.5
+"""Longest wait (s) for the plant of a run that the page follows already."""
+
+
+class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A click."""
+
+    verb: Verb
+    subject: Text = ""
+    """The switch, the agent, or one end of the link."""
+    other: Text = ""
+    """The other end of the link; both ways."""
+    value: float = 0.0
+    """Delay (s) or probability of a loss."""
+
+    def words(self) -> list[str]:
+        """Return the words of the command that does the same.
+
+        Examples
+        --------
+        >>> PageAction(verb="cut", subject="inv1", other="inv4").words()
+        ['link', 'cut', 'inv1', 'inv4']
+        """
+        match self.verb:
+            case "open" | "close":
+                return ["event", self.verb, self.subject]
+            case "synchronise":
+                return ["event", "close", self.subject, "--synchronised"]
+            case "stop":
+                return ["stop", self.subject]
+            case "start":
+                return ["agent", self.subject]
+            case "delay" | "loss":
+                return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.verb}", f"{self.value:g}"]
+            case "heal all":
+                return ["link", "heal"]
+        return ["link", self.verb, self.subject, self.other]
+
+    def link_command(self) -> LinkCommand:
+        """Return what links are told."""
+        on = EVERYTHING if self.verb == "heal all" else f"{self.subject} <-> {self.other}"
+        match self.verb:
+            case "cut":
+                return LinkCommand(fault=Fault(on=on, cut=Cut()))
+            case "delay":
+                return LinkCommand(fault=Fault(on=on, delay=Constant(delay_s=self.value)))
+            case "loss":
+                return LinkCommand(fault=Fault(on=on, loss=Bernoulli(p=self.value)))
+        return LinkCommand(heal=Heal(on=on, from_s=0.0))
+
+
+def command_line(words: list[str], where: RunAddress) -> str:
+    """Return a command as it can be typed in a shell.
+
+    Examples
+    --------
+    >>> command_line(["link", "cut", "inv1", "inv4"], RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)))
+    'gridpeers link cut inv1 inv4'
+    >>> command_line(["stop", "inv4"], RunAddress(run="lab", connect=("tcp/10.0.0.1:7447",)))
+    'gridpeers stop inv4 --run lab --connect tcp/10.0.0.1:7447'
+    """
+    return shlex.join(["gridpeers", *words, *address_options(where)])
+
+
+def address_options(where: RunAddress) -> list[str]:
+    """Return the options that say which run is meant; those that say the defaults are left out."""
+    run = [] if where.run == RUN else ["--run", where.run]
+    endpoints = [] if where.connect == (ENDPOINT,) else [word for text in where.connect for word in ("--connect", text)]
+    return run + endpoints
+
+
+class ActionClient:
+    """Carry actions out, one after another, over a session of its own; all calls from one thread.
+
+    Parameters
+    ----------
+    where : RunAddress
+        The run.
+    """
+
+    def __init__(self, where: RunAddress) -> None:
+        self._where = where
+        self._client: RunClient | None = None
+
+    def perform(self, action: PageAction) -> str:
+        """Carry out an action other than to start an agent; return its effect in words.
+
+        Raises
+        ------
+        NobodyError, RefusedError, UsageError
+            If it cannot be done.
+        """
+        client = self._at_the_run()
+        match action.verb:
+            case "open" | "close" | "synchronise" | "stop":
+                return ask(client, action.verb, action.subject)
+        for name in (action.subject, action.other):
+            if action.verb != "heal all":
+                check_name("LINKS", name)
+        command = action.link_command()
+        check_link_command(command, links_of_run(client)[0])
+        result = command_links(client, command)
+        wrong = [f"{name}: {why}" for name, why in result.refused.items()]
+        if result.silent:
+            wrong.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
+        if wrong:
+            raise UsageError(f"{result.text}; {'; '.join(wrong)}")
+        return f"{result.text}; from t = {result.t:.2f} s on" if result.changes_links else result.text
+
+    def close(self) -> None:
+        """Close the session."""
+        if self._client is not None:
+            self._client.close()
+
+    def _at_the_run(self) -> RunClient:
+        """Return a client whose plant is there."""
+        if self._client is None:
+            self._client = RunClient(self._where)
+        for _ in self._client.take(0.0):  # tokens that went since the last action
+            pass
+        try:
+            self._client.find_plant(FIND)
+        except NobodyError:
+            self._client.renew()
+            raise
+        return self._client

@@ -1,0 +1,280 @@
+"""The server of the page: static files, and a web socket for each page that is open."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import secrets
+import signal
+import socket
+from collections.abc import AsyncIterator, Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING, Any, NoReturn
+from urllib.parse import parse_qs
+
+import msgspec
+
+from scenarios.live.run_address import RunAddress
+from scenarios.view.own_agents import OwnAgents
+from scenarios.view.page_actions import ActionClient, PageAction, command_line
+from scenarios.view.run_follower import RunFollower
+from scenarios.view.run_view import Cursor
+from wire.driver.drive import StoppedError
+
+if TYPE_CHECKING:  # the extra view has them; who does not open a page needs neither
+    from starlette.applications import Starlette
+    from starlette.requests import HTTPConnection, Request
+    from starlette.responses import Response
+    from starlette.websockets import WebSocket
+
+PAGE = Path(__file__).parent / "page"
+"""The page's own files; it loads nothing from elsewhere."""
+
+FILES = {
+    "view.css": "text/css",
+    "view.js": "text/javascript",
+    "diagram.js": "text/javascript",
+    "strips.js": "text/javascript",
+}
+
+HEARTBEAT = 0.25
+"""Longest time (s) between two frames: a page that hears nothing for a second knows that its numbers are old."""
+
+FASTEST = 0.05
+"""Least time (s) between two frames of a page."""
+
+_log = logging.getLogger("view")
+
+COOKIE = "gridpeers_view"
+
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
+    "frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+
+_ASK_TOKEN = """<!doctype html><html lang="en"><meta charset="utf-8"><title>gridpeers view</title>
+<link rel="stylesheet" href="/static/view.css"><main class="ask"><h1>gridpeers view</h1>
+<form method="post" action="/token"><label>Token, as the command printed it
+<input name="token" type="password" autofocus required></label><button>Open</button></form>
+<p role="alert">%s</p></main></html>"""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PageOptions:
+    """Options of the server."""
+
+    where: RunAddress
+    """The run."""
+    control: bool = False
+    """Whether pages may act on the run."""
+    token: str = ""
+    """What a page must know; "" asks for none."""
+    hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
+    """Names in the address of the page; () takes any. Without it, a page of others could reach this one under a name of
+    theirs (DNS rebinding)."""
+
+
+class PageServer:
+    """Serve the page of a run until a signal comes.
+
+    Parameters
+    ----------
+    follower : RunFollower
+        Follows the run.
+    options : PageOptions
+        Options of the command.
+    """
+
+    def __init__(self, follower: RunFollower, options: PageOptions) -> None:
+        self._follower, self._options = follower, options
+        self._news: set[asyncio.Event] = set()
+        self._worker = ThreadPoolExecutor(1, "actions")
+        self._actions = ActionClient(options.where)
+        self._agents = OwnAgents(options.where)
+
+    def run(self, listening: socket.socket) -> None:
+        """Serve on a socket that listens; SIGINT ends in KeyboardInterrupt, SIGTERM in StoppedError."""
+        import uvicorn
+
+        config = uvicorn.Config(
+            self._app(),
+            log_level="error",
+            access_log=False,
+            server_header=False,
+            ws="websockets-sansio",
+            ws_max_size=4096,
+            ws_per_message_deflate=False,
+            timeout_graceful_shutdown=1,
+        )
+        signal.signal(signal.SIGTERM, _stop)  # uvicorn ends, and then raises the signal again
+        try:
+            uvicorn.Server(config).run(sockets=[listening])
+        finally:
+            self._worker.shutdown(cancel_futures=True)
+            self._actions.close()
+            self._agents.close()
+
+    def _app(self) -> Starlette:
+        from starlette.applications import Starlette
+        from starlette.routing import Route, WebSocketRoute
+
+        return Starlette(
+            routes=[
+                Route("/", self._index),
+                Route("/token", self._take_token, methods=["POST"]),
+                Route("/static/{name}", self._static),
+                WebSocketRoute("/frames", self._page),
+            ],
+            lifespan=self._lifespan,
+        )
+
+    @contextlib.asynccontextmanager
+    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            for event in self._news:
+                event.set()
+
+        def on_news() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has just closed
+                loop.call_soon_threadsafe(wake)
+
+        self._follower.on_news(on_news)
+        yield
+        self._follower.on_news(lambda: None)
+
+    # ---- who may see it
+
+    def _admits(self, connection: HTTPConnection) -> bool:
+        """Return whether a request comes from our own page: under a name of ours, and not from a page of others."""
+        host = connection.headers.get("host", "")
+        name = host.rpartition(":")[0] if host.rpartition(":")[2].isdigit() else host
+        origin = connection.headers.get("origin")
+        known = not self._options.hosts or name in self._options.hosts
+        return known and (origin is None or origin in (f"http://{host}", f"https://{host}"))
+
+    def _knows_token(self, connection: HTTPConnection) -> bool:
+        token = self._options.token
+        return not token or secrets.compare_digest(connection.cookies.get(COOKIE, "").encode(), token.encode())
+
+    async def _index(self, request: Request) -> Response:
+        if not self._admits(request):
+            return _refusal()
+        if (given := request.query_params.get("token")) is not None:
+            return self._let_in(given)
+        if not self._knows_token(request):
+            return _answer(_ASK_TOKEN % "", 401)
+        return _answer((PAGE / "index.html").read_text())
+
+    async def _take_token(self, request: Request) -> Response:
+        if not self._admits(request):
+            return _refusal()
+        body = (await request.body())[:1000].decode(errors="replace")
+        return self._let_in(parse_qs(body).get("token", [""])[0])
+
+    def _let_in(self, given: str) -> Response:
+        token = self._options.token
+        if token and not secrets.compare_digest(given.encode(), token.encode()):
+            return _answer(_ASK_TOKEN % "That is not the token of this view.", 401)
+        answer = _answer("", 303, Location="/")
+        if token:
+            answer.set_cookie(COOKIE, token, httponly=True, samesite="strict")
+        return answer
+
+    async def _static(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        if name not in FILES or not self._admits(request):
+            return _answer("not found", 404, "text/plain")
+        return _answer((PAGE / name).read_text(), 200, FILES[name])
+
+    # ---- a page that is open
+
+    async def _page(self, socket: WebSocket) -> None:
+        from starlette.websockets import WebSocketDisconnect
+
+        if not (self._admits(socket) and self._knows_token(socket)):
+            await socket.close(4403)
+            return
+        await socket.accept()
+        news = asyncio.Event()
+        self._news.add(news)
+        tasks = [asyncio.create_task(self._send(socket, news)), asyncio.create_task(self._receive(socket))]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            self._news.discard(news)
+            for task in tasks:
+                task.cancel()
+            for end in await asyncio.gather(*tasks, return_exceptions=True):
+                if isinstance(end, Exception) and not isinstance(end, WebSocketDisconnect):
+                    _log.error("a page was closed by an error", exc_info=end)
+
+    async def _send(self, socket: WebSocket, news: asyncio.Event) -> None:
+        """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
+        where = self._options.where
+        hello = {"hello": {"run": where.run, "where": str(where), "control": self._options.control}}
+        await socket.send_text(_json(hello))
+        cursor, drawn = Cursor(), False
+        while True:
+            news.clear()
+            if not drawn and (diagram := self._follower.feeder_map()) is not None:
+                await socket.send_text(_json({"map": diagram}))
+                drawn = True
+            frame, cursor = self._follower.frame(cursor)
+            if frame.reset:
+                drawn = False
+            await socket.send_text(_json({"frame": frame}))
+            for text in await asyncio.get_running_loop().run_in_executor(None, self._agents.take_endings):
+                await socket.send_text(_json({"done": {"ok": False, "text": text}}))
+            await asyncio.sleep(FASTEST)
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(news.wait(), HEARTBEAT)
+
+    async def _receive(self, socket: WebSocket) -> None:
+        """Carry out what a page asks for, one after another."""
+        loop = asyncio.get_running_loop()
+        async for text in socket.iter_text():
+            await socket.send_text(_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
+
+    def _do(self, text: str) -> dict[str, Any]:
+        """Carry out an action; return what the page says of it."""
+        try:
+            action = msgspec.json.decode(text, type=PageAction)
+        except msgspec.DecodeError as error:
+            return {"ok": False, "text": f"no action: {error}"}
+        command = command_line(action.words(), self._options.where)
+        if not self._options.control:
+            return {"ok": False, "command": command, "text": "this view only looks; start it with --control"}
+        perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
+        if action.verb == "start":
+            perform = lambda: self._agents.start(action.subject)  # noqa: E731
+        try:
+            return {"ok": True, "command": command, "text": perform()}
+        except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
+            return {"ok": False, "command": command, "text": str(error)}
+
+
+def _stop(number: int, frame: FrameType | None) -> NoReturn:
+    raise StoppedError(signal.Signals(number).name)
+
+
+def _refusal() -> Response:
+    return _answer("this page is open under the address that the command printed, and no other", 403, "text/plain")
+
+
+def _answer(text: str, status: int = 200, kind: str = "text/html", **headers: str) -> Response:
+    from starlette.responses import Response
+
+    return Response(text, status, HEADERS | headers, kind)
+
+
+def _json(value: Any) -> str:
+    return msgspec.json.encode(value).decode()

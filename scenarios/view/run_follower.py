@@ -1,0 +1,152 @@
+"""Follow a run for the page, in a thread of its own: a peer like `gridpeers watch`."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable
+from time import monotonic
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from scenarios.emulation.link_reports import decode_statuses
+from scenarios.live.feeder_map import read_feeder_map
+from scenarios.live.run_client import RunClient
+from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.live.show.watching import RunSubscriber
+from scenarios.view.run_view import Cursor, Frame, RunView
+from wire.codec import encode
+from wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry
+
+PAUSE = 0.1
+"""Longest wait (s) for a message; then the page is looked after."""
+
+ACCOUNTS = 0.5
+"""Time (s) between two questions for the accounts of emulated links, while any has a fault."""
+
+STATUS = 5.0
+"""Time (s) between two questions for the plant's status, which are also asked when a switch has moved."""
+
+AGAIN = 0.1
+"""Least time (s) between two questions for it."""
+
+
+class RunFollower:
+    """Feed a run's messages into a `RunView`, and read frames from it. Use it as a context.
+
+    Parameters
+    ----------
+    client : RunClient
+        At the run, with its agents met. Only this follower's thread uses it.
+    """
+
+    def __init__(self, client: RunClient) -> None:
+        self._client = client
+        self._view, self._lock = RunView(client.where.run), threading.Lock()
+        self._on_news: Callable[[], None] = _nothing
+        self._ending = threading.Event()
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+        self._asked_status = self._asked_accounts = float("-inf")
+        self._had_plant = False
+
+    def __enter__(self) -> RunFollower:
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._ending.set()
+        self._thread.join()
+
+    def on_news(self, call: Callable[[], None]) -> None:
+        """Set the function that is called, in the follower's thread, when there may be something new."""
+        self._on_news = call
+
+    def frame(self, cursor: Cursor) -> tuple[Frame, Cursor]:
+        """Return what is new since a cursor, and the next cursor; from any thread."""
+        with self._lock:
+            return self._view.frame(cursor, monotonic())
+
+    def feeder_map(self) -> msgspec.Raw | None:
+        """Return the one-line diagram as JSON; None until it has come."""
+        with self._lock:
+            return None if self._view.feeder_map is None else msgspec.Raw(msgspec.json.encode(self._view.feeder_map))
+
+    def _follow(self) -> None:
+        subscriber = RunSubscriber(self._client, _Locked(self._view, self._lock), self._take_other)
+        while not self._ending.is_set():
+            heard = subscriber.take(PAUSE)
+            now = monotonic()
+            with self._lock:
+                self._view.presence(plant=self._client.plant, agents=self._client.present, now=now)
+                self._view.forget_silent(now)
+                questions = self._questions(now)
+            for verb in questions:
+                self._ask(verb)
+            if self._client.plant and not self._had_plant:
+                self._client.fetch(self._client.keys.feeder_map)
+            self._had_plant = self._client.plant
+            if heard or questions:
+                self._on_news()
+
+    def _questions(self, now: float) -> list[str]:
+        """Return the verbs to ask the plant with now."""
+        if not self._client.plant:
+            return []
+        asked = []
+        if now - self._asked_status >= (AGAIN if self._view.wants_status else STATUS):
+            self._asked_status = now
+            asked.append("status")
+        if self._view.any_impaired and now - self._asked_accounts >= ACCOUNTS:
+            self._asked_accounts = now
+            asked.append("links")
+        return asked
+
+    def _ask(self, verb: str) -> None:
+        tree = {"sender": "visitor", "epoch": 0, "seq": 0, "t": 0.0, "verb": verb, "reply_to": self._client.id}
+        command = Command(**tree)  # type: ignore[arg-type]  # the fields above
+        self._client.publish(self._client.keys.command, encode(command))
+
+    def _take_other(self, key: str, payload: bytes) -> None:
+        """Take answers of the plant and of receivers of links, and the one-line diagram."""
+        if key == self._client.keys.feeder_map:
+            diagram = read_feeder_map(payload)
+            with self._lock:
+                self._view.feeder_map = diagram or self._view.feeder_map
+            self._on_news()
+            return
+        message = self._client.read(key, payload)
+        with contextlib.suppress(msgspec.DecodeError), self._lock:
+            if isinstance(message, Answer) and message.ok and "phase" in message.data:
+                self._view.plant_status(msgspec.convert(message.data, PlantStatus))
+            elif isinstance(message, LinkAcknowledgement) and message.ok and message.data:
+                self._view.accounts(message.sender, decode_statuses(message.data))
+        self._on_news()
+
+
+class _Locked:
+    """The view as the subscriber feeds it, while pages read it in another thread."""
+
+    def __init__(self, view: RunView, lock: threading.Lock) -> None:
+        self._view, self._lock = view, lock
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        with self._lock:
+            return self._view.inverters
+
+    def config(self, config: AgentConfig) -> None:
+        with self._lock:
+            self._view.config(config)
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        with self._lock:
+            self._view.telemetry(message, now)
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        with self._lock:
+            self._view.status(message, now)
+
+
+def _nothing() -> None:
+    """Do nothing."""

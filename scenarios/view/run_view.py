@@ -1,0 +1,229 @@
+"""What the page shows of a run: fed by messages, read out as frames. Pure: messages and the time are arguments.
+
+A frame has what is new since the reader's `Cursor`, and the present values. So any number of pages read at their own
+pace, and nothing waits for a slow one.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Collection, Mapping
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from scenarios.emulation.link_reports import LinkStatus
+from scenarios.live.feeder_map import FeederMap
+from scenarios.live.show.run_monitor import SILENT, PlantStatus, RunMonitor
+from scenarios.live.show.snapshot import InverterStatus
+from scenarios.view.link_states import LinkStates, LinkView
+from scenarios.view.liveness import Liveness, LivenessView
+from scenarios.view.strips import Point, Strips
+from wire.messages import AgentStatus, PlantEvent, Telemetry
+
+KEPT = 200
+"""Most events that are kept for a page that comes later."""
+
+
+class EventView(msgspec.Struct, frozen=True):
+    """An event as the page shows it."""
+
+    number: int
+    t: float
+    kind: str
+    subject: str
+    text: str
+
+
+class Cursor(msgspec.Struct, frozen=True):
+    """What a page has already."""
+
+    run: int = -1
+    """Number of the run's plant, counted by the view."""
+    t: float = -1.0
+    """Run time (s) of its last point."""
+    event: int = 0
+    """Number of its last event."""
+    links: int = 0
+    """Version of its links."""
+    switches: int = -1
+    """Version of its switches."""
+
+
+class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """What a page needs to be up to date."""
+
+    live: LivenessView
+    t: float | None
+    """Run time (s)."""
+    pace: str
+    inverters: tuple[InverterStatus, ...]
+    """Present values; those of the plant only if the run is live."""
+    reset: bool = False
+    """Whether all that the page has is of another run."""
+    names: tuple[str, ...] = ()
+    """Inverters in the order of the points; with the points of the first frame, or when they change."""
+    f_nom: float = 0.0
+    """Nominal frequency (Hz); 0 if it is not known."""
+    points: tuple[Point, ...] = ()
+    events: tuple[EventView, ...] = ()
+    links: dict[str, tuple[LinkView, ...]] = {}
+    """Links into each agent whose links have changed."""
+    switches: dict[str, bool] | None = None
+    """Position of each switch, if any has changed: whether it is closed."""
+
+
+class RunView:
+    """Collect a run's messages for the page.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    """
+
+    def __init__(self, run: str) -> None:
+        self._monitor = RunMonitor(run)
+        self.feeder_map: FeederMap | None = None
+        """The one-line diagram; None until it has come."""
+        self.wants_status = True
+        """Whether the plant should be asked for its status: at first, after switching, and after a restart."""
+        self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates()
+        self._configs: dict[str, AgentConfig] = {}
+        self._names: tuple[str, ...] = ()
+        self._run = 0
+        self._events: deque[EventView] = deque(maxlen=KEPT)
+        self._known_events: deque[PlantEvent] = deque(maxlen=KEPT)
+        self._count = 0
+        self._switches: dict[str, bool] = {}
+        self._switches_version = 0
+        self._into: dict[str, tuple[int, tuple[LinkView, ...]]] = {}
+        """Links into each agent, with the version at which they changed."""
+        self._version = 0
+        self._status_at: dict[str, float] = {}
+        self._islands: dict[str, str] = {}
+        self._present: frozenset[str] = frozenset()
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of all inverters in the messages so far, in order."""
+        return self._monitor.inverters
+
+    @property
+    def any_impaired(self) -> bool:
+        """Whether any link has an emulated fault, so that its account is of interest."""
+        return self._links.any_impaired
+
+    # ---- what comes
+
+    def config(self, config: AgentConfig) -> None:
+        """Take the configuration of an agent."""
+        self._configs[config.name] = config
+        self._monitor.config(config)
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        """Take the plant's telemetry; `now` is the client's clock (s)."""
+        self._monitor.telemetry(message, now)
+        if self._liveness.heard(message.epoch, now, ended=message.outcome if message.final else None):
+            self._begin_again()
+        if message.inverters != self._names:
+            self._strips.clear()
+            self._names = message.inverters
+        self._strips.add(message.inverters, message.rows, self._configs)
+        self._take_events(message.events)
+
+    def plant_status(self, status: PlantStatus) -> None:
+        """Take the plant's status."""
+        self._monitor.plant_status(status)
+        self.wants_status = False
+        if status.switches != self._switches:
+            self._switches, self._switches_version = status.switches, self._switches_version + 1
+        self._take_events(status.events, old=True)
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Take the status of an agent."""
+        self._monitor.status(message, now)
+        self._status_at[message.sender] = now
+        self._islands[message.sender] = message.island
+        self._links.status(message, now)
+        self._renew_links(message.sender)
+
+    def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
+        """Take the states of the emulated links into a receiver."""
+        self._links.accounts(receiver, statuses)
+        self._renew_links(receiver)
+
+    def presence(self, *, plant: bool, agents: Collection[str], now: float) -> None:
+        """Note whose tokens are there."""
+        self._liveness.token(there=plant, now=now)
+        self._present = frozenset(agents)
+
+    def forget_silent(self, now: float) -> None:
+        """Show no links of agents that have been silent: what they said is not of now."""
+        for name, (_, links) in list(self._into.items()):
+            if links and (name not in self._present or now - self._status_at[name] > SILENT):
+                self._note_links(name, ())
+
+    # ---- what a page reads
+
+    def frame(self, cursor: Cursor, now: float) -> tuple[Frame, Cursor]:
+        """Return what is new since a cursor, and the next cursor."""
+        reset = cursor.run != self._run
+        if reset:
+            cursor = Cursor(run=self._run)
+        live = self._liveness.at(now)
+        snapshot = self._monitor.snapshot(self._present, now, current=live.word == "live")
+        points = tuple(self._strips.since(cursor.t))
+        f_nom = next((config.f_nom for config in self._configs.values()), 0.0)
+        frame = Frame(
+            live=live,
+            t=snapshot.t,
+            pace=snapshot.pace if live.word == "live" else "",
+            inverters=snapshot.inverters,
+            reset=reset,
+            names=self._names if points and cursor.t < 0.0 else (),
+            f_nom=f_nom if reset or cursor.t < 0.0 else 0.0,
+            points=points,
+            events=tuple(event for event in self._events if event.number > cursor.event),
+            links={name: links for name, (version, links) in self._into.items() if version > cursor.links},
+            switches=self._switches if self._switches_version != cursor.switches else None,
+        )
+        later = Cursor(
+            run=self._run,
+            t=points[-1][0] if points else cursor.t,
+            event=self._count,
+            links=self._version,
+            switches=self._switches_version,
+        )
+        return frame, later
+
+    # ---- inner
+
+    def _begin_again(self) -> None:
+        """Forget what the former plant said."""
+        self._run += 1
+        self._strips.clear()
+        self._links.clear()
+        self._into.clear()
+        self._events.clear()
+        self._known_events.clear()
+        self.wants_status = True
+
+    def _take_events(self, events: tuple[PlantEvent, ...], *, old: bool = False) -> None:
+        for event in events:
+            if event in self._known_events:
+                continue
+            self._known_events.append(event)
+            self._count += 1
+            self._events.append(EventView(self._count, event.t, event.kind, event.subject, event.text))
+            self.wants_status |= event.kind == "switch" and not old
+
+    def _renew_links(self, receiver: str) -> None:
+        config = self._configs.get(receiver)
+        max_age = 0.25 if config is None else config.control.degraded_communication.max_age or config.max_age
+        self._note_links(receiver, self._links.into(receiver, self._islands, max_age))
+
+    def _note_links(self, receiver: str, links: tuple[LinkView, ...]) -> None:
+        if self._into.get(receiver, (0, ()))[1] != links:
+            self._version += 1
+            self._into[receiver] = self._version, links

@@ -1,0 +1,96 @@
+"""The last seconds of a run as strips: f, P, Q and V of each inverter, MPSI and MQSI. Pure."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+from math import isfinite
+
+import numpy as np
+
+from agents.agent_config import AgentConfig
+from scenarios.results.metrics import sharing_index
+from wire.messages import VALUES
+
+LENGTH = 30.0
+"""Length of the strips (s of run time)."""
+
+STEP = 0.05
+"""Run time (s) between two points at the least: more than a strip of 600 pixels can show."""
+
+MANY, WIDE_STEP = 30, 0.1
+"""Inverters beyond which there are half as many points."""
+
+Point = tuple[float, tuple[float | None, ...]]
+"""Run time (s); then f (Hz), P (pu of the rating), Q (pu of the rating) and V (pu) of each inverter, all f first; then
+MPSI and MQSI. None stands for a value that is not known, not finite, or of an inverter off the network."""
+
+
+class Strips:
+    """Keep points of the last `LENGTH` seconds.
+
+    Examples
+    --------
+    >>> strips = Strips()
+    >>> strips.add(("inv1",), [(0.0, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0), (0.01, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0)], {})
+    >>> strips.since(-1.0)
+    [(0.0, (60.0, None, None, None, None, None))]
+    """
+
+    def __init__(self) -> None:
+        self._points: deque[Point] = deque()
+        self._due = 0.0
+
+    @property
+    def latest(self) -> float:
+        """Run time (s) of the latest point; -1 before the first."""
+        return self._points[-1][0] if self._points else -1.0
+
+    def clear(self) -> None:
+        """Forget all points: another run has begun."""
+        self._points.clear()
+        self._due = 0.0
+
+    def add(
+        self,
+        inverters: tuple[str, ...],
+        rows: list[tuple[float, ...]] | tuple[tuple[float, ...], ...],
+        configs: Mapping[str, AgentConfig],
+    ) -> None:
+        """Take rows of telemetry; per-unit values need the nameplates of all inverters."""
+        step = STEP if len(inverters) <= MANY else WIDE_STEP
+        for row in rows:
+            t = row[0]
+            if t + 1e-9 < self._due:
+                continue
+            self._due = (int(t / step + 1e-6) + 1) * step
+            self._points.append((round(t, 4), _values(inverters, row, configs)))
+        while self._points and self._points[0][0] < self.latest - LENGTH:
+            self._points.popleft()
+
+    def since(self, t: float) -> list[Point]:
+        """Return the points after a run time (s)."""
+        found = []
+        for point in reversed(self._points):
+            if point[0] <= t:
+                break
+            found.append(point)
+        return found[::-1]
+
+
+def _values(
+    inverters: tuple[str, ...], row: tuple[float, ...], configs: Mapping[str, AgentConfig]
+) -> tuple[float | None, ...]:
+    f, P, Q, V = (np.array(row[1 + i :: VALUES]) for i in range(4))
+    present = (P != 0.0) | (Q != 0.0)  # the plant reports exactly no power of an inverter that is off the network
+    known = [configs.get(name) for name in inverters]
+    rated = np.array([np.nan if config is None else config.P_rated for config in known])
+    V_nom = np.array([np.nan if config is None else config.V_nom for config in known])
+    indices = [np.nan, np.nan]
+    if all(known):
+        droops = [np.array([getattr(config, name) for config in known]) for name in ("m_p", "m_q")]
+        indices = [
+            float(sharing_index(x[None, :], rated, m, present[None, :])[0]) for x, m in zip((P, Q), droops, strict=True)
+        ]
+    columns = np.concatenate([np.where(present, x, np.nan) for x in (f, P / rated, Q / rated, V / V_nom)])
+    return tuple(round(value, 4) if isfinite(value) else None for value in (*columns.tolist(), *indices))

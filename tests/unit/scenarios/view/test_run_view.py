@@ -1,0 +1,186 @@
+"""What the page shows of a run, without a browser: new things once, and nothing old as if it were of now."""
+
+from __future__ import annotations
+
+from math import isclose
+
+import msgspec
+import pytest
+
+from netem.ledger import LinkCounts
+from scenarios.emulation.link_reports import LinkStatus
+from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.view.liveness import FROZEN
+from scenarios.view.run_view import Cursor, RunView
+from scenarios.view.strips import LENGTH, STEP
+from tests.toy.toy_configs import agent_config
+from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+NAMES = ("inv1", "inv2")
+
+
+def row(t: float, P: float = 3e4) -> tuple[float, ...]:
+    """A row of telemetry; the second inverter delivers twice as much."""
+    return (t, 60.0, P, 1e3, 277.0, P, 277.0, 60.0, 2 * P, 1e3, 277.0, P, 277.0)
+
+
+def telemetry(t: float, epoch: int = 7, *events: PlantEvent, final: bool = False, outcome: str = "") -> Telemetry:
+    """Telemetry of the plant with one row."""
+    return Telemetry(
+        sender="plant", epoch=epoch, seq=0, t=t, inverters=NAMES, rows=(row(t),), events=events, final=final,
+        outcome=outcome, reproducible=False, pacing=None,
+    )  # fmt: skip
+
+
+def status(name: str, *, used: tuple[str, ...], age: float = 0.02, sent: int = 0, **others: object) -> AgentStatus:
+    """Status of an agent with one neighbour."""
+    (neighbour,) = set(NAMES) - {name}
+    fields: dict[str, object] = {
+        "phase": "running", "waits_for": "", "island": "inv1", "neighbours": (neighbour,), "ages": (age,), "used": used,
+        "received": 0, "sent": sent, "rejected": 0, "lost": 0, "ticks": 0, "missed": 0, "lateness": 0.0,
+    }  # fmt: skip
+    return AgentStatus(sender=name, epoch=1, seq=0, t=0.0, **(fields | others))  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def view() -> RunView:
+    """A view of two inverters, whose plant and agents are there."""
+    made = RunView("lab")
+    for name in NAMES:
+        made.config(agent_config(name))
+    made.presence(plant=True, agents=NAMES, now=0.0)
+    return made
+
+
+def test_a_frame_has_what_is_new_and_no_more(view: RunView) -> None:
+    """Two pages read at their own pace; each gets every point and event once."""
+    event = PlantEvent(t=0.1, kind="switch", subject="13-152", text="switch 13-152 opened")
+    view.telemetry(telemetry(0.1, 7, event), 1.0)
+    fast, cursor = view.frame(Cursor(), 1.0)
+    view.telemetry(telemetry(0.3, 7, event), 1.2)
+    second, _ = view.frame(cursor, 1.2)
+    slow, _ = view.frame(Cursor(), 1.2)
+
+    assert [point[0] for point in fast.points] == [0.1]
+    assert (fast.reset, fast.names, fast.f_nom) == (True, NAMES, 60.0)
+    assert [point[0] for point in second.points] == [0.3]
+    assert (second.reset, second.names, second.events) == (False, (), ())
+    assert [point[0] for point in slow.points] == [0.1, 0.3]
+    assert [event.text for event in slow.events] == ["switch 13-152 opened"]
+    msgspec.json.encode(slow)
+
+
+def test_numbers_are_of_now_only_while_the_plant_speaks(view: RunView) -> None:
+    """Frozen, gone and ended: no value of the plant stands in the frame, and the page is told since when."""
+    view.telemetry(telemetry(1.0), 10.0)
+    assert view.frame(Cursor(), 10.1)[0].inverters[0].P == 30.0
+
+    frozen, _ = view.frame(Cursor(), 10.0 + FROZEN + 0.1)
+    assert (frozen.live.word, frozen.inverters[0].P, frozen.inverters[0].f) == ("frozen", None, None)
+    assert frozen.pace == ""
+    view.presence(plant=False, agents=NAMES, now=10.2)
+    gone, _ = view.frame(Cursor(), 10.3)
+    assert (gone.live.word, gone.live.since, gone.inverters[0].P) == ("gone", 0.3, None)
+    view.telemetry(telemetry(1.2, final=True, outcome="it broke"), 10.4)
+    ended, _ = view.frame(Cursor(), 10.5)
+    assert (ended.live.word, ended.live.text, ended.inverters[0].P) == ("ended", "The run has ended: it broke.", None)
+
+
+def test_another_plant_begins_anew(view: RunView) -> None:
+    """No point, event or link of the former plant stays, and every page is told."""
+    event = PlantEvent(t=0.1, kind="switch", subject="13-152", text="switch 13-152 opened")
+    view.telemetry(telemetry(5.0, 7, event), 1.0)
+    view.status(status("inv1", used=("inv2",)), 1.0)
+    pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+    view.plant_status(PlantStatus(phase="running", t=5.0, speed=1.0, pacing=pacing))
+    _, cursor = view.frame(Cursor(), 1.0)
+    assert not view.wants_status
+
+    view.telemetry(telemetry(0.1, 8), 2.0)
+    frame, _ = view.frame(cursor, 2.0)
+
+    assert (frame.reset, frame.live.restarts, frame.t) == (True, 1, 0.1)
+    assert [point[0] for point in frame.points] == [0.1]
+    assert (frame.events, frame.links) == ((), {})
+    assert view.wants_status
+
+
+def test_strips_keep_the_last_seconds_in_per_unit(view: RunView) -> None:
+    """Memory is bounded however long a run is, and however many rows a second has."""
+    rated, V_nom = agent_config("inv1").P_rated, agent_config("inv1").V_nom
+    for k in range(10_000):
+        view.telemetry(telemetry(k * 0.01), k * 0.01)
+    points = view.frame(Cursor(), 100.0)[0].points
+
+    assert len(points) <= LENGTH / STEP + 1
+    assert isclose(points[-1][0] - points[0][0], LENGTH, abs_tol=STEP)
+    f1, f2, P1, P2, _, _, V1, _, MPSI, MQSI = points[-1][1]
+    assert (f1, f2, V1) == (60.0, 60.0, round(277.0 / V_nom, 4))
+    assert (round(3e4 / rated, 4), round(6e4 / rated, 4)) == (P1, P2)
+    assert (MPSI, MQSI) == (0.3333, 0.0), "(16) of loads 1 : 2 and equal vars"
+
+
+def test_an_inverter_off_the_network_has_no_line(view: RunView) -> None:
+    """The plant reports exactly no power of it; a line at 0 would say that it idles."""
+    message = telemetry(1.0)
+    off = (1.0, 60.0, 0.0, 0.0, 277.0, 0.0, 277.0, *row(1.0)[7:])
+    view.telemetry(msgspec.structs.replace(message, rows=(off,)), 1.0)
+
+    values = view.frame(Cursor(), 1.0)[0].points[0][1]
+
+    assert values[::2][:4] == (None, None, None, None)
+    assert all(value is not None for value in values[1:8:2])
+
+
+def test_links_say_how_they_are(view: RunView) -> None:
+    """Used, old and in another island; cut or lossy with the words of the fault; messages per second as they come."""
+    view.status(status("inv2", used=("inv1",), sent=100), 0.0)
+    view.status(status("inv2", used=("inv1",), sent=150), 1.0)
+    view.status(status("inv1", used=("inv2",)), 1.0)
+    used = view.frame(Cursor(), 1.0)[0].links["inv1"][0]
+    assert (used.src, used.state, used.age, used.rate, used.cut) == ("inv2", "used", 0.0, 50.0, False)
+
+    view.status(status("inv1", used=(), age=3.0, impaired=("inv2",)), 1.1)
+    assert view.any_impaired
+    view.accounts("inv1", {"inv2": LinkStatus(holds=("cut",))})
+    cut = view.frame(Cursor(), 1.1)[0].links["inv1"][0]
+    assert (cut.state, cut.age, cut.rate, cut.holds, cut.cut) == ("old", 3.0, 0.0, ("cut",), True)
+
+    view.status(status("inv1", used=("inv2",), impaired=("inv2",)), 1.2)
+    for sent, dropped in ((100, 0), (200, 20)):
+        counts = LinkCounts(
+            sent=sent, delivered=sent - dropped, duplicated=0, corrupted=0, in_flight=0, dropped={"loss": dropped}
+        )
+        view.accounts("inv1", {"inv2": LinkStatus(holds=("loss 0.2",), counts=counts)})
+    lossy = view.frame(Cursor(), 1.2)[0].links["inv1"][0]
+    assert (lossy.lost, lossy.rate, lossy.cut) == (0.2, 40.0, False)
+
+    view.status(status("inv2", used=(), island="inv2"), 1.3)
+    view.status(status("inv1", used=()), 1.3)
+    assert view.frame(Cursor(), 1.3)[0].links["inv1"][0].state == "apart"
+
+
+def test_links_into_a_silent_agent_are_not_shown(view: RunView) -> None:
+    """What it said is not of now."""
+    view.status(status("inv1", used=("inv2",)), 1.0)
+    _, cursor = view.frame(Cursor(), 1.0)
+    view.forget_silent(1.1)
+    assert view.frame(cursor, 1.1)[0].links == {}
+    view.forget_silent(5.0)
+    assert view.frame(cursor, 5.0)[0].links == {"inv1": ()}
+
+
+def test_switches_come_when_they_change(view: RunView) -> None:
+    """An event of a switch asks for the positions; a page gets them once."""
+    pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+    closed = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing, switches={"13-152": True})
+    view.plant_status(closed)
+    frame, cursor = view.frame(Cursor(), 1.0)
+    assert frame.switches == {"13-152": True}
+    assert view.frame(cursor, 1.0)[0].switches is None
+
+    view.telemetry(telemetry(1.0, 7, PlantEvent(t=1.0, kind="switch", subject="13-152", text="opened")), 1.1)
+    assert view.wants_status
+    view.plant_status(msgspec.structs.replace(closed, switches={"13-152": False}))
+    assert view.frame(cursor, 1.2)[0].switches == {"13-152": False}
+    assert not view.wants_status
