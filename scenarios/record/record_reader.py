@@ -13,7 +13,7 @@ from math import inf
 from pathlib import Path
 from typing import TypeVar
 
-from netem.ledger import LinkTrace
+from netem.ledger import LinkCounts, LinkTrace
 from scenarios.emulation.link_reports import data_of
 from scenarios.record.decision_reader import DecisionReader
 from scenarios.record.message_index import MessageIndex, MessageOnWire
@@ -175,6 +175,16 @@ class RunRecord:
                 yield from data_of(report).traces
             except ValueError:  # the report of a later version, or a damaged one
                 self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
+
+    def link_counts(self) -> dict[tuple[str, str], LinkCounts]:
+        """Return the counts of the messages of each emulated link, by sender and receiver, at their last report."""
+        counts: dict[tuple[str, str], LinkCounts] = {}
+        for report in self._index.of_type("link_reports", LinkReport):
+            try:
+                counts |= {(src, report.sender): of for src, of in data_of(report).counts.items()}
+            except ValueError:
+                self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
+        return counts
 
     def link_requests(self) -> Iterator[LinkRequest]:
         """Yield the commands to emulated links, in their order."""

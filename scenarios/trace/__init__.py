@@ -1,0 +1,1 @@
+"""The messages of a run on one time axis: a Perfetto trace, and flows for a space-time diagram (docs/trace.md)."""
