@@ -56,7 +56,7 @@ class DecisionReader:
             for journal, entry in self._index.part(index).entries:
                 if journal.sender == agent and isinstance(entry, Decision):
                     found[entry.tick] = entry
-        if linked and not self._index.file.complete:
+        if linked:  # its journal comes in parts: of what is behind the last one nothing is known
             reports = [journal.t for journal in self._index.journals(agent)]
             until = max(reports, default=-1.0)
         ticks = sorted(found)

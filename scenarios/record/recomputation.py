@@ -36,9 +36,10 @@ class Recomputed(NamedTuple):
 
 
 def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterator[Recomputed]:
-    """Yield all decisions of an agent, each with its state computed again.
+    """Yield the decisions of an agent, each with its state computed again.
 
-    A law may have a memory, so this begins with the first decision.
+    A law may have a memory, so this begins with the first decision. It ends with the first that is not whole, as where
+    the record is cut off.
 
     Parameters
     ----------
@@ -58,6 +59,8 @@ def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterato
     """
     with closing(_Recomputation(record, agent, law)) as again:
         for decision in record.decisions(agent):
+            if not decision.is_whole:
+                return
             yield Recomputed(decision, again.decide(decision))
 
 

@@ -71,6 +71,11 @@ class RecordedDecision:
     """What came out: set-points (W, V), and what it shared."""
 
     @property
+    def is_whole(self) -> bool:
+        """Whether the record has all states that the agent used: at its end it may lack some, if it is cut off."""
+        return all(each.state is not None for each in self.neighbours if each.number is not None and not each.unused)
+
+    @property
     def agent(self) -> str:
         """Name of the agent."""
         return self.config.name

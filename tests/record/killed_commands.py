@@ -56,8 +56,10 @@ def killed(folder: Path, clock: Literal["simulated", "wall"], after: float, who:
         first, t = began
         os.kill(process, signal.SIGKILL)
         killed_at = monotonic()
-        if who != "command":  # the run goes on, or ends by itself; what it records meanwhile is of no interest
-            sleep(0.3)
+        if who == "plant":  # the run breaks, and the command closes its files
+            command.wait(60.0)
+        elif who != "command":
+            _wait_for_rows(command, history, more=20_000)
     finally:
         command.kill()
         command.wait()
@@ -67,12 +69,13 @@ def killed(folder: Path, clock: Literal["simulated", "wall"], after: float, who:
     return Left(record, last, max(0.0, last - record.t_end) / pace)
 
 
-def _wait_for_rows(command: subprocess.Popen[bytes], history: Path) -> tuple[float, float]:
-    """Wait for the first rows; return when they came, and their run time."""
+def _wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5000) -> tuple[float, float]:
+    """Wait for the first rows, or some bytes more of them; return when they came, and their run time."""
     deadline = monotonic() + 120.0
+    more += history.stat().st_size if history.exists() else 0
     while monotonic() < deadline:
         assert command.poll() is None, "the command ended by itself"
-        if history.exists() and history.stat().st_size > 5000:
+        if history.exists() and history.stat().st_size > more:
             return monotonic(), _last_time(history)
         sleep(0.02)
     raise AssertionError("no rows within 120 s")
@@ -85,15 +88,15 @@ def _last_time(history: Path) -> float:
 
 def _process(parent: int, name: str) -> int:
     """Return the process of the run with a name, a child of the command."""
-    found = subprocess.run(["pgrep", "-P", str(parent), "-f", name], capture_output=True, text=True, check=False)
-    return int(found.stdout.split()[0])
+    words = ["pgrep", "-P", str(parent), "-f", "--", f"--leash {name}$"]
+    return int(subprocess.run(words, capture_output=True, text=True, check=True).stdout.split()[0])
 
 
-def assert_usable(left: Left) -> None:
+def assert_usable(left: Left, *, complete: bool = False) -> None:
     """The record opens, lacks at most the last second, and decisions are made again from all that it has."""
     record = left.record
-    assert not record.complete
-    assert any("cut off" in text for text in record.damage)
+    assert record.complete == complete
+    assert complete or any("cut off" in text for text in record.damage)
     assert left.lost <= 1.0, f"{left.lost:.2f} s lost: history to {left.history:.2f} s, record to {record.t_end:.2f} s"
     assert len(record.physics().t) > 1
     for agent in record.agents[:2]:

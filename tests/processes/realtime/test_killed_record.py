@@ -1,0 +1,47 @@
+"""A process of a recorded run is killed, or its disk is full: the record opens and has what came before."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from scenarios.record.record_reader import RunRecord
+from tests.processes.commands.test_run_command import command
+from tests.processes.terminals import LIMITED
+from tests.record.killed_commands import assert_usable, killed
+
+
+@pytest.mark.parametrize("clock", ["simulated", "wall"])
+@pytest.mark.parametrize("who", ["command", "plant", "inv1"])
+def test_a_killed_process_leaves_a_record(who: str, clock: Literal["simulated", "wall"], tmp_path: Path) -> None:
+    """Decisions are made again from all that is there, whether the writer or what it records was killed."""
+    assert_usable(killed(tmp_path / "run", clock, 1.3, who), complete=who == "plant")
+
+
+def test_a_record_without_room_ends_and_the_run_goes_on(tmp_path: Path) -> None:
+    """The run is whole; its report and its log say where run.mcap ends and why, and what is in it can be read."""
+    event = '[[event]]\nlabel = "islanding"\nt_s = 0.5\nopen = ["13-152"]\n'
+    text = f'[time]\nend_s = 7.0\nrecord_s = 0.02\n{event}[case.calm]\nsecondary = "all"\ngraph = "full"\n'
+    (tmp_path / "calm.toml").write_text(text)
+    done = subprocess.run(
+        [*LIMITED, *command("run", "calm.toml", "--clock", "wall", "--out", "here")],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    )
+
+    here = tmp_path / "here"
+    assert done.returncode == 0, done.stderr
+    assert (here / "status.txt").read_text() == "complete\n"
+    told = r"the record run\.mcap ends at \d\.\d\d s: File too large; the run went on without it"
+    assert re.search(told, (here / "report.txt").read_text())
+    assert re.search(told, (here / "log" / "run.log").read_text())
+    record = RunRecord.open(here / "calm")
+    assert 1.0 < record.t_end < 6.9
+    assert any("cut off" in text for text in record.damage)
+    assert record.decision("inv4", record.t_end - 0.5).action == "law"

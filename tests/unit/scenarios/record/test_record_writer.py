@@ -1,0 +1,99 @@
+"""A writer whose disk fails or stands still: the record ends with a sentence, and nobody waits."""
+
+from __future__ import annotations
+
+import errno
+import os
+import threading
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenarios.record import record_writer
+from scenarios.record.record_channels import channels
+from scenarios.record.record_file import RecordFile
+from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_writer import RecordWriter
+from tests.toy.toy_configs import toy_configs
+
+
+def writer(folder: Path) -> RecordWriter:
+    """Return the writer of a record in a folder."""
+    plant, agents = toy_configs(2)
+    info = RecordInfo(
+        level="all", scenario="toy", case="I", toml="", seed=1, driver="processes", versions={}, inverters=plant.agents,
+        plant=plant, agents=agents,
+    )  # fmt: skip
+    return RecordWriter(folder / "run.mcap", info, channels(plant.agents, ("f_Hz",)))
+
+
+def until(happens: threading.Event) -> None:
+    """Wait for something that another thread does."""
+    assert happens.wait(30.0)
+
+
+def test_on_a_full_disk_the_file_ends_with_a_whole_chunk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A write that stops half-way is taken back; the reason is told, and later messages are let go."""
+    one = writer(tmp_path)
+    one.add("telemetry", 10**9, 0, b"first")
+    written, real = threading.Event(), os.write
+    wrote: list[int] = []
+
+    def write(descriptor: int, data: Any) -> int:
+        if written.is_set():
+            if wrote[-1] < 0:
+                raise OSError(errno.ENOSPC, "No space left on device")
+            wrote.append(-1)
+            return real(descriptor, bytes(data)[:20])
+        count = real(descriptor, data)
+        wrote.append(count)
+        written.set()
+        return count
+
+    monkeypatch.setattr(record_writer.os, "write", write)
+    until(written)
+    one.add("telemetry", 2 * 10**9, 1, b"second" * 1000)
+    one.close()
+    one.add("telemetry", 3 * 10**9, 2, b"third")
+
+    assert one.failure == "No space left on device"
+    assert one.ended == 10**9
+    file = RecordFile(tmp_path / "run.mcap")
+    assert [(each.t, each.data) for each in file.messages()] == [(10**9, b"first")]
+    assert "cut off between two chunks" in file.damage[0]
+
+
+def test_a_disk_that_stands_still_ends_the_record_and_not_the_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Once too much waits for the disk, it is let go: the memory of a run is bounded, and nobody waits."""
+    one, stands, goes_on, real = writer(tmp_path), threading.Event(), threading.Event(), os.write
+
+    def write(descriptor: int, data: Any) -> int:
+        stands.set()
+        until(goes_on)
+        return real(descriptor, data)
+
+    monkeypatch.setattr(record_writer.os, "write", write)
+    monkeypatch.setattr(record_writer, "BEHIND", 10_000)
+    one.add("telemetry", 0, 0, b"x")
+    until(stands)
+    for number in range(20):
+        one.add("telemetry", 10**9, number, bytes(1000))
+
+    assert "its disk takes too long" in one.failure
+    goes_on.set()
+    one.close()
+
+
+def test_a_record_closed_twice_is_closed(tmp_path: Path) -> None:
+    """The second time does nothing, and what was written is whole."""
+    one = writer(tmp_path)
+    one.add("events", 0, 0, b"{}")
+    one.close()
+    one.close()
+
+    file = RecordFile(tmp_path / "run.mcap")
+    assert file.complete
+    assert len(list(file.messages())) == 1
