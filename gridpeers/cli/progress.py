@@ -15,7 +15,9 @@ from scenarios.run import Progress as Tell
 PATIENCE = 4.0
 """A start that takes longer than this (s) is explained; usually it takes about 1 s."""
 
-COMPILING = "still starting: the first run ever compiles the plant's inner loop, which takes some seconds ..."
+COMPILING = (
+    "still starting: the plant is built, and the first run ever compiles its inner loop, which takes some seconds ..."
+)
 
 TRYING = (
     "still at work: the plant is tried; the first use ever compiles its inner loop, which takes some 20 seconds ..."

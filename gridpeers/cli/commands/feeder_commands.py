@@ -244,10 +244,13 @@ def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: 
 
 
 def _describe(feeder: Feeder) -> None:
+    from plant.equipment.imported_equipment import BEHIND
+
     load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
-    nodes = sum(len(bus.phases) for bus in feeder.buses)
+    buses = [bus for bus in feeder.buses if BEHIND not in bus.name]  # an import's own stand behind switches and source
+    nodes = sum(len(bus.phases) for bus in buses)
     typer.echo(
-        f"{feeder.name}: {counted(len(feeder.buses), 'bus', 'buses')}, {counted(nodes, 'node')}, "
+        f"{feeder.name}: {counted(len(buses), 'bus', 'buses')}, {counted(nodes, 'node')}, "
         f"{load:.0f} kW of load, "
         f"{f'{generation:.0f} kW of constant generation, ' if generation else ''}"
         f"{counted(len(feeder.switches), 'switch', 'switches')}, {counted(len(feeder.inverters), 'inverter')}, "

@@ -27,6 +27,10 @@ from scenarios.results.plots.style import (
 )
 
 
+ROUNDS = ("-", "--", ":", "-.")
+"""Lines of the first inverters, of those that have their colours again, and so on."""
+
+
 def plug_and_play(drawing: Drawing) -> Figure:
     """Draw P of every inverter, frequency and voltage below each other, a column for each case: the paper's figure."""
     count, nameplates = len(drawing.histories), drawing.nameplates
@@ -65,11 +69,12 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
     widths = np.linspace(2.4, 0.9, len(chosen))  # wide below narrow: where curves coincide all of them are seen
     for panel, (case, history) in zip(grid.flat, drawing.histories.items(), strict=False):
         for number, i in enumerate(chosen):
-            colour = OTHER_STYLES[number % len(OTHER_STYLES)][0]
+            again, of = divmod(number, len(OTHER_STYLES))  # more inverters than colours: those of a later round dashed
             panel.plot(
                 history.t,
                 history.P[:, i] / drawing.nameplates.s[i],
-                color=colour,
+                linestyle=ROUNDS[again % len(ROUNDS)],
+                color=OTHER_STYLES[of][0],
                 linewidth=widths[number],
                 label=drawing.nameplates.names[i],
             )

@@ -25,6 +25,9 @@ BLACK, GREY = "#000000", "#444444"
 LETTER = 0.056
 """Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt."""
 
+LONGEST = 20
+"""Letters of a word that is written whole."""
+
 GAP = 0.06
 """Least distance between two texts (inches)."""
 
@@ -105,11 +108,23 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
 
 def _choices(mark: Mark) -> list[tuple[float, str, TextSide]]:
     """Return what can be written at a mark, and how much it costs."""
-    both = "\n".join(text for text in (mark.label, mark.what) if text)
-    narrow = "\n".join(text for text in (mark.label, mark.what.replace(" ", "\n", 1)) if text)
+    what = " ".join(map(_abridged, mark.what.split(" ")))
+    both = "\n".join(text for text in (mark.label, what) if text)
+    narrow = "\n".join(text for text in (mark.label, what.replace(" ", "\n", 1)) if text)
     texts = {both: 0.0, narrow: 5.0, mark.label: 10.0, "": 30.0}
     sides: tuple[tuple[TextSide, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
     return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
+
+
+def _abridged(word: str) -> str:
+    """Return a word without its middle if it is long, as names of switches in other programs' feeders are.
+
+    Examples
+    --------
+    >>> _abridged("mdv201_hn_2_793_abc1023346_sw"), _abridged("13-152")
+    ('mdv201_hn...23346_sw', '13-152')
+    """
+    return word if len(word) <= LONGEST else f"{word[:9]}...{word[-8:]}"
 
 
 def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colour: str = GREY) -> None:
