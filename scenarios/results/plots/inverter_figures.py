@@ -26,7 +26,6 @@ from scenarios.results.plots.style import (
     widths,
 )
 
-
 ROUNDS = ("-", "--", ":", "-.")
 """Lines of the first inverters, of those that have their colours again, and so on."""
 
