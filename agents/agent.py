@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
+from types import MappingProxyType
 
 from msgspec.structs import replace
 
@@ -47,7 +48,7 @@ def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) 
         nameplate.m_p,
         nameplate.m_q,
         nameplate.P_rated,
-        state.shared,
+        MappingProxyType(state.shared) if state.shared else NOTHING,  # all agents of a process see this one
     )
     _converted[name] = state, nameplate, age, weight, neighbour
     return neighbour

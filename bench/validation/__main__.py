@@ -38,6 +38,11 @@ def main(
             result = part.run(case)
             results.setdefault(part.name, []).append(result)
             broken += [f"{part.name}: {problem}" for problem in result.broken()]
+            numbers = ", ".join(
+                f"{check.quantity} {check.text()} ({'at least' if check.at_least else 'at most'} {check.limit:g})"
+                for check in result.checks
+            )
+            print(f"  {'holds' if not result.broken() else 'BROKEN'}: {numbers}")
     print(write_page(all_parts, results, folder))
     if broken:
         print("\n".join(broken), file=sys.stderr)

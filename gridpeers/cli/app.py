@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Literal
 
 from wire.driver.leftover import leave
@@ -19,6 +20,9 @@ def main() -> None:
     """Run the command line; no bad input ends in a traceback."""
     try:
         _main()
+    except KeyboardInterrupt:  # before the command line is read
+        _tell("interrupted before anything had begun")
+        sys.exit(130)
     except SystemExit as end:
         leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
         raise
@@ -32,15 +36,7 @@ def _main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    driver = driver_of(sys.argv[1:])  # what servers import takes longer than all that comes before them here
-    if driver == "processes":
-        from scenarios.drivers.warm_servers import prepare
-
-        prepare()
-    elif driver == "inprocess":
-        from scenarios.results.figure_processes import prepare_figures
-
-        prepare_figures()
+    _start_ahead(driver_of(sys.argv[1:]))  # what servers import takes longer than all that comes before them here
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
         from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
@@ -53,6 +49,19 @@ def _main() -> None:
             fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
             fail([str(error)], BROKEN)
+
+
+def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:
+    """Start the servers of a run; where that fails, the run starts them when it needs them, and says what is wrong."""
+    with suppress(OSError):
+        if driver == "processes":
+            from scenarios.drivers.warm_servers import prepare
+
+            prepare()
+        elif driver == "inprocess":
+            from scenarios.results.figure_processes import prepare_figures
+
+            prepare_figures()
 
 
 def driver_of(words: Sequence[str]) -> Literal["processes", "inprocess", ""]:

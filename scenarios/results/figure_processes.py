@@ -9,8 +9,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -44,9 +44,9 @@ def drawn_on_all_cores(drawing: Drawing, folder: Path) -> Iterator[None]:
         if started and all([process.wait() == 0 for process in started]):
             return
     finally:
-        for process in started:
-            process.send_signal(signal.SIGKILL)
-            process.wait()
+        _end(started)
+        for unfinished in folder.glob(".*.png"):
+            unfinished.unlink(missing_ok=True)
     from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
 
     draw_all(drawing, folder)
@@ -63,13 +63,20 @@ def _started(drawing: Drawing, folder: Path, number: int) -> list[ForkedProcess]
             started += [server.fork([MODULE], log, speaks=False) for _ in range(number)]
         for first, process in enumerate(started):
             process.stdin.write(pickle.dumps((drawing, folder, first, number)))
-            process.stdin.close()
+            process.stdin.flush()  # it stays open: a process that draws ends with this one
     except (ForkServerError, OSError, pickle.PicklingError):
-        for process in started:
-            process.send_signal(signal.SIGKILL)
-            process.wait()
+        _end(started)
         started.clear()
     return started
+
+
+def _end(started: Sequence[ForkedProcess]) -> None:
+    """End the processes, whatever they are doing."""
+    for process in started:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+        with suppress(BrokenPipeError):  # of what it never read
+            process.stdin.close()
 
 
 def _cores() -> int:

@@ -34,8 +34,13 @@ def cache_folder() -> str:
         base = Path(chosen)
     elif os.access(beside if beside.exists() else _HERE, os.W_OK):
         base = beside
+    elif chosen := os.environ.get("XDG_CACHE_HOME"):
+        base = Path(chosen) / "gridpeers"
     else:
-        base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "gridpeers"
+        try:
+            base = Path.home() / ".cache" / "gridpeers"
+        except RuntimeError:  # nobody's home: nothing is kept
+            base = beside
     return str(base / f"kernels-{digest.hexdigest()[:16]}")
 
 

@@ -1,7 +1,7 @@
 """Machine code on disk: read it, link it into this process by llvmlite, and call it.
 
 This needs no numba. A file of it is for one function, the types of its arguments, one processor and one version of
-numba; it begins with a hash of the rest, so that half a file is none.
+numba; it begins with a hash of its name and the rest, so that half a file is none, nor one under another's name.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class MachineCode(NamedTuple):
             digest, _, rest = file.read_bytes().partition(b"\n")
         except OSError:
             return None
-        if digest.decode(errors="replace") != sha256(rest).hexdigest():
+        if digest.decode(errors="replace") != _digest(file, rest):
             return None
         symbol, results, code = rest.split(b"\n", 2)
         return cls(symbol.decode(), results.decode(), code)
@@ -56,10 +56,13 @@ class MachineCode(NamedTuple):
         """Write it into a file, whole or not at all; where nothing can be written it is compiled anew next time."""
         rest = f"{self.symbol}\n{self.results}\n".encode() + self.code
         part = file.with_name(f"{file.name}-{os.getpid()}")
-        with suppress(OSError):
+        try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            part.write_bytes(sha256(rest).hexdigest().encode() + b"\n" + rest)
+            part.write_bytes(_digest(file, rest).encode() + b"\n" + rest)
             part.replace(file)
+        except OSError:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
 
     def linked(self, name: str, *, locked: bool) -> Callable[[bytes], Any]:
         """Link it into this process; return the function from words to results.
@@ -86,6 +89,11 @@ class MachineCode(NamedTuple):
         kind = ctypes.PYFUNCTYPE if locked else ctypes.CFUNCTYPE
         pointers = ctypes.c_void_p, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_void_p
         return _caller(name, kind(ctypes.c_int32, *pointers)(tracker[self.symbol]), self.results, tracker)
+
+
+def _digest(file: Path, rest: bytes) -> str:
+    """Return the hash of a file's content and name: under another name it is the code of something else."""
+    return sha256(file.name.encode() + b"\n" + rest).hexdigest()
 
 
 def new_linker() -> Any:

@@ -1,15 +1,26 @@
 """A process that draws some figures of a run: `python -m scenarios.results.plots.drawing_process` < PICKLE.
 
 On standard input comes, pickled, what to draw, where to, and which share of the figures: the number of the share, from
-0, and that of all shares. `scenarios.results.figure_processes` writes it.
+0, and that of all shares. `scenarios.results.figure_processes` writes it, and closes its end when they are drawn.
+If it ends before, the command was killed, and its folder may be that of another run by now.
 """
 
 from __future__ import annotations
 
+import os
 import pickle
 import sys
+import threading
 
 from scenarios.results.plots.run_figures import draw_share
 
+
+def _end_with_the_command() -> None:
+    sys.stdin.buffer.read()
+    os._exit(1)
+
+
 if __name__ == "__main__":
-    draw_share(*pickle.loads(sys.stdin.buffer.read()))
+    share = pickle.load(sys.stdin.buffer)
+    threading.Thread(target=_end_with_the_command, daemon=True).start()
+    draw_share(*share)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -75,3 +76,18 @@ def test_an_error_beside_ends_the_drawing(tmp_path: Path) -> None:
         raise RuntimeError("no room")
 
     assert children_of(os.getpid()) == before
+    assert not list((tmp_path / "plots").glob(".*"))  # a figure that is being written has a hidden name
+
+
+def test_a_process_that_draws_ends_with_its_command(tmp_path: Path) -> None:
+    """After a kill -9 of the command its folder may be another's: nothing comes into it any more."""
+    server = figure_server()
+    assert server is not None
+    with (tmp_path / "log").open("wb") as log:
+        process = server.fork([figure_processes.MODULE], log, speaks=False)
+
+    process.stdin.write(pickle.dumps((drawing("IV"), tmp_path / "plots", 0, 1)))
+    process.stdin.close()  # as the system does for a process that is killed
+
+    assert process.wait() == 1
+    assert not (tmp_path / "plots" / "overview.png").exists()  # the last of all

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import pytest
@@ -8,6 +9,7 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from agents.agent_config import Control, DegradedCommunication
 from agents.laws.consensus import P_set_step, V_set_step
+from agents.laws.law import Law, Neighbour, Own, SetPoints
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from wire.messages import OFF, Measurement, Nameplate, State
 
@@ -158,3 +160,22 @@ def test_a_neighbour_that_is_out_of_service_is_left_out(islands: Literal["switch
 
     assert agent.shares_island("inv2")
     assert not agent.shares_island("inv3")
+
+
+def test_a_law_that_changes_what_a_neighbour_shares_fails() -> None:
+    """All agents of a process see one state: a law that changed it would couple them, but not in many processes."""
+
+    class Touching(Law):
+        def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+            neighbours[0].shared["x"] = 1.0  # type: ignore[index]
+            return SetPoints(own.P_set, own.V_set)
+
+    agent = Agent(met().config, Touching())
+    agent.meet(plate("inv2"))
+    told = replace(state("inv2"), shared={"x": 0.5})
+    agent.hear(told)
+
+    decided = agent.tick(measurement(1), ("inv2",))
+
+    assert "does not support item assignment" in decided.fault
+    assert told.shared == {"x": 0.5}

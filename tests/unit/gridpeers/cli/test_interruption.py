@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
+from gridpeers.cli import app
 from gridpeers.cli.interruption import exit_code, interruptible
 
 
@@ -30,6 +31,22 @@ def test_a_signal_ends_a_command_as_ctrl_c_does(sent: signal.Signals, code: int)
 
     assert exit_code(ended.value) == code
     assert [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)] == [signal.SIG_IGN, signal.SIG_DFL]
+
+
+def test_before_the_command_line_is_read_ctrl_c_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A run starts its servers before all else, and whoever stops it in that moment sees no traceback."""
+
+    def interrupted(driver: str) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(app, "_start_ahead", interrupted)
+
+    with pytest.raises(SystemExit) as ended:
+        app.main()
+
+    assert (ended.value.code, capsys.readouterr().err) == (130, "gridpeers: interrupted before anything had begun\n")
 
 
 def test_under_nohup_a_command_outlives_its_terminal() -> None:

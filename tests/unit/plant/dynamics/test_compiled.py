@@ -112,6 +112,26 @@ def test_another_process_reads_machine_code_without_numba() -> None:
     assert done.stdout == "['llvmlite']\n"
 
 
+def test_a_file_under_another_name_is_none(folder: Path) -> None:
+    """Code of one function in the file of another would be called with what it cannot take, and end the process."""
+    Kernel(fill)(np.zeros(2), 1.0)
+    (file,) = folder.glob(f"*{SUFFIX}")
+
+    other = file.rename(file.with_name(f"other{SUFFIX}"))
+
+    assert MachineCode.read(other) is None
+
+
+def test_what_cannot_be_kept_leaves_nothing(folder: Path) -> None:
+    """A folder where its file should be: no part of a file stays beside it, however often that happens."""
+    code = MachineCode("name", "f", b"code")
+    (folder / f"fill{SUFFIX}").mkdir(parents=True)
+
+    code.keep(folder / f"fill{SUFFIX}")
+
+    assert [path.name for path in folder.iterdir()] == [f"fill{SUFFIX}"]
+
+
 def test_a_damaged_file_is_compiled_anew(folder: Path) -> None:
     """Half a file, as of a full disk, is no machine code: linked, it would end the process."""
     Kernel(fill)(np.zeros(2), 1.0)
