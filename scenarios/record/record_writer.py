@@ -9,9 +9,12 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, cast
 
+from mcap.data_stream import RecordBuilder
+from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
 
 from scenarios.record.record_channels import RecordChannel, Topic
@@ -86,6 +89,27 @@ class _WholeWrites:
         os.close(self._file)
 
 
+class _CompactIndex:
+    """The index of all chunks as bytes: as objects, as the library keeps it, an hour has 17 MB."""
+
+    def __init__(self) -> None:
+        self.bytes = bytearray()
+
+    def append(self, index: ChunkIndex) -> None:
+        """Add the index of a chunk."""
+        builder = RecordBuilder()
+        index.write(builder)
+        self.bytes += builder.end()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
+
+    def __iter__(self) -> Iterator[_CompactIndex]:
+        """Yield what writes all of them at the end of the file."""
+        yield self
+
+    def write(self, builder: RecordBuilder) -> None:
+        """Write all of them."""
+        builder.write(self.bytes)
+
+
 class RecordWriter:
     """Write one record: `add` its messages, then `close` it.
 
@@ -114,6 +138,10 @@ class RecordWriter:
         # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
         compression = CompressionType.LZ4 if info.driver == "inprocess" else CompressionType.ZSTD
         self._writer = Writer(cast("Any", self._file), chunk_size=CHUNK, compression=compression)
+        self.index = _CompactIndex()
+        """Index of the chunks written so far."""
+        # the one place where a run of days would grow: should the library name it otherwise, a test tells
+        self._writer._Writer__chunk_indices = self.index  # type: ignore[attr-defined,unused-ignore]  # noqa: SLF001
         self._channels: dict[Topic, int] = {}
         self._begin(info, channels)
         self._waiting: list[_Item] = []

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 
 from scenarios.record import record_writer
 from scenarios.record.record_channels import channels
@@ -97,3 +98,19 @@ def test_a_record_closed_twice_is_closed(tmp_path: Path) -> None:
     file = RecordFile(tmp_path / "run.mcap")
     assert file.complete
     assert len(list(file.messages())) == 1
+
+
+def test_the_index_of_a_long_run_takes_little_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each chunk some bytes are kept, not its objects; in the file every chunk is in the index, for viewers."""
+    monkeypatch.setattr(record_writer, "CHUNK", 100)
+    one = writer(tmp_path)
+    for number in range(500):
+        one.add("telemetry", number, number, bytes(200))
+    one.close()
+
+    with (tmp_path / "run.mcap").open("rb") as file:
+        summary = make_reader(file).get_summary()
+        assert summary is not None
+        assert len(summary.chunk_indexes) == 500
+        assert len(list(make_reader(file).iter_messages())) == 500
+    assert len(one.index.bytes) < 500 * 150
