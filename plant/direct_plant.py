@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
-from wire.messages import Measurement, State, Telemetry
+from wire.messages import PLANT, Journal, Measurement, State, Telemetry
 
 
 class DirectPlant(LockstepPlant):
@@ -21,29 +21,38 @@ class DirectPlant(LockstepPlant):
         The plant at t = 0.
     on_telemetry : Callable[[Telemetry], None]
         Takes the telemetry, as it is.
+    on_journal : Callable[[Journal], None]
+        Takes the journal, if the configuration asks for one.
     """
 
-    def __init__(self, config: PlantConfig, plant: PlantLike, on_telemetry: Callable[[Telemetry], None]) -> None:
+    def __init__(
+        self,
+        config: PlantConfig,
+        plant: PlantLike,
+        on_telemetry: Callable[[Telemetry], None],
+        on_journal: Callable[[Journal], None],
+    ) -> None:
         assert not config.schedule
         assert not config.links
         super().__init__(config, plant)
-        self._on_telemetry = on_telemetry
+        self._on_telemetry, self._take_journal = on_telemetry, on_journal
+        self._measured: list[Measurement] = []
+        """Measurements of this tick."""
         self._roster, self.phase = config.agents, "ticking"
         self._reporter.collect()
 
     def begin_tick(self) -> list[Measurement]:
         """Return the measurements of this tick, one for each agent."""
         measurements = list(self._measurements())
-        if self._tick_traffic is not None:
-            self._tick_traffic.measured(measurements)
         if self.tick == 0:
             self._report(final=False)
+        self._measured = measurements
         return measurements
 
     def end_tick(self, states: Sequence[State]) -> None:
         """Hold the set-points of these states and advance; at the end of the run, or if the plant breaks, be over."""
         if self._tick_traffic is not None:
-            self._tick_traffic.decided(states)
+            self._tick_traffic.exchanged(self.tick, self._measured, states)
         for state in states:
             self._note_state(state)
             if not state.idle:
@@ -52,3 +61,12 @@ class DirectPlant(LockstepPlant):
 
     def _send(self, message: Telemetry) -> None:
         self._on_telemetry(message)
+
+    def _report_journal(self) -> None:
+        if self.journal is None or self._tick_traffic is None:
+            return
+        self._tick_traffic.settle()
+        for data in self.journal.take_parts():
+            journal = Journal(sender=PLANT, epoch=self.config.epoch, seq=self._journal_parts, t=self.t, data=data)
+            self._journal_parts += 1
+            self._take_journal(journal)

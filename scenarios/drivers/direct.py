@@ -14,8 +14,6 @@ from agents.laws.law import Law
 from plant.direct_plant import DirectPlant
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
-from wire.actions import Publish
-from wire.codec import decode
 from wire.messages import Journal, Telemetry
 
 
@@ -50,7 +48,7 @@ def run_direct(
     on_journal : Callable[[Journal], None], optional
         Takes the journals, if the configurations ask for them.
     """
-    core = DirectPlant(config, plant, on_telemetry)
+    core = DirectPlant(config, plant, on_telemetry, on_journal)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
     group = AgentGroup([agents[i] for i in order], [laws[i] for i in order])
@@ -58,9 +56,5 @@ def run_direct(
         core.end_tick(group.tick(core.begin_tick()))
         for journal in group.take_journals():
             on_journal(journal)
-        for action in core.take_actions():
-            if isinstance(action, Publish) and action.key == core.keys.telemetry:
-                message = decode(action.payload)
-                assert isinstance(message, Journal)
-                on_journal(message)
+        core.take_actions()  # words to agents, who are not there to hear them
     return core
