@@ -190,7 +190,7 @@ class PlantNode(Node):
         """Pass on a part of an agent's journal."""
         self._publish(self.keys.telemetry, payload)
 
-    def _report_journal(self) -> None:
+    def _report_journal(self, *, last: bool = False) -> None:
         """Send the own journal since the last report."""
         self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
 
@@ -249,6 +249,6 @@ class PlantNode(Node):
         """Send the last telemetry, unless it is sent already."""
         if self._last_due:
             self._last_due = False
-            self._report_journal()
+            self._report_journal(last=True)
             self._report_links(last=True)
             self._report(final=True)

@@ -52,13 +52,14 @@ class DecisionReader:
         found: dict[int, Decision] = {}
         until = inf
         linked = bool((config := self._info.agent(agent)) and config.links)
-        for index in self._index.near(0.0, inf):
-            for journal, entry in self._index.part(index).entries:
-                if journal.sender == agent and isinstance(entry, Decision):
+        latest = -1.0
+        for journal in self._index.journals(agent):
+            latest = max(latest, journal.t)
+            for entry in self._index.entries_in(journal):
+                if isinstance(entry, Decision):
                     found[entry.tick] = entry
         if linked:  # its journal comes in parts: of what is behind the last one nothing is known
-            reports = [journal.t for journal in self._index.journals(agent)]
-            until = max(reports, default=-1.0)
+            until = latest
         ticks = sorted(found)
         return ticks, [found[tick] for tick in ticks], until
 

@@ -110,6 +110,13 @@ class MessageIndex:
         last = bisect_left(self._ends, until + LATE) + 1 if until < inf else len(self._ends)
         return range(first, min(last, len(self._ends)))
 
+    def entries_in(self, journal: Journal) -> Iterator[Entry]:
+        """Yield the entries of one part of a journal, as far as they can be read."""
+        try:
+            yield from entries_of(journal.data)
+        except ValueError as error:
+            self.note_damage(f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read: {error}")
+
     def journals(self, node: str) -> Iterator[Journal]:
         """Yield the parts of the journal of a node."""
         for record in self.file.messages(_JOURNALS):
@@ -173,12 +180,9 @@ class MessageIndex:
             journal = self._message(record)
             if not isinstance(journal, Journal):
                 continue
-            try:
-                for entry in entries_of(journal.data):
-                    part.entries.append((journal, entry))
-                    self._note(part, entry)
-            except ValueError as error:
-                self.note_damage(f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read: {error}")
+            for entry in self.entries_in(journal):
+                part.entries.append((journal, entry))
+                self._note(part, entry)
         return part
 
     def _note(self, part: _Part, entry: Entry) -> None:

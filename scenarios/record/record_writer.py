@@ -1,6 +1,7 @@
 """Write the record of one case while it runs: chunks, each on the disk within a second of its first message.
 
-A thread of its own encodes, compresses and writes, so that the run waits for no disk. A full or broken disk ends the
+A thread of its own encodes, compresses and writes, so that the run waits for no disk; a run in one process, which does
+nothing else, writes in between. A full or broken disk ends the
 record with one sentence, and the run goes on. What is in the file can be read whatever ends the process.
 """
 
@@ -11,6 +12,7 @@ import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from time import monotonic
 from typing import Any, NamedTuple, cast
 
 from mcap.data_stream import RecordBuilder
@@ -149,10 +151,13 @@ class RecordWriter:
         self._wake = threading.Event()
         self._closing = False
         self._lock = threading.Lock()
-        self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
-        self._thread.start()
         self._closed = threading.Event()
-        threading.Thread(target=self._sync_all, args=(self._file.descriptor(),), name="sync", daemon=True).start()
+        self._written_at = self._began = monotonic()
+        self._syncs = False
+        self._thread: threading.Thread | None = None
+        if info.driver != "inprocess":  # there the run would take turns with it, 5 ms each, and wait for longer
+            self._thread = threading.Thread(target=self._write_all, name="record", daemon=True)
+            self._thread.start()
 
     def _begin(self, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
         writer = self._writer
@@ -173,6 +178,9 @@ class RecordWriter:
             many = self._bytes
         if many > BEHIND:
             self._fail(f"its disk takes too long: {many / 1e6:.0f} MB wait for it")
+        elif self._thread is None:
+            if many > CHUNK or monotonic() - self._written_at > PERIOD:
+                self._write()
         elif many > CHUNK:
             self._wake.set()
 
@@ -183,7 +191,10 @@ class RecordWriter:
         self._closing = True
         self._wake.set()
         self._closed.set()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
+        elif not self.failure:
+            self._write()
         if not self.failure:
             try:
                 self._writer.finish()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
@@ -200,12 +211,20 @@ class RecordWriter:
             self._wake.wait(PERIOD)
             self._wake.clear()
             closing = self._closing
-            try:
-                self._write_waiting()
-            except OSError as error:
-                self._fail(error.strerror or str(error))
+            self._write()
             if closing:
                 return
+
+    def _write(self) -> None:
+        """Write what waits as a chunk, and have the disk keep it now and then."""
+        try:
+            self._write_waiting()
+            self._written_at = monotonic()
+            if not self._syncs and self._written_at - self._began > SYNC:  # a shorter run has no need of it
+                self._syncs, words = True, (self._file.descriptor(),)
+                threading.Thread(target=self._sync_all, args=words, name="sync", daemon=True).start()
+        except OSError as error:
+            self._fail(error.strerror or str(error))
 
     def _sync_all(self, descriptor: int) -> None:
         """Have the disk keep what is written, also if the machine loses its power, once a `SYNC` until the end.
