@@ -102,9 +102,9 @@ def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[Recorde
             for each in record.decisions(decision.agent, since=since, until=decision.t)
             if each.state.epoch == decision.state.epoch
         ]
-        pauses = [i for i, each in enumerate(found) if each.action != "law"]
-        if pauses or since == 0.0:
-            return tuple(found[pauses[-1] + 1 if pauses else 0 :])
+        starts = [i for i, each in enumerate(found) if each.restarted or (i > 0 and found[i - 1].action != "law")]
+        if starts or since == 0.0:
+            return tuple(each for each in found[starts[-1] if starts else 0 :] if each.action == "law")
         back *= 4.0
 
 
