@@ -21,7 +21,7 @@ M = TypeVar("M", bound=AnyMessage)
 
 _JOURNALS: tuple[Topic, ...] = ("journal",)
 
-LATE = 5.0
+LATE = 2.0
 """Longest time (s of run time) after which an entry of a journal may come into the record."""
 
 
@@ -80,7 +80,7 @@ class MessageIndex:
         self._ends = [until for _, until in self._spans]
         for i in range(1, len(self._ends)):  # so that they rise, should a part hold late entries alone
             self._ends[i] = max(self._ends[i], self._ends[i - 1])
-        self.part = lru_cache(maxsize=16)(self._read_part)
+        self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 12 in real time
 
     def note_damage(self, text: str) -> None:
         """Note that something could not be read."""
