@@ -232,7 +232,7 @@ class PageServer:
             if frame.reset:
                 drawn = False
             await socket.send_text(_json({"frame": frame}))
-            for text in await asyncio.get_running_loop().run_in_executor(None, self._agents.take_endings):
+            for text in self._agents.take_endings():
                 await socket.send_text(_json({"done": {"ok": False, "text": text}}))
             await asyncio.sleep(FASTEST)
             with contextlib.suppress(asyncio.TimeoutError):

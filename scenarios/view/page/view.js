@@ -51,18 +51,18 @@ function take(message) {
     $("control").hidden = $("tools").hidden = !S.hello.control;
     $("rights").textContent = S.hello.control ? "" : "looks only; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); heads();
-    S.links.clear(); strips.clear(); S.events = []; $("event-list").replaceChildren();
+    S.links.clear(); S.pairs = null; strips.clear(); S.events = []; $("event-list").replaceChildren();
   } else if (message.map) {
     S.map = message.map; recolour(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
   } else if (message.done) { done(message.done); }
   else if (message.frame) { takeFrame(message.frame); }
 }
 function takeFrame(frame) {
-  if (frame.reset) { S.links.clear(); strips.clear(); S.events = []; $("event-list").replaceChildren(); }
+  if (frame.reset) { S.links.clear(); S.pairs = null; strips.clear(); S.events = []; $("event-list").replaceChildren(); }
   S.frame = frame;
   if (frame.names && String(frame.names) !== String(strips.names)) { strips.clear(); strips.names = frame.names; colours = lineColours(); for (const id of ["link-a", "link-b"]) fill($(id), frame.names.map(name => [name, name])); $("link-b").selectedIndex = Math.min(1, frame.names.length - 1); }
   if (frame.points) strips.add(frame.points);
-  for (const [dst, links] of Object.entries(frame.links || {})) S.links.set(dst, links);
+  if (frame.links) { for (const [dst, links] of Object.entries(frame.links)) S.links.set(dst, links); S.pairs = pairs(); }
   if (frame.switches) { S.switches = frame.switches; for (const name of Object.keys(frame.switches)) S.pending.delete(name); }
   S.inverters = new Map(frame.inverters.map(one => [one.name, one]));
   for (const event of frame.events || []) {
@@ -102,13 +102,15 @@ function draw() {
   const inverters = frame.inverters.map(one => current ? one : stale(one));
   const islands = [...new Set(inverters.map(one => one.island).filter(Boolean))];
   put($("islands"), islands.length ? `islands: ${islands.join(", ")}` : "");
-  S.pairs = pairs();
+  S.pairs ||= pairs();
   const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V }]));
   for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
   diagram.update(S.pairs, S.switches, states, S.pending, S.lit);
   const speed = Number((frame.pace.match(/speed ([0-9.]+)/) || [0, 1])[1]);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
-  strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), S.events.map(event => [event.t, event.kind]), colours);
+  // most frames have statuses alone: the strips, which take most of the time, stay as they are
+  const now = [strips.latest, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");
+  if (now !== S.drawn) { S.drawn = now; strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), S.events.map(event => [event.t, event.kind]), colours); }
   rows(inverters);
   if (S.tip) showTip();
 }

@@ -118,8 +118,11 @@ def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk
     page.get_by_label("Stop the agent of inv4").click()
     for each in (page, other):
         each.wait_for_selector('[data-agent="inv4"].absent', state="attached")
-    assert page.get_by_label("Start the agent of inv4").is_enabled()
     plant.expect("inv4 left")
+    page.get_by_label("Start the agent of inv4").click()
+    plant.expect("inv4 joined")
+    for each in (page, other):
+        each.wait_for_selector('[data-agent="inv4"]:not(.absent)', state="attached")
 
     page.evaluate(
         """() => { window.seen = [];
