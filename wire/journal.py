@@ -174,7 +174,7 @@ class JournalBuffer:
     >>> journal = JournalBuffer()
     >>> journal.add(Token(None, "alive/agent/inv1/a", True))
     >>> len(journal), journal.take_parts()[0][:7], len(journal)
-    (29, b'\x94\xa5token', 0)
+    (28, b'\x94\xa5token', 0)
     """
 
     __slots__ = ("_bytes", "_ends", "_lost")
