@@ -20,6 +20,7 @@ import msgspec
 
 from scenarios.drivers.forking import ForkedProcess, ForkServer, ForkServerError
 from wire.driver.process import LEASH
+from wire.messages import PLANT
 
 LAST_LINES = 12
 """Last lines of a log in the report on a process that died."""
@@ -170,7 +171,8 @@ class Children:
     def end(self) -> None:
         """End all: ask, wait a short while, then kill. By process id, never by name."""
         try:
-            for child in self.running():
+            # The plant first: an agent that ends before it is an inverter that leaves the network.
+            for child in sorted(self.running(), key=lambda child: child.name != PLANT):
                 child.signal(signal.SIGTERM)
             self.wait(GRACE)
         finally:  # a second Ctrl-C shortens the wait and nothing else
