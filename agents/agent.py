@@ -334,11 +334,10 @@ class Agent:
 
     def _own(self, m: Measurement) -> Own:
         """Return the own inverter as the law sees it."""
-        config, e = self.config, (m.f - self.config.f_nom) / self.config.f_nom
         assert self._P_set is not None
         assert self._V_set is not None
-        self.saturated = self._saturated_sides(m, e) if self._stops else (0, 0)
-        return own_of(config, m, self._P_set, self._V_set, self.saturated)
+        self.saturated = self._saturated_sides(m) if self._stops else (0, 0)
+        return own_of(self.config, m, self._P_set, self._V_set, self.saturated)
 
     def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
         """Return the neighbours that count, with the age (s) and the weight of their last states."""
@@ -366,10 +365,10 @@ class Agent:
         weights = self._weights.at_tick(aged)
         return [neighbour_of(known[name], heard[name], aged[name], weight) for name, weight in weights.items()]
 
-    def _saturated_sides(self, measurement: Measurement, e: float) -> tuple[int, int]:
+    def _saturated_sides(self, measurement: Measurement) -> tuple[int, int]:
         """Return the saturated sides of P by (3), (7) and V by (4), (8), for the set-points that the plant holds."""
         config, m = self.config, measurement
-        P = m.P / config.P_rated + e / config.m_p
+        P = m.P / config.P_rated + (m.f - config.f_nom) / config.f_nom / config.m_p
         V = m.V / config.V_nom / config.m_q + m.Q / config.P_rated
         return (
             self._saturation_P.saturated_side(m.P_set / config.P_rated, P, m.t),

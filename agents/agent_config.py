@@ -203,7 +203,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     max_age: float = MAX_AGE
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""
     record: RecordLevel = "physics"
-    """What the journal of this process has, for a recorder."""
+    """How much this process notes in its journal, which a recorder gets."""
 
     def by_own_clock(self) -> AgentConfig:
         """Return the configuration in simulated time, where a clock that is off makes the period seem longer."""

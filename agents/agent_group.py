@@ -66,15 +66,17 @@ class AgentGroup:
         """Let each agent meet its in-neighbours by the run's rule; return their names."""
         listens: dict[str, tuple[str, ...]] = dict.fromkeys(self._agents, ())
         nameplates = {name: agent.nameplate for name, agent in self._agents.items()}
-        for control in [config.control for config in configs[:1]]:
-            graph = RosterGraph(rule_of(control), nameplates, control.graph)
-            for name, agent in self._agents.items():
-                try:
-                    listens[name] = without_missing(control, name, graph.in_neighbours(name))
-                except GraphError as error:
-                    agent.graph_error = str(error)
-                for other in listens[name]:
-                    agent.meet(nameplates[other])
+        if not configs:
+            return listens
+        control = configs[0].control
+        graph = RosterGraph(rule_of(control), nameplates, control.graph)
+        for name, agent in self._agents.items():
+            try:
+                listens[name] = without_missing(control, name, graph.in_neighbours(name))
+            except GraphError as error:
+                agent.graph_error = str(error)
+            for other in listens[name]:
+                agent.meet(nameplates[other])
         return listens
 
     def tick(self, measurements: Iterable[Measurement]) -> list[State]:
@@ -105,7 +107,7 @@ class AgentGroup:
         for state in changed:
             for data in self._journals[state.sender].journal.take_parts():
                 journals.append(Journal(sender=state.sender, epoch=state.epoch, seq=self._parts, t=state.t, data=data))
-        self._parts += bool(changed)
+        self._parts += 1
         return tuple(journals)
 
     def _note_decisions(self, states: Sequence[State]) -> None:

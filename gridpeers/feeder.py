@@ -10,7 +10,7 @@ import msgspec
 
 from plant.equipment import Feeder as Tables
 from plant.equipment import InverterRow
-from plant.equipment.imported_equipment import BEHIND
+from plant.equipment.imported_equipment import is_behind
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
     def __repr__(self) -> str:
         loads = len({part.name for part in self.load_parts}) + len(self.loads)
-        buses = [bus for bus in self.buses if BEHIND not in bus.name]  # an import has some of its own
+        buses = [bus for bus in self.buses if not is_behind(bus.name)]
         counted = {"buses": buses, "switches": self.switches, "inverters": self.inverters}
         counts = ", ".join(f"{what} {len(rows)}" for what, rows in counted.items())
         return f"<Feeder {self.name}: {counts}, loads {loads}>"

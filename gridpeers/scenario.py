@@ -165,8 +165,8 @@ class Scenario:
         ScenarioError
             If the feeder has no operating point to start from.
         """
-        from scenarios.operating_point import start_problem
         from scenarios.schema.supply import supply_notes
+        from scenarios.start_check import start_problem
 
         if problem := start_problem(self._spec, self._feeder):
             raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])

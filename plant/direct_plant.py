@@ -8,7 +8,7 @@ from plant.lockstep_plant import LockstepPlant
 from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
 from wire.journal import LOT
-from wire.messages import PLANT, Journal, Measurement, State, Telemetry
+from wire.messages import Journal, Measurement, State, Telemetry
 
 
 class DirectPlant(LockstepPlant):
@@ -36,7 +36,7 @@ class DirectPlant(LockstepPlant):
         assert not config.schedule
         assert not config.links
         super().__init__(config, plant)
-        self._on_telemetry, self._take_journal = on_telemetry, on_journal
+        self._on_telemetry, self._on_own_journal = on_telemetry, on_journal
         self._measured: list[Measurement] = []
         """Measurements of this tick."""
         self._roster, self.phase = config.agents, "ticking"
@@ -69,7 +69,5 @@ class DirectPlant(LockstepPlant):
         self._tick_traffic.settle()
         if len(self.journal) < LOT and not last:  # some milliseconds of this run: no kill can take more
             return
-        for data in self.journal.take_parts():
-            journal = Journal(sender=PLANT, epoch=self.config.epoch, seq=self._journal_parts, t=self.t, data=data)
-            self._journal_parts += 1
-            self._take_journal(journal)
+        for journal in self._take_journal(self.config.epoch, self.t):
+            self._on_own_journal(journal)

@@ -194,6 +194,6 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     agent_configs: dict[str, dict[str, Any]] = {}
     """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""
     record: RecordLevel = "physics"
-    """What the journal of this process has, for a recorder."""
+    """How much this process notes in its journal, which a recorder gets."""
     feeder_map: dict[str, Any] = {}
     """Wall-clock: the one-line diagram (`scenarios.live.feeder_map`), as a tree, for clients that draw it."""

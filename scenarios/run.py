@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from datetime import datetime
+from functools import cache
 from importlib import import_module, metadata
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
@@ -326,6 +327,7 @@ def versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
 
 
+@cache
 def _version(package: str) -> str:
     """Version of an installed package; one process does not need all of them."""
     try:

@@ -18,7 +18,7 @@ is handled, costs that message alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from math import inf
 from typing import Any, NamedTuple
@@ -191,10 +191,15 @@ class Node:
 
     def _publish_journal(self, key: str, epoch: int, t: float, *, empty: bool = False) -> None:
         """Publish the journal since the last part, if there is anything in it, or also if it is `empty`."""
+        for journal in self._take_journal(epoch, t, empty=empty):
+            self._publish(key, encode(journal))
+
+    def _take_journal(self, epoch: int, t: float, *, empty: bool = False) -> Iterator[Journal]:
+        """Take out the journal since the last part."""
         if self.journal is None:
             return
         for data in self.journal.take_parts() or ([b""] if empty else []):
-            self._publish(key, encode(Journal(sender=self._name, epoch=epoch, seq=self._journal_parts, t=t, data=data)))
+            yield Journal(sender=self._name, epoch=epoch, seq=self._journal_parts, t=t, data=data)
             self._journal_parts += 1
 
     def _publish_link_reports(

@@ -15,7 +15,7 @@ KEYS = (*CARRIERS, "folder", "time_limit_s")
 """Keys of the table `law` that are no parameters of the law."""
 
 METHODS = ("start", "close", "terms")
-"""What is called of a law, beside `step`."""
+"""Methods of a law that are called beside `step`; a law may leave them as they are in `Law`."""
 
 
 def _objection(it: Any) -> str:

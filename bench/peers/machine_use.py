@@ -1,4 +1,4 @@
-"""What a measurement stands on: commit and versions, and how much of the machine other programs had meanwhile."""
+"""The conditions of a measurement: commit, versions, and how much of the machine other programs used meanwhile."""
 
 from __future__ import annotations
 

@@ -187,7 +187,7 @@ def links(extent: Extent) -> list[Measure]:
 
 
 def scale(extent: Extent) -> list[Measure]:
-    """What a simulated second costs in one process, on a ring, up to 999 agents."""
+    """Cost of a simulated second in one process, on a ring, up to 999 agents."""
     return [
         Measure(
             f"{n} agents in process, T_c {T_c_ms} ms",

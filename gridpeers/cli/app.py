@@ -21,8 +21,10 @@ def main() -> None:
     try:
         _main()
     except KeyboardInterrupt:  # before the command line is read
+        from gridpeers.cli.usage import INTERRUPTED
+
         _tell("interrupted before anything had begun")
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
     except SystemExit as end:
         leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
         raise

@@ -8,7 +8,7 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment.imported_equipment import BEHIND, LinearElement, LoadPart
+from plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
 
@@ -108,7 +108,7 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
         >>> Switch(name="632-632~632-671", alias="632-671", **ends, phases="ABC", closed=True).event_name
         '632-671'
         """
-        return self.alias if self.alias and BEHIND in self.to_bus else self.name
+        return self.alias if self.alias and is_behind(self.to_bus) else self.name
 
     @property
     def full_name(self) -> str:

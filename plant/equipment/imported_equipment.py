@@ -19,6 +19,17 @@ def bus_behind(bus: str, element: str) -> str:
     return f"{bus}{BEHIND}{element}"
 
 
+def is_behind(bus: str) -> bool:
+    """Return whether an import has added a bus, which the other program does not have.
+
+    Examples
+    --------
+    >>> is_behind("632~632-671"), is_behind("632")
+    (True, False)
+    """
+    return BEHIND in bus
+
+
 class LinearElement(msgspec.Struct, frozen=True, kw_only=True):
     """Anything linear between nodes, by its primitive admittance matrix: a line, a transformer, a capacitor."""
 

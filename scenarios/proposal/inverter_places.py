@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import accumulate
 
 from plant.equipment import Feeder
-from plant.equipment.imported_equipment import BEHIND
+from plant.equipment.imported_equipment import is_behind
 from plant.tables.feeder_columns import RATED_CURRENT, power_of
 
 
@@ -24,7 +24,7 @@ def possible_places(feeder: Feeder, section: Collection[str], rating: float, cou
     """
     within, known = set(section), set(three_phase(feeder))
     rows = [bus for bus in feeder.buses if bus.name in within and bus.name in known]
-    rows = [bus for bus in rows if BEHIND not in bus.name] or rows
+    rows = [bus for bus in rows if not is_behind(bus.name)] or rows
     rows = [bus for bus in rows if rating <= most_rated(bus.V_nom)] or rows
     if not rows:
         return []

@@ -125,7 +125,7 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
-    from plant.equipment.imported_equipment import BEHIND
+    from plant.equipment.imported_equipment import is_behind
     from scenarios.results.run_files import refusal, shown, write_whole
 
     try:
@@ -140,7 +140,7 @@ def solve(
     if others := len(table) - len(phases):
         text += f"; {counted(others, 'node')} beside phases A, B and C (neutrals) not counted"
     typer.echo(text)
-    live = live[~live["bus"].str.contains(BEHIND)]  # an import's own buses stand beside one that the script has
+    live = live[~live["bus"].map(is_behind).astype(bool)]  # an import's own buses stand beside one that the script has
     for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
         typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
     if csv is not None:
@@ -244,10 +244,10 @@ def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: 
 
 
 def _describe(feeder: Feeder) -> None:
-    from plant.equipment.imported_equipment import BEHIND
+    from plant.equipment.imported_equipment import is_behind
 
     load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
-    buses = [bus for bus in feeder.buses if BEHIND not in bus.name]  # an import's own stand behind switches and source
+    buses = [bus for bus in feeder.buses if not is_behind(bus.name)]
     nodes = sum(len(bus.phases) for bus in buses)
     typer.echo(
         f"{feeder.name}: {counted(len(buses), 'bus', 'buses')}, {counted(nodes, 'node')}, "

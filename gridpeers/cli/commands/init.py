@@ -168,9 +168,9 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
     from gridpeers.cli.progress import TRYING, explained_work
-    from scenarios.operating_point import start_problem
     from scenarios.proposal.proposal_errors import NoProposalError
     from scenarios.schema import load_scenario
+    from scenarios.start_check import start_problem
     from wire.counted import counted
     from wire.driver.command_line import command_line
 

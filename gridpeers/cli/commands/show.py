@@ -42,9 +42,9 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from gridpeers.cli.progress import TRYING, explained_work
-    from scenarios.operating_point import start_problem
     from scenarios.results.file_sizes import file_sizes
     from scenarios.schema.supply import supply_notes
+    from scenarios.start_check import start_problem
 
     with explained_work(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)

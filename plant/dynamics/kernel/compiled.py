@@ -104,7 +104,7 @@ class Kernel(Generic[_P, _R]):
 
     @property
     def dispatcher(self) -> Any:
-        """What numba has for the function, which sees the same of the functions that it calls."""
+        """The function as numba compiles it; the functions of ours that it calls are given to numba likewise."""
         if self._dispatcher is None:
             from plant.dynamics.kernel.compiling import dispatcher_of
 

@@ -28,7 +28,7 @@ class Root(NamedTuple):
 
     x: Real
     fun: Real
-    """What the function is there."""
+    """Values of the function at `x`."""
     success: bool
 
 

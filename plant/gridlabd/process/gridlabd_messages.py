@@ -1,4 +1,4 @@
-"""What GridLAB-D complains of, from what it has printed."""
+"""Find errors and warnings in the lines that GridLAB-D has printed."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ from plant.dynamics import Dynamics
 from plant.dynamics.kernel import compiled
 from plant.dynamics.kernel.compiled import Kernel
 from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode
-from scenarios.operating_point import start_problem
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
+from scenarios.start_check import start_problem
 from tests.side_by_side import compile_once
 
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
