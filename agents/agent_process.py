@@ -17,6 +17,7 @@ from agents.lockstep_agent import LockstepAgent
 from agents.realtime.realtime_agent import RealtimeAgent
 from wire.driver.drive import StoppedError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
 from wire.keys import check_name
 from wire.node_group import NodeGroup
@@ -54,6 +55,8 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     wall = configs[0].clock == "wall"
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         configs = tuple(replace(config, epoch=max(config.epoch, time_ns() // 1_000_000)) for config in configs)
+    else:
+        schedule_as_batch()
     with ExitStack() as laws:
         nodes = _one_session_after_the_other(configs, make_links, laws)
     failures = []

@@ -18,6 +18,7 @@ from plant.realtime.realtime_plant import RealtimePlant
 from plant.start_words import COMPILING, LISTENING, READY
 from wire.driver.drive import StoppedError, drive, perform, serve
 from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
 from wire.messages import PLANT
 
@@ -70,6 +71,8 @@ def run_plant(
     wall = config.clock == "wall"
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
         config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
+    else:
+        schedule_as_batch()
     plant: LivePlant | None = None
     listen, connect = config.listen, config.connect
     session = Session("plant", listen=listen, connect=connect, clock=config.clock, rendezvous=True, star=config.star)

@@ -1,0 +1,40 @@
+"""How the kernel schedules a process of a run."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+import pytest
+
+from wire.driver.scheduling import schedule_as_batch
+
+pytestmark = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
+
+
+def policies(before: int) -> tuple[int, int]:
+    """Policy of a thread that had one before, and of a thread that it starts."""
+    found: list[int] = []
+
+    def thread() -> None:
+        os.sched_setscheduler(0, before, os.sched_param(0))
+        schedule_as_batch()
+        found.append(os.sched_getscheduler(0))
+        inner = threading.Thread(target=lambda: found.append(os.sched_getscheduler(0)))
+        inner.start()
+        inner.join()
+
+    outer = threading.Thread(target=thread)
+    outer.start()
+    outer.join()
+    return found[0], found[1]
+
+
+def test_a_thread_and_those_it_starts_become_batch_work() -> None:
+    """Zenoh's threads, which start later, are scheduled as the agent that opens the session."""
+    assert policies(os.SCHED_OTHER) == (os.SCHED_BATCH, os.SCHED_BATCH)
+
+
+def test_a_policy_that_the_user_has_chosen_stays() -> None:
+    """A run under `chrt --idle` stays in the background."""
+    assert policies(os.SCHED_IDLE) == (os.SCHED_IDLE, os.SCHED_IDLE)
