@@ -7,7 +7,7 @@ from typing import TypedDict, get_args
 
 import msgspec
 
-from scenarios.live.live_options import SPEEDS
+from scenarios.live.run_speed import SPEEDS
 from scenarios.results.metrics_file import Clock
 from scenarios.run import Driver
 from scenarios.schema import ScenarioError

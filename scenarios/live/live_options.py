@@ -11,15 +11,13 @@ from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
 from scenarios.live.feeder_map import feeder_map
 from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
+from scenarios.live.run_speed import SPEEDS
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.driver.command_line import command_line
 from wire.journal import RecordLevel
 from wire.schema.suggestion import suggestion
-
-SPEEDS = (0.1, 50.0)
-"""Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""
 
 
 class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
