@@ -73,8 +73,10 @@ class Explanation:
         return text_of(self)
 
 
-def explain(record: RunRecord, agent: str, t: float) -> Explanation:
+def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, ...] | None = None) -> Explanation:
     """Explain the decision of an agent that was in force at a run time (s).
+
+    `events` are those of the record, if they are known already: to read them takes its whole file.
 
     Raises
     ------
@@ -84,12 +86,14 @@ def explain(record: RunRecord, agent: str, t: float) -> Explanation:
     """
     if agent not in record.agents:
         raise RecordFileError(f"{record.path}: there was no agent {agent:.64}; agents are {short(record.agents)}")
-    return explained(record, record.decision(agent, t), t)
+    return explained(record, record.decision(agent, t), t, events)
 
 
-def explained(record: RunRecord, decision: RecordedDecision, asked: float) -> Explanation:
+def explained(
+    record: RunRecord, decision: RecordedDecision, asked: float, events: tuple[PlantEvent, ...] | None = None
+) -> Explanation:
     """Explain a decision of a record."""
-    events = record.events()
+    events = record.events() if events is None else events
     step = law_step(record, decision)
     return Explanation(
         scenario=record.info.scenario,

@@ -45,6 +45,10 @@ class DecisionReader:
             return iter(())
         return (self._in_ticks if self._info.clock == "simulated" else self._live)(config, since, until)
 
+    def forget(self) -> None:
+        """Forget what was read of all parts: there are more of them now."""
+        self._forms.cache_clear()
+
     # ---------------------------------------------------------------- simulated time
 
     def _read_forms(self, agent: str) -> tuple[list[int], list[Decision], float]:

@@ -19,8 +19,6 @@ from wire.messages import PLANT, AnyMessage, Journal, Measurement, State
 
 M = TypeVar("M", bound=AnyMessage)
 
-_JOURNALS: tuple[Topic, ...] = ("journal",)
-
 LATE = 2.0
 """Longest time (s of run time) after which an entry of a journal may come into the record."""
 
@@ -76,11 +74,25 @@ class MessageIndex:
         self.file, self.info = file, file.info
         self.damage: list[str] = []
         """Sentences on what could not be read."""
-        self._spans = file.spans
-        self._ends = [until for _, until in self._spans]
-        for i in range(1, len(self._ends)):  # so that they rise, should a part hold late entries alone
-            self._ends[i] = max(self._ends[i], self._ends[i - 1])
+        self._ends: list[float] = []
+        """Last run time (s) of each part."""
+        self._note_parts()
         self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 12 in real time
+
+    def refresh(self) -> bool:
+        """Note what the file of a run that is still recorded has got since; return whether that is anything."""
+        changed = self.file.refresh()
+        self._note_parts()
+        return changed
+
+    @property
+    def parts(self) -> int:
+        """Number of parts."""
+        return len(self._ends)
+
+    def _note_parts(self) -> None:
+        for _, until in self.file.spans[len(self._ends) :]:  # they rise, should a part hold late entries alone
+            self._ends.append(max(until, self._ends[-1]) if self._ends else until)
 
     def note_damage(self, text: str) -> None:
         """Note that something could not be read."""
@@ -89,12 +101,13 @@ class MessageIndex:
 
     # ---------------------------------------------------------------- messages of the plant for recorders
 
-    def of_type(self, topic: Topic, kind: type[M]) -> Iterator[M]:
-        """Yield the messages of a topic that can be read."""
-        for record in self.file.messages([topic]):
-            message = self._message(record)
-            if isinstance(message, kind):
-                yield message
+    def of_type(self, topic: Topic, kind: type[M], parts: Iterable[int] | None = None) -> Iterator[M]:
+        """Yield the messages of a topic that can be read, of some parts or of all."""
+        for index in range(self.parts) if parts is None else parts:
+            for record in self.file.part(index):
+                message = self._message(record) if record.topic == topic else None
+                if isinstance(message, kind):
+                    yield message
 
     def _message(self, record: RecordMessage) -> AnyMessage | None:
         message = sound(record.data)
@@ -119,10 +132,11 @@ class MessageIndex:
 
     def journals(self, node: str) -> Iterator[Journal]:
         """Yield the parts of the journal of a node."""
-        for record in self.file.messages(_JOURNALS):
-            journal = self._message(record)
-            if isinstance(journal, Journal) and journal.sender == node:
-                yield journal
+        return (journal for journal in self.of_type("journal", Journal) if journal.sender == node)
+
+    def journals_in(self, part: int) -> Iterator[Journal]:
+        """Yield the parts of journals, of all nodes, in one part of the file."""
+        return self.of_type("journal", Journal, (part,))
 
     def entries(self, node: str, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
         """Yield the entries of the journal of a node."""

@@ -2,13 +2,14 @@
 
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
 half written, and no index at the end. So the index is not used: the reader goes from record to record, which takes one
-look at each chunk of about a second, and stops where the file ends or makes no sense.
+look at each chunk of about a second, and stops where the file ends or makes no sense. There it can go on later, if the
+run is still recorded.
 """
 
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
@@ -79,24 +80,42 @@ class RecordFile:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.damage: list[str] = []
-        """Sentences on parts of the file that could not be read."""
         self.complete = False
         """Whether the file was closed properly: everything that was recorded is in it."""
+        self._damage: list[str] = []
+        self._end = ""
+        """How the file ends, in a sentence, if that is not its proper end."""
+        self._offset = 0
+        """Where the first record begins that could not be read yet."""
+        self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
+        """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
         self._chunks: list[_ChunkPlace] = []
-        info: RecordInfo | None = None
-        try:
-            with path.open("rb") as file:
-                self._size = file.seek(0, 2)
-                file.seek(0)
-                info = self._scan(file)
-        except OSError as error:
-            raise RecordFileError(f"{path}: cannot be read: {error.strerror}") from None
-        if info is None:
+        self._info: RecordInfo | None = None
+        self._read_on()
+        if self._info is None:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
-        self.info: RecordInfo = info
+        self.info: RecordInfo = self._info
         """The run."""
-        self._load = lru_cache(maxsize=8)(self._load_chunk)
+        self._load: Callable[[int], tuple[RecordMessage, ...]] = lru_cache(maxsize=8)(self._load_chunk)
+
+    @property
+    def damage(self) -> tuple[str, ...]:
+        """Sentences on parts of the file that could not be read, and on its end if it is cut off."""
+        return (*self._damage, *([self._end] if self._end else []))
+
+    def refresh(self) -> bool:
+        """Note what was written since, of a run that is still recorded; return whether that is anything.
+
+        Raises
+        ------
+        RecordFileError
+            If the file cannot be read any more.
+        """
+        if self.complete:
+            return False
+        chunks = len(self._chunks)
+        self._read_on()
+        return self.complete or len(self._chunks) > chunks
 
     @property
     def spans(self) -> list[tuple[float, float]]:
@@ -119,43 +138,55 @@ class RecordFile:
 
     # ---------------------------------------------------------------- inside
 
-    def _scan(self, file: BinaryIO) -> RecordInfo | None:
-        """Note where the chunks are; return what the file says about its run."""
-        if file.read(len(_MAGIC)) != _MAGIC:
-            raise RecordFileError(f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}")
-        info: RecordInfo | None = None
-        self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
-        """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
+    def _read_on(self) -> None:
+        """Read the file from where it ended before."""
+        try:
+            with self.path.open("rb") as file:
+                self._size = file.seek(0, 2)
+                file.seek(self._offset)
+                self._scan(file)
+        except OSError as error:
+            raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
+
+    def _scan(self, file: BinaryIO) -> None:
+        """Note where the chunks are, and what the file says about its run."""
+        if not self._offset:
+            if file.read(len(_MAGIC)) != _MAGIC:
+                raise RecordFileError(
+                    f"{self.path}: this is no record: it does not begin as an MCAP file; give a {FILE}"
+                )
+            self._offset = len(_MAGIC)
+        self._end = ""
         while frame := file.read(_FRAME.size):
             if len(frame) < _FRAME.size:
                 self._cut("within the length of a record")
-                break
+                return
             opcode, length = _FRAME.unpack(frame)
             start = file.tell()
             if start + length > self._size:
                 self._cut("within a chunk" if opcode == Opcode.CHUNK else "within a record")
-                break
+                return
             if opcode == Opcode.FOOTER:
                 self.complete = True
-                break
+                return
             if opcode == Opcode.CHUNK and length > _TIMES.size:
                 since, until, size = _TIMES.unpack(file.read(_TIMES.size))
                 if size > MOST_CHUNK or since > until:
-                    self.damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
+                    self._damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
                 else:
                     self._chunks.append(_ChunkPlace(start, length, since, until))
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
             elif opcode == Opcode.METADATA:
-                info = info or self._info_of(file.read(length))
-            file.seek(start + length)
-        if not self.complete and not self.damage:
+                self._info = self._info or self._info_of(file.read(length))
+            self._offset = start + length
+            file.seek(self._offset)
+        if not self._damage:
             self._cut("between two chunks")
-        return info
 
     def _cut(self, where: str) -> None:
         at = f" after t = {self.t_end:.2f} s" if self._chunks else ""
-        self.damage.append(f"the file is cut off {where}{at}: its writer was killed, or is still at work")
+        self._end = f"the file is cut off {where}{at}: its writer was killed, or is still at work"
 
     def _check_header(self, data: bytes) -> None:
         try:
@@ -200,7 +231,7 @@ class RecordFile:
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
-            self.damage.append(
+            self._damage.append(
                 f"a chunk is damaged, from t = {place.since / 1e9:.2f} s to {place.until / 1e9:.2f} s: "
                 f"{str(error)[:100] or type(error).__name__}"
             )

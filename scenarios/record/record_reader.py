@@ -58,6 +58,11 @@ class RunRecord:
         self._index = MessageIndex(file)
         self._decisions = DecisionReader(self._index)
 
+    @property
+    def index(self) -> MessageIndex:
+        """What is in each part of the file, for readers that go through it by parts."""
+        return self._index
+
     @classmethod
     def open(cls, path: str | Path) -> RunRecord:
         """Open a record.
@@ -81,6 +86,13 @@ class RunRecord:
         """Whether the record was closed properly. If not, its end is missing: at most the last second."""
         return self._file.complete
 
+    def refresh(self) -> bool:
+        """Take in what was written since, of a run that is still recorded; return whether that is anything."""
+        changed = self._index.refresh()
+        if changed:
+            self._decisions.forget()
+        return changed
+
     @property
     def damage(self) -> tuple[str, ...]:
         """Sentences on parts of the file that could not be read so far, and on its end if it is cut off."""
@@ -99,14 +111,17 @@ class RunRecord:
     @property
     def outcome(self) -> str | None:
         """Why the run broke; empty after a good end; None if the record ends before the run."""
-        last = _last(self.telemetry())
+        last = _last(self.telemetry(since=max(0.0, self.t_end - 1.0)))
         return last.outcome if last is not None and last.final else None
 
     # ---------------------------------------------------------------- physics and events
 
-    def telemetry(self) -> Iterator[Telemetry]:
-        """Yield the plant's telemetry: rows and events, in the order of time."""
-        return self._index.of_type("telemetry", Telemetry)
+    def telemetry(self, *, since: float = 0.0, until: float = inf) -> Iterator[Telemetry]:
+        """Yield the plant's telemetry: rows and events, in the order of time.
+
+        Messages have the rows of a while: those between two run times (s) come with others around them.
+        """
+        return self._index.of_type("telemetry", Telemetry, self._index.near(since, until))
 
     def physics(self) -> History:
         """Return the rows of the plant: f, P, Q, V, P_set, V_set of every inverter, as in history.csv, to the last bit.

@@ -9,7 +9,7 @@ import msgspec
 FROZEN = 0.7
 """Time (s) without telemetry after which a plant that is there counts as frozen: it publishes five times a second."""
 
-Word = Literal["waiting", "live", "frozen", "gone", "ended"]
+Word = Literal["waiting", "live", "frozen", "gone", "ended", "record"]
 
 
 class LivenessView(msgspec.Struct, frozen=True, kw_only=True):

@@ -8,21 +8,15 @@ import logging
 import secrets
 import signal
 import socket
-from collections.abc import AsyncIterator, Callable
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import AsyncIterator, Coroutine
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Protocol
 from urllib.parse import parse_qs
 
 import msgspec
 
-from scenarios.live.run_address import RunAddress
-from scenarios.view.own_agents import OwnAgents
-from scenarios.view.page_actions import ActionClient, PageAction, command_line
-from scenarios.view.run_follower import RunFollower
-from scenarios.view.run_view import Cursor
 from wire.driver.drive import StoppedError
 
 if TYPE_CHECKING:  # the extra view has them; who does not open a page needs neither
@@ -39,6 +33,7 @@ FILES = {
     "view.js": "text/javascript",
     "diagram.js": "text/javascript",
     "strips.js": "text/javascript",
+    "player.js": "text/javascript",
 }
 
 HEARTBEAT = 0.25
@@ -70,10 +65,6 @@ _ASK_TOKEN = """<!doctype html><html lang="en"><meta charset="utf-8"><title>grid
 class PageOptions:
     """Options of the server."""
 
-    where: RunAddress
-    """The run."""
-    control: bool = False
-    """Whether pages may act on the run."""
     token: str = ""
     """What a page must know; "" asks for none."""
     hosts: tuple[str, ...] = ("127.0.0.1", "localhost", "[::1]")
@@ -81,23 +72,42 @@ class PageOptions:
     theirs (DNS rebinding)."""
 
 
+Talk = Coroutine[Any, Any, None]
+
+
+class Pages(Protocol):
+    """What the pages show: a live run, or records."""
+
+    def begin(self) -> None:
+        """Begin to serve, in the loop that runs now."""
+        ...
+
+    def end(self) -> None:
+        """Serve no more."""
+        ...
+
+    def close(self) -> None:
+        """End what pages have begun; no loop runs any more."""
+        ...
+
+    def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
+        """Return what sends a page what it shows, and what takes what it says; both end with the first of them."""
+        ...
+
+
 class PageServer:
-    """Serve the page of a run until a signal comes.
+    """Serve the page until a signal comes.
 
     Parameters
     ----------
-    follower : RunFollower
-        Follows the run.
+    pages : Pages
+        What the pages show.
     options : PageOptions
         Options of the command.
     """
 
-    def __init__(self, follower: RunFollower, options: PageOptions) -> None:
-        self._follower, self._options = follower, options
-        self._news: set[asyncio.Event] = set()
-        self._worker = ThreadPoolExecutor(1, "actions")
-        self._actions = ActionClient(options.where)
-        self._agents = OwnAgents(options.where)
+    def __init__(self, pages: Pages, options: PageOptions) -> None:
+        self._pages, self._options = pages, options
 
     def run(self, listening: socket.socket) -> None:
         """Serve on a socket that listens; SIGINT ends in KeyboardInterrupt, SIGTERM in StoppedError."""
@@ -117,9 +127,7 @@ class PageServer:
         try:
             uvicorn.Server(config).run(sockets=[listening])
         finally:
-            self._worker.shutdown(cancel_futures=True)
-            self._actions.close()
-            self._agents.close()
+            self._pages.close()
 
     def _app(self) -> Starlette:
         from starlette.applications import Starlette
@@ -137,19 +145,9 @@ class PageServer:
 
     @contextlib.asynccontextmanager
     async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
-        loop = asyncio.get_running_loop()
-
-        def wake() -> None:
-            for event in self._news:
-                event.set()
-
-        def on_news() -> None:
-            with contextlib.suppress(RuntimeError):  # the loop has just closed
-                loop.call_soon_threadsafe(wake)
-
-        self._follower.on_news(on_news)
+        self._pages.begin()
         yield
-        self._follower.on_news(lambda: None)
+        self._pages.end()
 
     # ---- who may see it
 
@@ -204,62 +202,15 @@ class PageServer:
             await socket.close(4403)
             return
         await socket.accept()
-        news = asyncio.Event()
-        self._news.add(news)
-        tasks = [asyncio.create_task(self._send(socket, news)), asyncio.create_task(self._receive(socket))]
+        tasks = [asyncio.create_task(each) for each in self._pages.talk(socket)]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
-            self._news.discard(news)
             for task in tasks:
                 task.cancel()
             for end in await asyncio.gather(*tasks, return_exceptions=True):
                 if isinstance(end, Exception) and not isinstance(end, WebSocketDisconnect):
                     _log.error("a page was closed by an error", exc_info=end)
-
-    async def _send(self, socket: WebSocket, news: asyncio.Event) -> None:
-        """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
-        where = self._options.where
-        hello = {"hello": {"run": where.run, "where": str(where), "control": self._options.control}}
-        await socket.send_text(_json(hello))
-        cursor, drawn = Cursor(), False
-        while True:
-            news.clear()
-            if not drawn and (diagram := self._follower.feeder_map()) is not None:
-                await socket.send_text(_json({"map": diagram}))
-                drawn = True
-            frame, cursor = self._follower.frame(cursor)
-            if frame.reset:
-                drawn = False
-            await socket.send_text(_json({"frame": frame}))
-            for text in self._agents.take_endings():
-                await socket.send_text(_json({"done": {"ok": False, "text": text}}))
-            await asyncio.sleep(FASTEST)
-            with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(news.wait(), HEARTBEAT)
-
-    async def _receive(self, socket: WebSocket) -> None:
-        """Carry out what a page asks for, one after another."""
-        loop = asyncio.get_running_loop()
-        async for text in socket.iter_text():
-            await socket.send_text(_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
-
-    def _do(self, text: str) -> dict[str, Any]:
-        """Carry out an action; return what the page says of it."""
-        try:
-            action = msgspec.json.decode(text, type=PageAction)
-        except msgspec.DecodeError as error:
-            return {"ok": False, "text": f"no action: {error}"}
-        command = command_line(action.words(), self._options.where)
-        if not self._options.control:
-            return {"ok": False, "command": command, "text": "this view only looks; start it with --control"}
-        perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
-        if action.verb == "start":
-            perform = lambda: self._agents.start(action.subject)  # noqa: E731
-        try:
-            return {"ok": True, "command": command, "text": perform()}
-        except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
-            return {"ok": False, "command": command, "text": str(error)}
 
 
 def _stop(number: int, frame: FrameType | None) -> NoReturn:
@@ -276,5 +227,6 @@ def _answer(text: str, status: int = 200, kind: str = "text/html", **headers: st
     return Response(text, status, HEADERS | headers, kind)
 
 
-def _json(value: Any) -> str:
+def as_json(value: Any) -> str:
+    """Return a message to a page."""
     return msgspec.json.encode(value).decode()

@@ -58,13 +58,10 @@ class Strips:
         configs: Mapping[str, AgentConfig],
     ) -> None:
         """Take rows of telemetry; per-unit values need the nameplates of all inverters."""
-        step = STEP if len(inverters) <= MANY else WIDE_STEP
         for row in rows:
-            t = row[0]
-            if t + 1e-9 < self._due:
-                continue
-            self._due = (int(t / step + 1e-6) + 1) * step
-            self._points.append((round(t, 4), _values(inverters, row, configs)))
+            if row[0] + 1e-9 >= self._due:
+                self._due = next_due(row[0], len(inverters))
+                self._points.append(point_of(inverters, row, configs))
         while self._points and self._points[0][0] < self.latest - LENGTH:
             self._points.popleft()
 
@@ -78,9 +75,14 @@ class Strips:
         return found[::-1]
 
 
-def _values(
-    inverters: tuple[str, ...], row: tuple[float, ...], configs: Mapping[str, AgentConfig]
-) -> tuple[float | None, ...]:
+def next_due(t: float, inverters: int) -> float:
+    """Return the run time (s) of the next point after one at t (s), of so many inverters."""
+    step = STEP if inverters <= MANY else WIDE_STEP
+    return (int(t / step + 1e-6) + 1) * step
+
+
+def point_of(inverters: tuple[str, ...], row: tuple[float, ...], configs: Mapping[str, AgentConfig]) -> Point:
+    """Return the point of a row of telemetry."""
     f, P, Q, V = (np.array(row[1 + i :: VALUES]) for i in range(4))
     present = (P != 0.0) | (Q != 0.0)  # the plant reports exactly no power of an inverter that is off the network
     known = [configs.get(name) for name in inverters]
@@ -93,4 +95,5 @@ def _values(
             float(sharing_index(x[None, :], rated, m, present[None, :])[0]) for x, m in zip((P, Q), droops, strict=True)
         ]
     columns = np.concatenate([np.where(present, x, np.nan) for x in (f, P / rated, Q / rated, V / V_nom)])
-    return tuple(round(value, 4) if isfinite(value) else None for value in (*columns.tolist(), *indices))
+    values = tuple(round(value, 4) if isfinite(value) else None for value in (*columns.tolist(), *indices))
+    return round(row[0], 4), values

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
+from gridpeers.cli.page_beside import page_beside, page_socket
 from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
@@ -23,6 +24,8 @@ from gridpeers.cli.usage import (
 from plant.simulator import Simulator
 
 if TYPE_CHECKING:
+    import socket
+
     from gridpeers.runs.choices import Pace
     from plant.equipment import Feeder
     from scenarios.run import Driver
@@ -68,6 +71,12 @@ def run(
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Follow the run in the browser; the page stays until Ctrl-C (extra view).")
+    ] = False,
+    port: Annotated[
+        int | None, typer.Option(metavar="N", help="With --view: port of the page, 8123 if left out; 0 takes any.")
+    ] = None,
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 
@@ -86,8 +95,11 @@ def run(
     spec, feeder = load(scenario, {key: value for key, value in changes.items() if value is not None})
     if broker is not None and spec.plant.simulator != "helics":
         fail(["--broker: goes with a plant in a HELICS federation; add --plant helics"], BAD_INPUT)
+    if port is not None and not view:
+        fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
-    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check)
+    page = page_socket(port) if view else None
+    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check, page=page)
 
 
 def carry_out(
@@ -99,8 +111,12 @@ def carry_out(
     *,
     self_check: bool = False,
     outside: tuple[str, ...] | None = None,
+    page: socket.socket | None = None,
 ) -> NoReturn:
-    """Run a checked scenario into a folder, show its report, and end with its exit code."""
+    """Run a checked scenario into a folder, show its report, and end with its exit code.
+
+    A `page` is opened at its socket, and follows the run.
+    """
     from datetime import datetime
 
     from gridpeers.runs.choices import check_how
@@ -147,15 +163,16 @@ def carry_out(
     request = Request(
         scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
     )
-    try:
-        with interruptible(), progress(console, tuple(spec.cases), explanation) as tell:
-            report = run_scenario(request, tell)
-    except BrokenRunError as error:
-        kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []
-        fail([f"the run broke: {error}", *kept], BROKEN)
-    except KeyboardInterrupt as error:
-        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
-    from scenarios.results.report import show
+    with page_beside(folder, page, spec.name):
+        try:
+            with interruptible(), progress(console, tuple(spec.cases), explanation) as tell:
+                report = run_scenario(request, tell)
+        except BrokenRunError as error:
+            kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []
+            fail([f"the run broke: {error}", *kept], BROKEN)
+        except KeyboardInterrupt as error:
+            fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+        from scenarios.results.report import show
 
-    show(report, console)
+        show(report, console)
     raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)

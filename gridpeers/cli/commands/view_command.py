@@ -1,17 +1,35 @@
-"""`gridpeers view`: a run in the browser."""
+"""`gridpeers view`: a live run, or the records of one, in the browser."""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
 from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, run_client, usage_errors
-from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail, require
+from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
 from wire.driver.output import watch_readers
+
+if TYPE_CHECKING:
+    from scenarios.view.page_server import Pages
+
+Line = Callable[[str], str]
+"""Makes the line that a command prints, from the address of its page."""
 
 
 def view(
+    record: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[RECORD]",
+            help="Folder of a recorded run or case, e.g. runs/islanding/latest, or a run.mcap; a live run if left out.",
+            show_default=False,
+        ),
+    ] = None,
+    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the RECORD, if it has several.")] = "",
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
@@ -26,37 +44,79 @@ def view(
         str, typer.Option("--token", metavar="TEXT", help="What a page must know; made up for other addresses.")
     ] = "",
 ) -> None:
-    """Show a run in the browser: feeder, links, strips and agents. Ctrl-C ends it, and not the run.
+    """Show a run in the browser: feeder, links, strips and agents.
 
-    Exit code: 2 bad usage, or nobody there, 130 Ctrl-C, 143 SIGTERM.
+    Of a live run it shows the present, of a RECORD any time, and how an agent decided then. Ctrl-C ends the page, and
+    not the run.
+
+    Exit code: 2 bad usage, no record, or nobody there, 130 Ctrl-C, 143 SIGTERM.
 
     Example:  gridpeers view --control
     """
-    modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
-    require(modules, "install it: pip install 'gridpeers[view]'")
+    require_page()
+    if record is None:
+        if case:
+            fail(["--case: goes with a RECORD; a live run has one case"], BAD_INPUT)
+        _serve(lambda: _live(run, connect, wait, control=control), address, port, token)
+    if control or connect or run != RUN:
+        option = "--control" if control else "--connect" if connect else "--run"
+        fail([f"{option}: goes with a live run; nothing can be done to a record"], BAD_INPUT)
+    _serve(lambda: _recorded(record / case if case else record), address, port, token)
+
+
+@contextmanager
+def _live(run: str, connect: list[str] | None, wait: float, *, control: bool) -> Iterator[tuple[Pages, Line]]:
+    """Yield the pages of a live run, and the line that tells their address."""
+    with run_client(run, connect, wait, meet_agents=True) as client:
+        from scenarios.view.live_pages import LivePages
+        from scenarios.view.run_follower import RunFollower
+
+        rights = "" if control else "; it only looks (--control lets it act)"
+        with RunFollower(client) as follower:
+            yield (
+                LivePages(follower, client.where, control=control),
+                lambda url: f"run {run}: open {url} in a browser{rights}; Ctrl-C ends the page, not the run",
+            )
+
+
+@contextmanager
+def _recorded(path: Path) -> Iterator[tuple[Pages, Line]]:
+    """Yield the pages of a record, and the line that tells their address."""
+    require({"mcap": "the record of a run"})
+    from scenarios.record.record_reader import RecordFileError
+    from scenarios.view.recorded.record_pages import RecordPages
+    from scenarios.view.recorded.recorded_run import RecordedRun
+
+    try:
+        recorded = RecordedRun(path)
+    except RecordFileError as error:
+        fail([str(error)], BAD_INPUT)
+    yield RecordPages(recorded), lambda url: f"record {path}: open {url} in a browser; Ctrl-C ends the page"
+
+
+def _serve(
+    pages: Callable[[], AbstractContextManager[tuple[Pages, Line]]], address: str, port: int, token: str
+) -> NoReturn:
+    """Serve pages until a signal comes."""
     with usage_errors():
         import secrets
 
         from scenarios.view.page_address import is_this_host, listen, url_of
 
         listening = listen(address, port)  # first: a port in use is told at once
-    with listening, run_client(run, connect, wait, meet_agents=True) as client:
+    with listening, pages() as (shown, line):
         from scenarios.view.page_server import PageOptions, PageServer
-        from scenarios.view.run_follower import RunFollower
         from wire.driver.drive import StoppedError
 
         here = is_this_host(address)
         token = token or ("" if here else secrets.token_urlsafe(16))
         hosts = ("127.0.0.1", "localhost", "[::1]", address) if here else ()
-        options = PageOptions(where=client.where, control=control, token=token, hosts=hosts)
-        url = url_of(listening, address) + (f"?token={token}" if token else "")
         watch_readers(quits=False)
         signal = "SIGINT"
-        with RunFollower(client) as follower:
-            rights = "" if control else "; it only looks (--control lets it act)"
-            typer.echo(f"run {run}: open {url} in a browser{rights}; Ctrl-C ends the page, not the run")
-            try:
-                PageServer(follower, options).run(listening)
-            except (KeyboardInterrupt, StoppedError) as stop:
-                signal = str(stop) or "SIGINT"
-        fail([f"{signal}: the page has ended"], TERMINATED if signal == "SIGTERM" else INTERRUPTED)
+        typer.echo(line(url_of(listening, address) + (f"?token={token}" if token else "")))
+        try:
+            PageServer(shown, PageOptions(token=token, hosts=hosts)).run(listening)
+        except (KeyboardInterrupt, StoppedError) as stop:
+            signal = str(stop) or "SIGINT"
+        finished = f"{signal}: the page has ended"
+    fail([finished], TERMINATED if signal == "SIGTERM" else INTERRUPTED)

@@ -11,7 +11,7 @@ const QUANTITIES = [
 
 export class Strips {
   constructor(holder) {
-    this.points = []; this.names = []; this.lit = ""; this.ranges = {};
+    this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null;
     this.charts = QUANTITIES.map((quantity, i) => {
       const figure = document.createElement("figure"), caption = document.createElement("figcaption");
       const canvas = document.createElement("canvas"), now = document.createElement("span");
@@ -23,6 +23,7 @@ export class Strips {
     });
   }
   clear() { this.points = []; this.ranges = {}; }
+  // end: right end of the window (s), if that is not the last point
   add(points) {
     this.points.push(...points);
     const end = this.latest - LENGTH;
@@ -36,7 +37,7 @@ export class Strips {
   draw(silent, events, colours) {
     const style = getComputedStyle(document.body), ink = style.getPropertyValue("--ink"), soft = style.getPropertyValue("--soft");
     const grid = style.getPropertyValue("--grid"), shade = style.getPropertyValue("--shade");
-    const end = Math.max(this.latest + silent, 0), start = end - LENGTH, n = this.names.length;
+    const end = this.end ?? Math.max(this.latest + silent, 0), start = end - LENGTH, n = this.names.length;
     this.charts.forEach(({ quantity, canvas, now, axis }, q) => {
       const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
       if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }

@@ -1,20 +1,23 @@
 // The page of a run: takes frames from the server, shows them, and sends what is clicked.
 import { Diagram, pairOf } from "./diagram.js";
+import { Player } from "./player.js";
 import { Strips } from "./strips.js";
 
 const $ = id => document.getElementById(id);
 const SILENT = 1000; // ms without a frame after which the numbers are old: the server sends four a second
-const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null };
+const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
 window.gridpeersView = S;
 
 const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases"));
+const player = new Player($, ask, () => strips.points.length ? strips.latest : -1, () => S.chosen);
+window.gridpeersPlayer = player;
 const number = (value, digits) => value === null || value === undefined ? "–" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
 const COLUMNS = [
   ["agent", "", i => i.name], ["island", "", i => i.island || "–", "text"], ["f", "Hz", i => number(i.f, 3)], ["P", "kW", i => number(i.P, 1)],
   ["P_set", "kW", i => number(i.P_set, 1)], ["P", "pu", i => number(i.P_share, 3)], ["Q", "kvar", i => number(i.Q, 1)], ["V", "pu", i => number(i.V, 4)],
-  ["V_set", "pu", i => number(i.V_set, 4)], ["hears", "", i => i.received === null ? "–" : String(Object.keys(i.ages).length)],
+  ["V_set", "pu", i => number(i.V_set, 4)], ["hears", "", i => i.received === null && !(S.hello?.record && i.island) ? "–" : String(Object.keys(i.ages).length)],
   ["age", "s", i => { const ages = Object.values(i.ages); return ages.length ? number(Math.max(...ages), 2) : "–"; }, "age"],
-  ["in", "", i => i.received ?? "–"], ["out", "", i => i.sent ?? "–"], ["lost", "", i => i.lost ?? "–", "lost"], ["", "", i => i.note, "text note"],
+  ["in", "", i => i.received ?? "–", "count"], ["out", "", i => i.sent ?? "–", "count"], ["lost", "", i => i.lost ?? "–", "count"], ["", "", i => i.note, "text note"],
 ];
 
 // ---- colours: a hue for each microgrid
@@ -48,17 +51,22 @@ function connect() {
 function take(message) {
   if (message.hello) {
     S.hello = message.hello; $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
-    $("control").hidden = $("tools").hidden = !S.hello.control;
-    $("rights").textContent = S.hello.control ? "" : "looks only; start it with --control to act";
-    document.body.classList.toggle("can-act", S.hello.control); heads();
-    S.links.clear(); S.pairs = null; strips.clear(); S.events = []; $("event-list").replaceChildren();
-  } else if (message.map) {
+    $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; put($("strips-title"), S.hello.record ? "30 s until then" : "Last 30 s");
+    $("rights").textContent = S.hello.record ? `${S.hello.where}: a record, which only looks` : S.hello.control ? "" : "looks only; start it with --control to act";
+    document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
+    clear();
+  } else if (message.record) { takeRecord(message.record); }
+  else if (message.news) { player.take(message.news); if (S.frame) render(); }
+  else if (message.decision) { takeDecision(message.decision); }
+  else if (message.problem) { player.failed(); put($("live-text"), message.problem); }
+  else if (message.map) {
     S.map = message.map; recolour(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
   } else if (message.done) { done(message.done); }
   else if (message.frame) { takeFrame(message.frame); }
 }
+function clear() { S.links.clear(); S.pairs = null; strips.clear(); if (!S.hello.record) { S.events = []; $("event-list").replaceChildren(); } }
 function takeFrame(frame) {
-  if (frame.reset) { S.links.clear(); S.pairs = null; strips.clear(); S.events = []; $("event-list").replaceChildren(); }
+  if (frame.reset) clear();
   S.frame = frame;
   if (frame.names && String(frame.names) !== String(strips.names)) { strips.clear(); strips.names = frame.names; colours = lineColours(); for (const id of ["link-a", "link-b"]) fill($(id), frame.names.map(name => [name, name])); $("link-b").selectedIndex = Math.min(1, frame.names.length - 1); }
   if (frame.points) strips.add(frame.points);
@@ -71,7 +79,8 @@ function takeFrame(frame) {
     time.className = "time"; time.textContent = `${event.t.toFixed(2)} s`; text.textContent = event.text.replace(/, at t = [0-9.e+]+ s$/, ""); text.className = `kind-${event.kind}`;
     line.append(time, text); $("event-list").prepend(line);
   }
-  while (S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
+  while (!S.hello.record && S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
+  if (S.hello.record) { strips.end = frame.t; player.answered(frame); }
   render();
 }
 
@@ -94,9 +103,9 @@ let due = false;
 function render() { if (!due) { due = true; requestAnimationFrame(() => { due = false; draw(); }); } }
 function draw() {
   const frame = S.frame, lost = S.heard && (performance.now() - S.heard > SILENT || S.socket.readyState !== 1);
-  const live = lost ? "lost" : frame ? frame.live.word : "waiting", current = live === "live";
+  const live = lost ? "lost" : frame ? S.hello.record ? player.grows ? "recording" : "record" : frame.live.word : "waiting", current = ["live", "record", "recording"].includes(live);
   if (document.body.dataset.live !== live) document.body.dataset.live = live;
-  put($("live-text"), lost ? "no word from this page's server: nothing here is of now" : frame ? frame.live.text : "connecting");
+  put($("live-text"), lost ? "no word from this page's server: nothing here is of now" : !frame ? "connecting" : S.hello.record ? ["record", player.news?.text, frame.live.text === "record" ? "" : frame.live.text].filter(Boolean).join(". ") : frame.live.text);
   if (!frame) return;
   put($("time"), frame.t === null ? "" : `t = ${frame.t.toFixed(2)} s`); put($("pace"), current ? frame.pace : "");
   const inverters = frame.inverters.map(one => current ? one : stale(one));
@@ -109,17 +118,18 @@ function draw() {
   const speed = Number((frame.pace.match(/speed ([0-9.]+)/) || [0, 1])[1]);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
   // most frames have statuses alone: the strips, which take most of the time, stay as they are
-  const now = [strips.latest, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");
-  if (now !== S.drawn) { S.drawn = now; strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), S.events.map(event => [event.t, event.kind]), colours); }
+  const now = [strips.latest, strips.end, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");
+  if (now !== S.drawn) { S.drawn = now; strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), (S.hello.record ? player.events : S.events).map(event => [event.t, event.kind]), colours); }
   rows(inverters);
   if (S.tip) showTip();
 }
+const acts = () => S.hello.control || S.hello.record;
 const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, received: null, sent: null, lost: null, island: "" });
 const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 function heads() {
   const head = document.querySelector("thead tr"); head.replaceChildren(); document.querySelector("tbody").replaceChildren();
-  for (const [title, unit, , kind] of [COLUMNS[0], ...(S.hello.control ? [["", "", null, ""]] : []), ...COLUMNS.slice(1)]) {
-    const cell = document.createElement("th"); cell.scope = "col"; cell.textContent = title; if (kind?.includes("text") || title === "agent") cell.className = "text";
+  for (const [title, unit, , kind] of [COLUMNS[0], ...(acts() ? [["", "", null, ""]] : []), ...COLUMNS.slice(1)]) {
+    const cell = document.createElement("th"); cell.scope = "col"; cell.textContent = title; cell.className = `${title === "agent" ? "text " : ""}${kind || ""}`.trim();
     if (unit) { const small = document.createElement("small"); small.textContent = unit; cell.append(small); } head.append(cell);
   }
 }
@@ -130,24 +140,43 @@ function rows(inverters) {
   for (const one of inverters) {
     let row = tableRows.get(one.name);
     if (!row) {
-      const line = body.insertRow(), cells = COLUMNS.map(([, , , kind], c) => { const cell = c ? line.insertCell() : line.appendChild(document.createElement("th")); cell.className = kind?.includes("text") || !c ? `text ${kind || ""}` : ""; return cell; });
+      const line = body.insertRow(), cells = COLUMNS.map(([, , , kind], c) => { const cell = c ? line.insertCell() : line.appendChild(document.createElement("th")); cell.className = `${c ? "" : "text "}${kind || ""}`.trim(); return cell; });
       cells[0].scope = "row"; cells[0].style.position = "static"; cells[0].style.boxShadow = "none";
       const dot = document.createElement("span"); dot.className = "dot"; dot.dataset.name = one.name; dot.style.cssText = `display:inline-block;width:9px;height:9px;border-radius:3px;margin-right:8px;background:${colourOf(one.name)}`;
       const text = document.createElement("span"); cells[0].append(dot, text); cells[0].style.color = "var(--ink)"; cells[0].style.fontWeight = "600";
       let button = null;
-      if (S.hello.control) { const cell = line.insertCell(1); cell.className = "act"; button = document.createElement("button"); button.type = "button"; cell.append(button); button.addEventListener("click", () => click("agent", one.name)); }
+      if (acts()) { const cell = line.insertCell(1); cell.className = "act"; button = document.createElement("button"); button.type = "button"; cell.append(button); button.addEventListener("click", () => click("agent", one.name)); }
       line.addEventListener("pointerenter", () => light(one.name)); line.addEventListener("pointerleave", () => light(""));
       row = { line, cells, text, button }; tableRows.set(one.name, row);
     }
     COLUMNS.forEach(([, , value], c) => put(c ? row.cells[c] : row.text, String(value(one))));
     row.cells[10].classList.toggle("warn", Math.max(0, ...Object.values(one.ages)) >= 0.2); row.cells[13].classList.toggle("warn", one.lost > 0);
     row.line.classList.toggle("lit", S.lit === one.name);
-    if (row.button) { const absent = one.note === "no agent"; put(row.button, absent ? "Start" : "Stop"); row.button.setAttribute("aria-label", `${absent ? "Start" : "Stop"} the agent of ${one.name}`); row.button.disabled = S.pending.has(one.name); }
+    if (row.button && S.hello.record) { put(row.button, "Why"); row.button.setAttribute("aria-label", `Show how ${one.name} decided`); row.button.setAttribute("aria-pressed", String(S.chosen === one.name)); }
+    else if (row.button) { const absent = one.note === "no agent"; put(row.button, absent ? "Start" : "Stop"); row.button.setAttribute("aria-label", `${absent ? "Start" : "Stop"} the agent of ${one.name}`); row.button.disabled = S.pending.has(one.name); }
   }
   for (const [name, row] of tableRows) if (!inverters.some(one => one.name === name)) { row.line.remove(); tableRows.delete(name); }
 }
 function light(name) { if (S.lit !== name) { S.lit = name; render(); } }
 function fill(select, options) { select.replaceChildren(...options.map(([value, text]) => new Option(text, value))); }
+
+// ---- a record
+function ask(question) { if (S.socket?.readyState !== 1) return false; S.socket.send(JSON.stringify(question)); return true; }
+function takeRecord(record) {
+  clear(); S.frame = null; strips.names = []; player.open(record);
+  put($("run"), `${record.scenario}${record.case ? `, case ${record.case}` : ""}`); document.title = `${$("run").textContent} – gridpeers view`;
+  if (!record.agents.includes(S.chosen)) choose("");
+}
+function choose(name) {
+  S.chosen = name; put($("decision-of"), name ? `of ${name}` : ""); $("decision-text").hidden = $("decision-command").hidden = $("decision-close").hidden = !name; $("decision-hint").hidden = !!name;
+  if (name) { put($("decision-text"), "..."); put($("decision-command"), ""); player.decided = 0; player.ask(); }
+  render();
+}
+function takeDecision(decision) {
+  if (decision.agent !== S.chosen) return;
+  put($("decision-text"), decision.text); put($("decision-command"), decision.command); $("decision-text").classList.toggle("bad", !decision.ok);
+}
+$("decision-close").addEventListener("click", () => choose(""));
 
 // ---- what the pointer is above
 function look(event, kind, subject) { S.tip = kind ? { x: event.clientX, y: event.clientY, kind, subject } : null; light(kind === "agent" ? subject : ""); showTip(); }
@@ -158,12 +187,12 @@ function showTip() {
   tip.style.left = `${Math.min(S.tip.x + 14, innerWidth - box.width - 8)}px`; tip.style.top = `${Math.min(S.tip.y + 14, innerHeight - box.height - 8)}px`;
 }
 function tipText(kind, subject) {
-  const does = verb => S.hello?.control ? `\nclick: ${verb}` : "";
+  const does = verb => S.hello?.control || S.hello?.record && verb === "show how it decided" ? `\nclick: ${verb}` : "";
   if (kind === "switch") return `switch ${subject}: ${S.switches[subject] ?? true ? "closed" : "open"}${does(S.switches[subject] ?? true ? "open it" : "close it")}`;
   if (kind === "agent") {
     const one = S.inverters.get(subject);
     if (!one) return subject;
-    return `${one.name}${one.note ? `: ${one.note}` : ""}\nP ${number(one.P_share, 3)} pu, Q ${number(one.Q, 1)} kvar\nV ${number(one.V, 4)} pu, f ${number(one.f, 3)} Hz${does(one.note === "no agent" ? "start its agent" : "stop its agent")}`;
+    return `${one.name}${one.note ? `: ${one.note}` : ""}\nP ${number(one.P_share, 3)} pu, Q ${number(one.Q, 1)} kvar\nV ${number(one.V, 4)} pu, f ${number(one.f, 3)} Hz${does(S.hello?.record ? "show how it decided" : one.note === "no agent" ? "start its agent" : "stop its agent")}`;
   }
   const pair = S.pairs?.get(subject);
   if (!pair) return "";
@@ -174,6 +203,7 @@ function tipText(kind, subject) {
 
 // ---- what is clicked
 function click(kind, subject) {
+  if (S.hello?.record && kind === "agent") choose(S.chosen === subject ? "" : subject);
   if (!S.hello?.control || S.pending.has(subject)) return;
   if (kind === "switch") act({ verb: S.switches[subject] ?? true ? "open" : "close", subject }, subject);
   else if (kind === "agent") act({ verb: S.inverters.get(subject)?.note === "no agent" ? "start" : "stop", subject }, subject);

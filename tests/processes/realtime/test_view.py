@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import re
-import shutil
 import signal
 import socket
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,35 +20,11 @@ if TYPE_CHECKING:
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
 
-QUIET = [
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-]
-"""A browser that asks nobody outside."""
-
 WAIT = 40_000
 """Longest wait (ms) for anything on the page."""
 
 SLOW = "0.2"
 """Speed of the runs: a control period is 100 ms of wall time, so that a busy machine keeps pace."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """Debian's Chromium, without a screen."""
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = shutil.which("chromium") or shutil.which("chromium-browser")
-    if path is None:
-        pytest.skip("chromium is not installed (Debian: apt-get install chromium)")
-    with api.sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=QUIET)
-        yield browser
-        browser.close()
 
 
 def run_of(desk: Desk) -> Terminal:

@@ -1,0 +1,117 @@
+"""Pages of a live run: frames as the run goes on, and what their clicks do to it."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+
+from scenarios.live.run_address import RunAddress
+from scenarios.view.own_agents import OwnAgents
+from scenarios.view.page_actions import ActionClient, PageAction, command_line
+from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json
+from scenarios.view.run_follower import RunFollower
+from scenarios.view.run_view import Cursor
+
+if TYPE_CHECKING:
+    from starlette.websockets import WebSocket
+
+
+class LivePages:
+    """Send every page what is new of a run, and carry out what it asks for.
+
+    Parameters
+    ----------
+    follower : RunFollower
+        Follows the run.
+    where : RunAddress
+        The run.
+    control : bool, optional
+        Whether pages may act on it.
+    """
+
+    def __init__(self, follower: RunFollower, where: RunAddress, *, control: bool = False) -> None:
+        self._follower, self._where, self._control = follower, where, control
+        self._news: set[asyncio.Event] = set()
+        self._worker = ThreadPoolExecutor(1, "actions")
+        self._actions = ActionClient(where)
+        self._agents = OwnAgents(where)
+
+    def begin(self) -> None:
+        """Note the loop that runs now, which serves the pages."""
+        loop = asyncio.get_running_loop()
+
+        def wake() -> None:
+            for event in self._news:
+                event.set()
+
+        def on_news() -> None:
+            with contextlib.suppress(RuntimeError):  # the loop has just closed
+                loop.call_soon_threadsafe(wake)
+
+        self._follower.on_news(on_news)
+
+    def end(self) -> None:
+        """Forget the loop."""
+        self._follower.on_news(lambda: None)
+
+    def close(self) -> None:
+        """End what pages have begun."""
+        self._worker.shutdown(cancel_futures=True)
+        self._actions.close()
+        self._agents.close()
+
+    def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
+        """Return what sends a page its frames, and what carries out its actions."""
+        return self._send(socket), self._receive(socket)
+
+    async def _send(self, socket: WebSocket) -> None:
+        """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
+        hello = {"hello": {"run": self._where.run, "where": str(self._where), "control": self._control}}
+        await socket.send_text(as_json(hello))
+        cursor, drawn, news = Cursor(), False, asyncio.Event()
+        self._news.add(news)
+        try:
+            while True:
+                news.clear()
+                if not drawn and (diagram := self._follower.feeder_map()) is not None:
+                    await socket.send_text(as_json({"map": diagram}))
+                    drawn = True
+                frame, cursor = self._follower.frame(cursor)
+                if frame.reset:
+                    drawn = False
+                await socket.send_text(as_json({"frame": frame}))
+                for text in self._agents.take_endings():
+                    await socket.send_text(as_json({"done": {"ok": False, "text": text}}))
+                await asyncio.sleep(FASTEST)
+                with contextlib.suppress(asyncio.TimeoutError):
+                    await asyncio.wait_for(news.wait(), HEARTBEAT)
+        finally:
+            self._news.discard(news)
+
+    async def _receive(self, socket: WebSocket) -> None:
+        """Carry out what a page asks for, one after another."""
+        loop = asyncio.get_running_loop()
+        async for text in socket.iter_text():
+            await socket.send_text(as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
+
+    def _do(self, text: str) -> dict[str, Any]:
+        """Carry out an action; return what the page says of it."""
+        try:
+            action = msgspec.json.decode(text, type=PageAction)
+        except msgspec.DecodeError as error:
+            return {"ok": False, "text": f"no action: {error}"}
+        command = command_line(action.words(), self._where)
+        if not self._control:
+            return {"ok": False, "command": command, "text": "this view only looks; start it with --control"}
+        perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
+        if action.verb == "start":
+            perform = lambda: self._agents.start(action.subject)  # noqa: E731
+        try:
+            return {"ok": True, "command": command, "text": perform()}
+        except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
+            return {"ok": False, "command": command, "text": str(error)}

@@ -1,0 +1,83 @@
+"""Rows of the plant in a record: the last one at a time, and the points of the strips before it."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import NamedTuple
+
+from agents.agent_config import AgentConfig
+from scenarios.record.record_reader import RunRecord
+from scenarios.view.strips import Point, next_due, point_of
+from wire.messages import Telemetry
+
+KEPT = 400
+"""Parts whose points are kept: two strips of a run in real time."""
+
+
+class _Rows(NamedTuple):
+    inverters: tuple[str, ...]
+    times: list[float]
+    rows: list[tuple[float, ...]]
+
+
+class PlantRows:
+    """Read rows by time.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The record.
+    configs : Mapping[str, AgentConfig]
+        Configuration of each inverter, for per-unit values.
+    """
+
+    def __init__(self, record: RunRecord, configs: Mapping[str, AgentConfig]) -> None:
+        self._index, self._configs = record.index, configs
+        self._rows_in = lru_cache(maxsize=8)(self._read_rows)
+        self._points_in = lru_cache(maxsize=KEPT)(self._read_points)
+
+    def last(self, t: float) -> tuple[tuple[str, ...], tuple[float, ...]] | None:
+        """Return the inverters and the last row up to a run time (s); None if there is none within a second before."""
+        found = None
+        for part in self._index.near(t - 1.0, t):
+            inverters, times, rows = self._rows_in(part)
+            at = bisect_right(times, t + 1e-9) - 1
+            if at >= 0 and (found is None or rows[at][0] > found[1][0]):
+                found = inverters, rows[at]
+        return found
+
+    def points(self, since: float, until: float) -> list[Point]:
+        """Return the points of the strips after a run time (s) up to another one, the last one exactly there."""
+        points = [
+            point
+            for part in self._index.near(since, until)
+            for point in self._points_in(part)
+            if since + 1e-9 < point[0] <= until + 1e-9
+        ]
+        points.sort(key=lambda point: point[0])
+        last = self.last(until)
+        if last is not None and last[1][0] > max(since, points[-1][0] if points else since) + 1e-9:
+            points.append(point_of(*last, self._configs))
+        return points
+
+    def _read_rows(self, part: int) -> _Rows:
+        """Return the rows of a part, in the order of time."""
+        inverters: tuple[str, ...] = ()
+        rows: list[tuple[float, ...]] = []
+        for message in self._index.of_type("telemetry", Telemetry, (part,)):
+            inverters = message.inverters
+            rows += message.rows
+        rows.sort(key=lambda row: row[0])
+        return _Rows(inverters, [row[0] for row in rows], rows)
+
+    def _read_points(self, part: int) -> list[Point]:
+        inverters, _, rows = self._rows_in(part)
+        points: list[Point] = []
+        due = 0.0
+        for row in rows:
+            if row[0] + 1e-9 >= due:
+                points.append(point_of(inverters, row, self._configs))
+                due = next_due(row[0], len(inverters))
+        return points

@@ -1,0 +1,175 @@
+"""Pages of a record: each asks for times, one after the other, and gets the frame of that time."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import msgspec
+from msgspec.structs import replace
+
+from scenarios.record.record_reader import RecordFileError
+from scenarios.view.link_states import LinkView
+from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json
+from scenarios.view.recorded.record_view import RecordView
+from scenarios.view.recorded.recorded_run import RecordedRun
+from wire.bounds import Text
+from wire.driver.command_line import command_line
+from wire.plugins.anybody import ANYTHING, named
+
+if TYPE_CHECKING:
+    from starlette.websockets import WebSocket
+
+
+class RecordQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What a page wants to see."""
+
+    case: Text = ""
+    """Case; the latest without one."""
+    at: float | None = None
+    """Run time (s); None asks for the end, as far as the run has come."""
+    since: float = -1.0
+    """Run time (s) of the last point that the page has, and that is before `at`; -1 asks for all points."""
+    agent: Text = ""
+    """Agent whose decision is asked for; none without a name."""
+
+
+class RecordPage:
+    """What one page has."""
+
+    def __init__(self) -> None:
+        self.case = ""
+        self.wanted = ""
+        """Case that it asked for; "" for the latest."""
+        self.events = 0
+        self.links: dict[str, tuple[LinkView, ...]] = {}
+        self.questions: asyncio.Queue[RecordQuestion] = asyncio.Queue(64)
+
+
+class RecordPages:
+    """Answer the questions of pages, one at a time, from the records of a run.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        The records. Only a thread of these pages uses it.
+    """
+
+    def __init__(self, run: RecordedRun) -> None:
+        self._run = run
+        self._worker = ThreadPoolExecutor(1, "record")
+
+    def begin(self) -> None:
+        """Begin to serve."""
+
+    def end(self) -> None:
+        """Serve no more."""
+
+    def close(self) -> None:
+        """End the thread that reads."""
+        self._worker.shutdown(cancel_futures=True)
+
+    def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
+        """Return what answers a page, and what takes its questions."""
+        page = RecordPage()
+        return self._send(socket, page), self._receive(socket, page)
+
+    async def _send(self, socket: WebSocket, page: RecordPage) -> None:
+        """Answer questions, and tell now and then how far the record has come."""
+        loop, told = asyncio.get_running_loop(), float("-inf")
+        where = str(self._run.path)
+        await socket.send_text(as_json({"hello": {"run": where, "where": where, "control": False, "record": True}}))
+        while True:
+            if (now := loop.time()) - told >= HEARTBEAT:
+                told = now
+                await self._tell(socket, partial(self.news, page))
+            with contextlib.suppress(asyncio.TimeoutError):
+                question = await asyncio.wait_for(page.questions.get(), HEARTBEAT)
+                await self._tell(socket, partial(self.frame, page, question))
+                await self._tell(socket, partial(self.decision, page, question))
+                await asyncio.sleep(FASTEST / 4)
+
+    async def _tell(self, socket: WebSocket, answer: Callable[[], Iterable[str]]) -> None:
+        """Send an answer; a page that waits for it knows that its server is there."""
+        future = asyncio.get_running_loop().run_in_executor(self._worker, lambda: list(answer()))
+        while not (await asyncio.wait({future}, timeout=HEARTBEAT))[0]:
+            await socket.send_text(as_json({"beat": True}))
+        for text in future.result():
+            await socket.send_text(text)
+
+    async def _receive(self, socket: WebSocket, page: RecordPage) -> None:
+        async for text in socket.iter_text():
+            with contextlib.suppress(msgspec.DecodeError):
+                await page.questions.put(msgspec.json.decode(text, type=RecordQuestion))
+
+    # ---------------------------------------------------------------- in the thread that reads
+
+    def news(self, page: RecordPage) -> list[str]:
+        """Return what is new of the record that a page shows, after the record itself if it is another one."""
+        try:
+            news = self._run.news(page.wanted, page.events if page.case else 0)
+            if news.case != page.case:
+                news = self._run.news(news.case, 0)
+                view = self._run.view(news.case)
+                page.case, page.links = news.case, {}
+                page.events = len(news.events)
+                return [as_json({"record": _of(view)}), as_json({"map": view.map}), as_json({"news": news})]
+        except RecordFileError as error:
+            return [as_json({"problem": str(error)})]
+        page.events += len(news.events)
+        return [as_json({"news": news})]
+
+    def frame(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
+        """Return the frame that a page asks for."""
+        if question.case != page.wanted:
+            page.wanted = question.case
+            yield from self.news(page)
+        try:
+            view = self._run.view(page.case)
+            t_end = view.record.t_end
+            t = t_end if question.at is None else min(max(0.0, question.at), t_end)
+            frame = view.frame(t, question.since)
+        except RecordFileError as error:
+            yield as_json({"problem": str(error)})
+            return
+        known = {} if frame.reset else page.links
+        page.links = dict(frame.links)
+        links = {name: links for name, links in frame.links.items() if known.get(name) != links}
+        yield as_json({"frame": replace(frame, links=links, names=frame.names if frame.reset else ())})
+
+    def decision(self, page: RecordPage, question: RecordQuestion) -> Iterator[str]:
+        """Return the decision that a page asks for."""
+        if not question.agent:
+            return
+        try:
+            view = self._run.view(page.case)
+            t_end = view.record.t_end
+            t = t_end if question.at is None else min(max(0.0, question.at), t_end)
+            ok, text = True, view.decision(question.agent, t)
+        except RecordFileError as error:
+            ok, text = False, str(error).removeprefix(f"{view.record.path}: ")
+        except ANYTHING as error:  # a law or graph is anybody's code
+            ok, text = False, named(error)
+        command = command_line("why", str(view.record.path.parent), question.agent, f"{t:.10g}")
+        yield as_json({"decision": {"agent": question.agent, "t": t, "ok": ok, "text": text, "command": command}})
+
+
+def _of(view: RecordView) -> dict[str, Any]:
+    """Return what a page needs to know of a record once."""
+    info = view.record.info
+    return {
+        "scenario": info.scenario,
+        "case": info.case,
+        "clock": info.clock,
+        "level": info.level,
+        "T_c": info.T_c,
+        "started": info.started,
+        "gridpeers": info.versions.get("gridpeers", ""),
+        "names": info.inverters,
+        "agents": view.record.agents,
+        "f_nom": next((config.f_nom for config in info.agents), 0.0),
+    }

@@ -1,0 +1,218 @@
+"""What the page shows of a record at a time: a frame as of a live run, made from the record alone.
+
+The same `RunView` that is fed by a live run is fed with what the record has of the second before. Nothing is kept from
+one time to the next but what speeds it up, so a time has the same frame whichever times were asked for before.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+from msgspec.structs import replace
+
+from scenarios.explanation.explanation import explain
+from scenarios.live.feeder_map import FeederMap, feeder_map
+from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.live.show.snapshot import InverterStatus
+from scenarios.record.record_reader import RunRecord
+from scenarios.view.link_states import LinkView
+from scenarios.view.liveness import FROZEN, LivenessView
+from scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
+from scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
+from scenarios.view.recorded.link_faults import NOTHING, LinkFaults
+from scenarios.view.recorded.plant_rows import PlantRows
+from scenarios.view.run_view import Cursor, EventView, Frame, RunView
+from scenarios.view.strips import LENGTH
+from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+WINDOW = 1.0
+"""Time (s) before a moment over which messages are counted."""
+
+_STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+
+
+class RecordView:
+    """Read a record for the page.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The record.
+    """
+
+    def __init__(self, record: RunRecord) -> None:
+        self.record = record
+        info = record.info
+        self._configs = {config.name: config for config in info.agents}
+        self._rows = PlantRows(record, self._configs)
+        self._moments = AgentMoments(record)
+        self._faults = LinkFaults(record)
+        self._parts = 0
+        """Parts whose events are here."""
+        self._events: list[EventView] = []
+        self._plant_events: list[PlantEvent] = []
+        feeder = feeder_of(info)
+        self.map: FeederMap = inverter_ring(info) if feeder is None else feeder_map(feeder)
+        """The one-line diagram; the inverters in a ring if the feeder is not here."""
+        self._switches = {switch.name: switch.closed for switch in self.map.switches}
+        self._by_name = {name: switch.name for switch in self.map.switches for name in (switch.alias, switch.name)}
+        self.missing = tuple(_missing(record, has_feeder=feeder is not None))
+        """Sentences on what the record, or this host, does not have."""
+
+    @property
+    def events(self) -> list[EventView]:
+        """All events so far, in their order; numbers begin with 1."""
+        index = self.record.index
+        for message in index.of_type("telemetry", Telemetry, range(self._parts, index.parts)):
+            self._plant_events += message.events
+            for event in message.events:
+                self._events.append(EventView(len(self._events) + 1, event.t, event.kind, event.subject, event.text))
+        self._parts = index.parts
+        return self._events
+
+    def frame(self, t: float, since: float = -1.0) -> Frame:
+        """Return what the page shows at a run time (s); its strips only have points after `since` (s)."""
+        agents = self._moments.at(t)
+        view = RunView(self.record.info.run)
+        for config in self._configs.values():
+            view.config(config)
+        view.presence(plant=True, agents=self._present(t, agents), now=t)
+        status = PlantStatus(
+            phase="running", t=t, speed=self.record.info.plant.speed, pacing=_STILL, switches=self._switches_at(t)
+        )
+        view.plant_status(status)
+        row = self._feed_row(view, t)
+        self._feed_links(view, agents, t)
+        frame, _ = view.frame(Cursor(), t)
+        links: dict[str, tuple[LinkView, ...]] = dict.fromkeys(self._configs, ()) | frame.links
+        stale = row is None or t - row > FROZEN
+        text = "There are no rows of this time in the record." if stale else "record"
+        points = tuple(self._rows.points(max(since, t - LENGTH), t))
+        return replace(
+            frame,
+            live=LivenessView(word="record", text=text),
+            t=t,
+            pace="",
+            inverters=tuple(self._noted(one, agents) for one in frame.inverters),
+            reset=since < 0.0 or since < t - LENGTH,
+            names=self.record.info.inverters,
+            points=points,
+            events=(),
+            links=links,
+        )
+
+    def decision(self, agent: str, t: float) -> str:
+        """Return in words and numbers how an agent decided at a run time (s), as `gridpeers why` does.
+
+        Raises
+        ------
+        RecordFileError
+            If it had not decided, or the record does not have it.
+        """
+        self.events  # noqa: B018  reads them, if there are more
+        return str(explain(self.record, agent, t, tuple(self._plant_events)))
+
+    # ---------------------------------------------------------------- inner
+
+    def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
+        """Return the agents that were there: by their decisions, or by the schedule if the record has none."""
+        if self.record.info.level != "physics":
+            return list(agents)
+        plant = self.record.info.plant
+        present = dict.fromkeys(plant.agents)
+        for action in plant.schedule:
+            if action.t <= t + 1e-9 and action.action == "join":
+                present[action.inverter] = None
+            elif action.t <= t + 1e-9:
+                present.pop(action.inverter, None)
+        return list(present)
+
+    def _switches_at(self, t: float) -> dict[str, bool]:
+        """Return the position of each switch."""
+        positions = dict(self._switches)
+        for event in self.events:
+            if event.t > t + 1e-9:
+                break
+            name = self._by_name.get(event.subject) if event.kind == "switch" else None
+            if name is not None and ("opened" in event.text or "closed" in event.text):
+                positions[name] = "opened" not in event.text
+        return positions
+
+    def _feed_row(self, view: RunView, t: float) -> float | None:
+        """Feed the last row; return its run time (s)."""
+        last = self._rows.last(t)
+        if last is None:
+            return None
+        inverters, row = last
+        message = Telemetry(
+            sender="plant",
+            epoch=1,
+            seq=0,
+            t=row[0],
+            inverters=inverters,
+            rows=(row,),
+            events=(),
+            final=False,
+            outcome="",
+            reproducible=False,
+        )
+        view.telemetry(message, row[0])
+        return row[0]
+
+    def _feed_links(self, view: RunView, agents: Mapping[str, AgentMoment], t: float) -> None:
+        """Feed the status of each agent and the accounts of its links, as of a second before and of now."""
+        sent, faults = self._moments.sent(t - WINDOW, t), self._faults.into(t, WINDOW)
+        span = min(WINDOW, max(t, 1e-3))
+        for at, counts in ((t - span, Counter[str]()), (t, sent)):
+            for name, agent in agents.items():
+                impaired = faults.get(name, {})
+                view.status(_status(agent, counts[name], tuple(impaired)), at)
+                if impaired:
+                    before = {src: replace(link, counts=NOTHING) for src, link in impaired.items()}
+                    view.accounts(name, impaired if at == t else before)
+
+    def _noted(self, one: InverterStatus, agents: Mapping[str, AgentMoment]) -> InverterStatus:
+        """Return the status of an inverter without what a record does not have."""
+        agent = agents.get(one.name)
+        note = one.note
+        if agent is not None and agent.idle:
+            note = "idle: paused, without a measurement, or its law has failed"
+        elif agent is None and note != "no agent":
+            note = ""
+        return dataclasses.replace(one, received=None, sent=None, lost=None, note=note)
+
+
+def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentStatus:
+    """Return what an agent would have published."""
+    return AgentStatus(
+        sender=agent.name,
+        epoch=1,
+        seq=0,
+        t=max(0.0, agent.t),
+        phase="running",
+        waits_for="",
+        island=agent.island,
+        neighbours=agent.neighbours,
+        ages=agent.ages,
+        used=agent.used,
+        received=0,
+        sent=sent,
+        rejected=0,
+        lost=0,
+        ticks=0,
+        missed=0,
+        lateness=0.0,
+        impaired=impaired,
+    )
+
+
+def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
+    info = record.info
+    if info.level == "physics":
+        yield 'It was recorded with record = "physics": no links and no decisions are in it.'
+    elif info.level == "decisions" and info.clock == "wall":
+        yield 'It was recorded with record = "decisions": what else arrived, and the fates of messages, are not in it.'
+    if not has_feeder:
+        yield f"The feeder {info.plant.settings.feeder} is not here: its inverters stand in a ring."

@@ -1,0 +1,174 @@
+"""`gridpeers view RECORD` and `gridpeers run --view` in a real browser: a record at any time, by slider and by key."""
+
+from __future__ import annotations
+
+import re
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from scenarios.explanation.explanation import explain
+from scenarios.record.record_reader import RunRecord
+from tests.command_line import invoke
+from tests.processes.terminals import Desk
+from tests.record.recorded_runs import recorded_run
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Page
+
+pytest.importorskip("starlette", reason="the extra view is not installed")
+pytest.importorskip("websockets", reason="the extra view is not installed")
+
+WAIT = 40_000
+"""Longest wait (ms) for anything on the page."""
+
+ISLANDED = """
+name = "islanded"
+[time]
+end_s = {end}
+[[event]]
+label = "event1"
+t_s = 0.2
+open = ["13-152"]
+[case.one]
+secondary = "all"
+graph = "full"
+[[case.one.link]]
+on = "inv1 <-> inv2"
+cut = true
+from_s = 0.5
+"""
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    """Terminals in an empty folder."""
+    with Desk(tmp_path) as terminals:
+        yield terminals
+
+
+def page_of(browser: Browser, url: str) -> Page:
+    """The page, with a record on it."""
+    page = browser.new_page(viewport={"width": 1500, "height": 1200})
+    page.set_default_timeout(WAIT)
+    page.goto(url)
+    page.wait_for_selector('body[data-live="record"]')
+    return page
+
+
+def shows(page: Page, t: float) -> None:
+    """Wait until the page shows a time (s)."""
+    page.wait_for_function("t => Math.abs(gridpeersView.frame?.t - t) < 1e-6 && !gridpeersPlayer.busy", arg=t)
+    page.wait_for_function("t => document.getElementById('time').textContent === `t = ${t.toFixed(2)} s`", arg=t)
+
+
+def power(page: Page) -> str:
+    """What the table says of inv1's real power (kW)."""
+    return page.locator("tbody tr").first.locator("td").nth(3).inner_text()
+
+
+def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Path) -> None:
+    """Slider, keys and events choose the time; values, links, switches and a decision are those of the record then."""
+    (tmp_path / "it.toml").write_text(ISLANDED.format(end=1.0), encoding="utf-8")
+    record = recorded_run(tmp_path / "it.toml", "one", tmp_path / "run" / "one")
+    history = record.physics()
+
+    def expected(t: float) -> str:
+        return f"{history.P[[k for k, at in enumerate(history.t) if at <= t + 1e-9][-1], 0] / 1e3:.1f}"
+
+    view = desk.open_bare("view", "run", "--port", "0")
+    url = view.expect(r"record run: open (http://\S+) in a browser; Ctrl-C ends the page")[1]
+    page = page_of(browser, url)
+    errors: list[Any] = []
+    page.on("pageerror", lambda error: errors.append(error))
+    shows(page, 1.0)
+    assert page.locator("#run").inner_text() == "islanded, case one"
+    assert power(page) == expected(1.0)
+    page.wait_for_selector('[data-link="inv1|inv2"] + .link.cut', state="attached")
+    page.wait_for_selector('[data-switch="13-152"].open', state="attached")
+
+    page.locator("#slider").evaluate("slider => { slider.value = 0.3; slider.dispatchEvent(new Event('input')) }")
+    shows(page, 0.3)
+    assert power(page) == expected(0.3) != expected(1.0)
+    page.wait_for_selector('[data-link="inv1|inv2"] + .link.used', state="attached")
+
+    page.locator("#slider").focus()
+    for key, t in (("ArrowRight", 0.32), ("ArrowLeft", 0.3), ("ArrowLeft", 0.28), ("Home", 0.0), ("End", 1.0)):
+        page.keyboard.press(key)
+        shows(page, t)
+        assert power(page) == expected(t)
+    page.locator("#event-list .jump", has_text="switch 13-152 opened").click()
+    shows(page, 0.2)
+    page.keyboard.press("ArrowLeft")
+    shows(page, 0.18)
+    page.wait_for_selector('[data-switch="13-152"].closed', state="attached")
+    page.locator("h1").click()
+    page.keyboard.press(" ")
+    page.wait_for_function("() => gridpeersView.frame.t > 0.25")
+    assert page.locator("#play").inner_text() in ("Play", "Pause")
+    shows(page, 1.0)
+
+    page.get_by_label("Show how inv2 decided").click()
+    page.locator("#decision-text", has_text="inv2 at t = 0.98 s").wait_for()
+    assert page.locator("#decision-text").inner_text().strip() == str(explain(record, "inv2", 1.0)).strip()
+    assert page.locator("#decision-command").inner_text() == "gridpeers why run/one inv2 1"
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press("ArrowLeft")
+    page.locator("#decision-text", has_text="inv2 at t = 0.96 s").wait_for()
+
+    other = page_of(browser, url)
+    shows(other, 1.0)
+    shows(page, 0.96)
+    assert page.evaluate("""() => { gridpeersView.socket.send('{"verb":"open","subject":"13-152"}'); return 1 }""")
+    page.keyboard.press("Home")
+    shows(page, 0.0)
+    assert errors == []
+    view.signal(signal.SIGINT)
+    assert view.end() == 130
+    page.wait_for_selector('body[data-live="lost"]')
+
+
+def test_a_run_is_followed_and_then_offered_as_a_record(desk: Desk, browser: Browser, tmp_path: Path) -> None:
+    """The page moves on with the run, says that it has ended, and has its slider at any time; Ctrl-C ends the page."""
+    (tmp_path / "it.toml").write_text(ISLANDED.format(end=3.0), encoding="utf-8")
+    words = ("it.toml", "--clock", "wall", "--speed", "0.5", "--view", "--port", "0", "--out", "out")
+    run = desk.open_bare("run", *words)
+    url = run.expect(r"open (http://\S+) in a browser; the page follows the run")[1]
+    page = browser.new_page(viewport={"width": 1500, "height": 1200})
+    page.set_default_timeout(WAIT)
+    page.goto(url)
+    page.wait_for_selector('body[data-live="recording"]')
+    page.wait_for_function("() => gridpeersView.frame?.t > 0.3")
+    assert "The run goes on" in page.locator("#live").inner_text()
+    page.wait_for_selector('body[data-live="record"]')
+    run.expect(r"the run has ended; http://\S+ shows its record until Ctrl-C")
+    shows(page, 3.0)
+
+    page.locator("#slider").focus()
+    page.keyboard.press("Home")
+    shows(page, 0.0)
+    page.get_by_label("Show how inv4 decided").click()
+    page.locator("#decision-text", has_text=re.compile(r"inv4")).wait_for()
+    run.signal(signal.SIGINT)
+    assert run.end() == 0
+    page.wait_for_selector('body[data-live="lost"]')
+    assert RunRecord.open(tmp_path / "out" / "one").complete
+
+
+def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is no record, or does not go with one, is told before anything is served or run."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "run.mcap").write_bytes(b"nothing of the kind")
+    for words, complaint in (
+        (("view", "run.mcap"), "run.mcap: this is no record: it does not begin as an MCAP file; give a run.mcap"),
+        (("view", "gone"), "gone: cannot be read: No such file or directory"),
+        (("view", "run.mcap", "--control"), "--control: goes with a live run; nothing can be done to a record"),
+        (("view", "--case", "IV"), "--case: goes with a RECORD; a live run has one case"),
+        (("run", "islanding", "--port", "0"), "--port: goes with a page; add --view"),
+        (("run", "islanding", "--view", "--port", "70000"), "--port: a port is a number from 0 to 65535, got 70000"),
+    ):
+        assert invoke(*words) == (2, f"gridpeers: {complaint}\n")
+    assert not (tmp_path / "runs").exists()

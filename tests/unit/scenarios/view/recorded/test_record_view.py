@@ -1,0 +1,186 @@
+"""The page of a record, without a browser: what it shows at a time is what the record has of that time."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from scenarios.record.record_reader import RunRecord
+from scenarios.view.recorded.record_view import RecordView
+from scenarios.view.run_view import Frame
+from tests.record.recorded_runs import recorded_run
+
+ISLANDED = """
+[time]
+end_s = 1.6
+[[event]]
+label = "event1"
+t_s = 0.2
+open = ["13-152"]
+[case.case]
+secondary = "all"
+graph = "full"
+[[link]]
+on = "inv4 <-> inv7"
+cut = true
+from_s = 0.5
+[[link]]
+on = "inv1 -> inv2"
+loss = 0.5
+"""
+"""Nine agents that island at 0.2 s; one link is cut from 0.5 s on, another loses half of its messages."""
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """The record of such a run, in many parts."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "it.toml").write_text(ISLANDED, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scenarios.record.record_writer.CHUNK", 60_000)
+        return recorded_run(folder / "it.toml", "case", folder / "case")
+
+
+@pytest.fixture
+def view(record: RunRecord) -> RecordView:
+    """A view of it, that nobody has asked for anything."""
+    return RecordView(RunRecord.open(record.path))
+
+
+def encoded(frame: Frame) -> bytes:
+    """All that a page would get."""
+    return msgspec.json.encode(frame)
+
+
+def test_a_time_has_one_frame(record: RunRecord, view: RecordView) -> None:
+    """Whichever times were asked for before, forwards or backwards, the page shows the same of a time."""
+    times = (0.0, 0.02, 0.51, 0.5, 1.6, 0.3, 1.21, 0.51)
+    frames = {t: encoded(view.frame(t)) for t in times}
+
+    for t in times:
+        assert encoded(view.frame(t)) == frames[t]
+        assert encoded(RecordView(RunRecord.open(record.path)).frame(t)) == frames[t]
+    assert len(set(frames.values())) == len(frames)
+
+
+def test_the_values_are_those_of_the_last_row(record: RunRecord, view: RecordView) -> None:
+    """The plant's values at a time are its last row up to then, and the strips end with it."""
+    history = record.physics()
+    config = record.info.agents[2]
+    column = history.inverters.index(config.name)
+    for t in (0.0, 0.2, 0.213, 0.77, 1.6):
+        row = [k for k, at in enumerate(history.t) if at <= t + 1e-9][-1]
+        frame = view.frame(t)
+        shown = next(one for one in frame.inverters if one.name == config.name)
+
+        assert frame.t == t
+        assert history.P[row, column] / 1e3 == shown.P
+        assert shown.f == history.f[row, column]
+        assert history.V[row, column] / config.V_nom == shown.V
+        assert frame.points[-1][0] == pytest.approx(history.t[row])
+        assert frame.points[-1][1][column] == round(history.f[row, column], 4)
+        assert (frame.live.word, shown.received) == ("record", None)
+
+
+def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: RecordView) -> None:
+    """Whom an agent hears, how old its states are, and whom it uses are the inputs of its decision in force then."""
+    for t in (0.1, 0.49, 0.5, 0.7, 1.333):
+        frame = view.frame(t)
+        for agent in record.agents:
+            inputs = {each.name: each for each in record.decision(agent, t).neighbours}
+            links = {link.src: link for link in frame.links[agent]}
+            assert links.keys() == inputs.keys()
+            for name, link in links.items():
+                age = inputs[name].age
+                assert age is not None
+                assert link.age == pytest.approx(age, abs=0.026)
+                assert (link.state == "used") == (inputs[name].unused == "")
+
+
+def test_faults_of_links_are_those_of_the_time(view: RecordView) -> None:
+    """A cut shows from its beginning on, in both directions; a lossy link says how much it has lost of late."""
+
+    def link(t: float, src: str, dst: str) -> tuple[bool, float, float]:
+        (found,) = (each for each in view.frame(t).links[dst] if each.src == src)
+        return found.cut, found.lost, found.rate
+
+    assert [link(t, "inv7", "inv4")[0] for t in (0.48, 0.5, 1.5)] == [False, True, True]
+    assert link(1.5, "inv4", "inv7")[0]
+    assert link(1.5, "inv4", "inv7")[2] == 0.0, "nothing comes over it"
+    _, lost, rate = link(1.5, "inv1", "inv2")
+    assert 0.3 < lost < 0.7
+    assert rate == pytest.approx(50.0 * (1.0 - lost), abs=1.0)
+    assert link(1.5, "inv1", "inv3") == (False, 0.0, 50.0)
+
+
+def test_switches_and_events_are_those_of_the_time(view: RecordView) -> None:
+    """A switch has its position of the time, also going back; events are listed once, in their order."""
+    positions = [view.frame(t).switches for t in (0.19, 0.2, 1.0, 0.0)]
+
+    assert [each and each["13-152"] for each in positions] == [True, False, False, True]
+    assert [event.number for event in view.events] == list(range(1, len(view.events) + 1))
+    assert [event.t for event in view.events] == sorted(event.t for event in view.events)
+    assert view.events[0].text == "switch 13-152 opened"
+
+
+def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
+    """Points of a later time continue those that a page has; together they are those of one request."""
+    whole, first = view.frame(1.5).points, view.frame(0.75)
+    more = view.frame(1.5, since=first.points[-1][0])
+
+    assert (first.reset, more.reset) == (True, False)
+    assert more.points[0][0] > first.points[-1][0]
+    assert {*first.points, *more.points} >= set(whole)
+    assert view.frame(1.5, since=1.5).points == ()
+
+
+def test_a_decision_is_explained(record: RunRecord, view: RecordView) -> None:
+    """A page shows what `gridpeers why` prints."""
+    from scenarios.explanation.explanation import explain
+
+    assert view.decision("inv4", 0.7) == str(explain(record, "inv4", 0.7))
+    assert "10 states since: 10 cut off by a cut link" in view.decision("inv4", 0.7)
+
+
+def test_a_record_of_the_physics_shows_them_and_says_what_it_lacks(tmp_path: Path) -> None:
+    """No link and no age is made up; agents are there as the scenario says."""
+    (tmp_path / "it.toml").write_text(ISLANDED.replace("1.6", "0.6"), encoding="utf-8")
+    view = RecordView(recorded_run(tmp_path / "it.toml", "case", tmp_path / "case", level="physics"))
+    frame = view.frame(0.3)
+
+    assert frame.inverters[0].P is not None
+    assert {one.note for one in frame.inverters} == {""}
+    assert not any(frame.links.values())
+    assert view.missing == ('It was recorded with record = "physics": no links and no decisions are in it.',)
+
+
+def test_without_the_feeder_the_inverters_stand_in_a_ring(record: RunRecord, tmp_path: Path) -> None:
+    """A feeder of one's own may have moved since the run; the rest of the page does not depend on it."""
+    copy = RunRecord.open(shutil.copy(record.path, tmp_path))
+    settings = msgspec.structs.replace(copy.info.plant.settings, feeder=str(tmp_path / "gone"))
+    copy.info = msgspec.structs.replace(copy.info, plant=msgspec.structs.replace(copy.info.plant, settings=settings))
+    view = RecordView(copy)
+
+    assert [row.name for row in view.map.inverters] == list(copy.info.inverters)
+    assert len({bus[1:] for bus in view.map.buses}) == len(copy.info.inverters)
+    assert view.map.branches == ()
+    assert "gone is not here" in view.missing[-1]
+    assert view.frame(0.3).inverters[0].P is not None
+
+
+def test_agents_that_join_and_leave(tmp_path: Path) -> None:
+    """An agent is there from its first decision to its last one."""
+    (tmp_path / "it.toml").write_text(
+        '[time]\nend_s = 0.8\n[case.case]\nsecondary = "all"\ngraph = "full"\n'
+        '[[event]]\nlabel = "one"\nt_s = 0.4\nleave = ["inv3"]\n[[event]]\nlabel = "two"\nt_s = 0.6\njoin = ["inv3"]\n',
+        encoding="utf-8",
+    )
+    view = RecordView(recorded_run(tmp_path / "it.toml", "case", tmp_path / "case"))
+
+    def absent(t: float) -> set[str]:
+        return {one.name for one in view.frame(t).inverters if one.note == "no agent"}
+
+    assert [absent(t) for t in (0.38, 0.42, 0.58, 0.62)] == [set(), {"inv3"}, {"inv3"}, set()]
