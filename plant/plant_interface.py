@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Protocol
 
-from wire.messages import PlantEvent
+from wire.messages import LoadSetting, PlantEvent
 
 
 class ReadingLike(Protocol):
@@ -73,7 +73,7 @@ class PlantLike(Protocol):
 
 
 class LivePlant(PlantLike, Protocol):
-    """The further part that wall-clock time uses: switches that people operate."""
+    """The further part that wall-clock time uses: switches that people operate, and loads that they set."""
 
     @property
     def switches(self) -> Mapping[str, bool]:
@@ -85,5 +85,17 @@ class LivePlant(PlantLike, Protocol):
 
         Raise ValueError if there is no such switch, with the names of all switches, or if it should close synchronised
         and its sides are not in step, with their differences.
+        """
+        ...
+
+    @property
+    def loads(self) -> Mapping[str, complex]:
+        """Power at nominal voltage (VA) of each load that has another one than in the feeder's tables now."""
+        ...
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Have a load take another power at the next step; return it in words.
+
+        Raise ValueError if there is no such load, if a number makes no sense, or if loads cannot be set here.
         """
         ...

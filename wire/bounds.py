@@ -80,6 +80,9 @@ Rating = Annotated[float, msgspec.Meta(gt=0.0, le=1e9)]
 Power = Annotated[float, msgspec.Meta(ge=-1e11, le=1e11)]
 """Power (W or var): up to 100 times the largest rating, the widest bound of an agent's set-points."""
 
+Factor = Annotated[float, msgspec.Meta(ge=0.0, le=1e3)]
+"""Factor on a power: never negative, and up to a thousand."""
+
 NominalVoltage = Annotated[float, msgspec.Meta(gt=0.0, le=1e5)]
 """Nominal voltage (V, line-to-neutral) of an inverter's terminals: at most 100 kV."""
 

@@ -23,6 +23,7 @@ from wire.bounds import (
     Cycles,
     Data,
     Droop,
+    Factor,
     Frequency,
     Label,
     Name,
@@ -252,17 +253,30 @@ class LinkAcknowledgement(Message, frozen=True, tag=True, forbid_unknown_fields=
     """The status of the links, to number 0; no core reads it."""
 
 
+class LoadSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A power that a person gives a load: a factor, or real and reactive power; what is nil stays as it is."""
+
+    factor: Factor | None = None
+    """Factor on the real and the reactive power of its table; the plant takes what makes sense of it."""
+    P: Power | None = None
+    """Real power at nominal voltage (W)."""
+    Q: Power | None = None
+    """Reactive power at nominal voltage (var)."""
+
+
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
     """A command that a person gives the plant (command line -> plant, wall-clock time)."""
 
-    verb: Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links", "telemetry"]
-    """Open or close a switch; close it if its sides are in step; let an agent leave; end the run; answer with its
-    status; send emulated links a command; ask all of them for their status; publish telemetry again that a recorder has
-    missed."""
+    verb: Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links", "telemetry"]
+    """Open or close a switch; close it if its sides are in step; set a load; let an agent leave; end the run; answer
+    with its status; send emulated links a command; ask all of them for their status; publish telemetry again that a
+    recorder has missed."""
     argument: Text = ""
-    """Name of the switch or of the agent; number of the first Telemetry needed; empty for the others."""
+    """Name of the switch, of the load or of the agent; number of the first Telemetry needed; empty for the others."""
     link_command: Tree = {}
     """The command to emulated links; empty for the others."""
+    load: LoadSetting | None = None
+    """The power of the load; nil for the others."""
     reply_to: Name
     """Unique id of the client: last part of the key of the `Answer`."""
 
@@ -331,7 +345,7 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     t: Time
     """Run time (s)."""
-    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "roster", "link", "law", "warning"]
+    kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "load", "roster", "link", "law", "warning"]
     """Kind of the event."""
     subject: Label
     """The switch, island or agent concerned."""

@@ -48,6 +48,7 @@ OWN_COMMANDS = {
         ("view", "view_command:view", "Show a run in the browser: feeder, links, strips and agents."),
         ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
         ("event", "live_commands:event", "Open or close a switch of a running plant."),
+        ("load", "load_command:load", "Set a load of a running plant."),
         ("link", "link:link", "Hurt and heal links while a run goes on."),
         ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
         ("bridge", "bridge_command:app", "Offer our plant to simulators of others."),

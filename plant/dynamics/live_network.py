@@ -68,6 +68,8 @@ class LiveNetwork:
         units = self._inverters
         if not self.substation_on:
             if circuit not in self._unsourced:
+                if len(self._unsourced) == KEPT:
+                    del self._unsourced[next(iter(self._unsourced))]
                 self._unsourced[circuit] = circuit.without_source()
             circuit = self._unsourced[circuit]
         key = circuit, units.connected.tobytes()

@@ -23,6 +23,11 @@ class Circuits:
         self._network, self._loads = network, network.loads()
         self._made: dict[frozenset[str], Circuit] = {}
 
+    def change_loads(self, network: Network) -> None:
+        """Go on with the same network with other loads; circuits are made anew as they are needed."""
+        self._network, self._loads = network, network.loads()
+        self._made.clear()
+
     def of(self, closed: frozenset[str]) -> Circuit:
         """Return the circuit with these switches closed.
 

@@ -32,6 +32,10 @@ class Islands:
         self._reported: dict[str, str] = {}
         """Last reported text of each island."""
 
+    def change_loads(self, network: Network) -> None:
+        """Go on with the same network with other loads."""
+        self._network = network
+
     def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
         """Return each inverter's island (`GRID`, or the first inverter's name) and whether the substation feeds it."""
         if self._named is None or self._named[0] is not reduction:

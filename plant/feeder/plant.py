@@ -15,6 +15,7 @@ from plant.feeder.current_limits import CurrentLimits
 from plant.feeder.hunting import hunting_event
 from plant.feeder.in_service import InService
 from plant.feeder.islands import Islands
+from plant.feeder.load_board import LoadBoard
 from plant.feeder.load_limits import LoadLimits
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
@@ -22,7 +23,7 @@ from plant.feeder.synchronism import Difference, Synchronism
 from plant.feeder.trips import trip_event
 from plant.network import Network
 from plant.plant_config import PlantSettings, PowerLimit
-from wire.messages import OFF, PlantEvent
+from wire.messages import OFF, LoadSetting, PlantEvent
 from wire.timing.clock import time_of
 
 
@@ -81,6 +82,7 @@ class Plant:
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
         self._switches = Switchboard(network, settings.events, settings.h)
         self._circuits, self._islands = Circuits(network), Islands(network)
+        self._loads = LoadBoard(network)
         self._set_points = SetPointLimits()
         self._limits: dict[int, list[PowerLimit]] = {}
         for limit in settings.limits:
@@ -207,6 +209,15 @@ class Plant:
         self._switches.put(step, known, action, synchronised=synchronised)
         return (known in closed) == (action == "close")
 
+    @property
+    def loads(self) -> dict[str, complex]:
+        """Power at nominal voltage (VA) of each load that has another one than in the feeder's tables now."""
+        return self._loads.changed
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Have a load take another power from the next step on; return it in words. See `LoadBoard.put`."""
+        return self._loads.put(name, setting)
+
     def difference_across(self, name: str) -> Difference | None:
         """Return angle, frequency and voltage across a switch, by its name or alias, that parts two live islands."""
         return self._closings.difference(self.network.switch_name(name))
@@ -216,13 +227,15 @@ class Plant:
         self._in_service.connect(self._row[name], self.tick * self._steps, on=on)
 
     def advance(self) -> None:
-        """Advance to the next tick, and operate the switches of these steps.
+        """Advance to the next tick, change the loads that people have set, and operate the switches of these steps.
 
         An island whose network has no solution is de-energised, which is an event; the others continue. Protection
         acts at the very step at which a clearing time ends: the steps are split there.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         self._events += self._closings.check_waiting(first)
+        if self._loads.waits:
+            self._change_loads(first)
         scheduled = sorted({s for s in (*self._switches.steps, *self._limits) if first < s < last} | {last})
         step = first
         while step < last:
@@ -297,6 +310,18 @@ class Plant:
         self._dynamics.connect(circuit)
         self._tell_trips(step)
         self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
+
+    def _change_loads(self, step: int) -> None:
+        """Take the powers of loads that people have set."""
+        t = self._time(step)
+        self.network, events = self._loads.apply(t)
+        self._events += events
+        self._circuits.change_loads(self.network)
+        self._islands.change_loads(self.network)
+        self._dynamics.connect(self._circuits.of(self._switches.closed))
+        self._load_limits = LoadLimits(self.network, self._dynamics.network.V_branch)
+        if self._tell_trips(step):
+            self._events += self._islands.report(t, self._switches.closed, self._dynamics.network.reduction)
 
     def _settle(self, step: int, which: list[int]) -> None:
         """Read inverters again that were switched at a step, and report new islands."""

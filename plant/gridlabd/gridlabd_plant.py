@@ -20,7 +20,7 @@ from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
 from plant.gridlabd.model.glm import write_glm
 from plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
 from plant.plant_config import PlantSettings
-from wire.messages import PlantEvent
+from wire.messages import LoadSetting, PlantEvent
 from wire.timing.clock import time_of
 
 FEEDERS = Path(__file__).parents[1] / "data"
@@ -170,6 +170,15 @@ class GridlabdPlant:
         if synchronised:
             raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
         return self._schedule.put(self.tick * self._steps, name, action)
+
+    @property
+    def loads(self) -> dict[str, complex]:
+        """Return none: they stay as in the model."""
+        return {}
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Refuse: the loads are those of the model."""
+        raise ValueError(f"load {name}: GridLAB-D as the plant keeps the loads of its model; use our own plant")
 
     def connect(self, name: str, on: bool) -> None:
         """Do nothing if an inverter comes that is there; RuntimeError if it goes: GridLAB-D's inverters stay."""

@@ -12,7 +12,7 @@ from plant.helics.federate import HelicsError, HelicsFederate
 from plant.helics.topics import SENSORS, Value, number
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant, ReadingLike
-from wire.messages import PlantEvent
+from wire.messages import LoadSetting, PlantEvent
 from wire.timing.clock import time_of
 
 _COLUMNS = len(SENSORS) + len(topics.HELD)
@@ -94,6 +94,15 @@ class BridgedPlant:
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch."""
         return self._plant.switch(name, action, synchronised=synchronised)
+
+    @property
+    def loads(self) -> Mapping[str, complex]:
+        """Power at nominal voltage (VA) of each load that was set."""
+        return self._plant.loads
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Set a load."""
+        return self._plant.set_load(name, setting)
 
     def advance(self) -> None:
         """Take the outside set-points of this tick, advance, and publish every row at its time."""

@@ -15,7 +15,7 @@ from plant.helics.federate import HelicsError, HelicsFederate
 from plant.helics.topics import ACT, Value, number
 from plant.plant_config import PlantConfig
 from wire.bounds import NAME
-from wire.messages import PlantEvent
+from wire.messages import LoadSetting, PlantEvent
 from wire.schema.suggestion import first_of
 from wire.timing.clock import time_of
 
@@ -108,6 +108,15 @@ class HelicsPlant:
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Refuse: the outside plant has the switches."""
         raise ValueError(f"{name}: the outside plant has the switches, and HELICS no topic for them")
+
+    @property
+    def loads(self) -> Mapping[str, complex]:
+        """Return none: the outside plant has the loads."""
+        return {}
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Refuse: the outside plant has the loads."""
+        raise ValueError(f"load {name}: the outside plant has the loads, and HELICS no topic for them")
 
     def advance(self) -> None:
         """Publish the set-points, and go on to the next tick."""

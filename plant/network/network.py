@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import cmath
 from collections.abc import Iterable
+from copy import copy
+from itertools import compress
 from math import pi, sqrt
 
 import numpy as np
@@ -12,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from plant.dynamics.load_law import LoadLaw
-from plant.equipment import PHASES, Feeder, InverterRow, Load, Switch
+from plant.equipment import PHASES, Feeder, InverterRow, Switch
 from plant.equipment.bus_islands import bus_islands, switch_name
 from plant.equipment.imported_equipment import LoadPart
 from plant.network.loads import LoadBranches
@@ -69,7 +71,7 @@ class Network:
     """
 
     def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
-        self.feeder = feeder
+        self.feeder = self._first = feeder
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
         self._index = {node: i for i, node in enumerate(self.nodes)}
@@ -140,9 +142,20 @@ class Network:
 
     def loads(self) -> LoadBranches:
         """Give the loads that are no impedances, at their own nodes (`LoadBranches.on` moves them)."""
-        own = self._load_branches([load for load in self.feeder.loads if load.model != "Z"])
+        own = self._load_branches([load.model != "Z" for load in self.feeder.loads])
         parts = [part for part in self.feeder.load_parts if not part.is_impedance]
         return own + self._load_part_branches(parts) if parts else own
+
+    def with_loads(self, feeder: Feeder) -> Network:
+        """Return the same network with the loads of `feeder`, which is this one's with other powers of loads.
+
+        The load branches stay the same ones, in the same order: a load that is set to nothing keeps its branches.
+        """
+        other = copy(self)
+        other.feeder = feeder
+        other.Y_loads = other._impedance_loads()  # noqa: SLF001  its own class
+        other._Y = other.Y_branches + other.Y_capacitors + other.Y_loads  # noqa: SLF001
+        return other
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
         """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
@@ -220,7 +233,7 @@ class Network:
         return self._assemble(parts)
 
     def _impedance_loads(self) -> sp.csc_array:
-        branches = self._load_branches([load for load in self.feeder.loads if load.model == "Z"])
+        branches = self._load_branches([load.model == "Z" for load in self.feeder.loads])
         parts = []
         # A Z load comes out of _load_branches with its nominal power in S, as a constant-power load would.
         for n_from, n_to, S, V in zip(branches.n_from, branches.n_to, branches.law.S, branches.V_nom, strict=True):
@@ -265,12 +278,13 @@ class Network:
             a_to=np.where(to < 0, 0.0, 1.0),
         )
 
-    def _load_branches(self, loads: list[Load]) -> LoadBranches:
+    def _load_branches(self, chosen: list[bool]) -> LoadBranches:
+        """Return the branches of the chosen loads that have power in the network's first tables."""
         n_from, n_to, power, current, V_nom, phi0 = [], [], [], [], [], []
-        for load in loads:
+        for load, table in compress(zip(self.feeder.loads, self._first.loads, strict=True), chosen):
             pairs = DELTA_PAIRS if load.connection == "D" else tuple((phase, "") for phase in PHASES)
-            for (first, second), S in zip(pairs, load.S, strict=True):
-                if S == 0:
+            for (first, second), S, S_table in zip(pairs, load.S, table.S, strict=True):
+                if S_table == 0:
                     continue
                 i = self.index(load.bus, first)
                 n_from.append(i)

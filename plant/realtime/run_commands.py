@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 MOST_SWITCHES = 500
 """Most switches in a status, which must fit into an answer."""
 
+MOST_LOADS = 150
+"""Most loads with another power than their table's in a status."""
+
 
 class RunCommands:
     """Carry commands to a plant out."""
@@ -82,6 +85,10 @@ class RunCommands:
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
             node.stop(node.keys.stop_request(argument, instance), "stopped by command")
             return f"{argument} was asked to leave at t = {node.t:.2f} s"
+        if verb == "load":
+            if command.load is None:
+                raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
+            return f"{node.plant.set_load(argument, command.load)}, at t = {node.t:.2f} s"
         if verb == "synchronise":
             node.plant.switch(argument, "close", synchronised=True)
             return f"switch {argument}: close in step at t = {node.t:.2f} s"
@@ -124,6 +131,7 @@ class RunCommands:
             "absent": self._agents(present=False),
             "events": msgspec.to_builtins(node.events),
             "switches": dict(islice(node.plant.switches.items(), MOST_SWITCHES)),
+            "loads": {name: [S.real, S.imag] for name, S in islice(node.plant.loads.items(), MOST_LOADS)},
             "impaired": list(node.link_commands.impaired(node.t)),
             "rejected": sum(node.rejects.counts.values()),
         }

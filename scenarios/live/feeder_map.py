@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from plant.equipment import Feeder
+from plant.equipment.named_loads import named_loads
 from scenarios.results.plots.feeder_places import has_coordinates, places
 
 
@@ -32,6 +33,18 @@ class MapInverter(msgspec.Struct, frozen=True):
     spare: bool = False
 
 
+class MapLoad(msgspec.Struct, frozen=True):
+    """A load on the map."""
+
+    name: str
+    bus: int
+    """Number of its bus."""
+    P: float
+    """Real power at nominal voltage (W), of the feeder's tables."""
+    Q: float
+    """Reactive power at nominal voltage (var), of the feeder's tables."""
+
+
 class FeederMap(msgspec.Struct, frozen=True):
     """A feeder's one-line diagram."""
 
@@ -41,6 +54,7 @@ class FeederMap(msgspec.Struct, frozen=True):
     """Numbers of the two buses of each branch, and its number of phases."""
     switches: tuple[MapSwitch, ...] = ()
     inverters: tuple[MapInverter, ...] = ()
+    loads: tuple[MapLoad, ...] = ()
     source: int = -1
     """Number of the substation's bus; -1 if there is none."""
     to_scale: bool = True
@@ -70,6 +84,9 @@ def feeder_map(feeder: Feeder) -> FeederMap:
             MapInverter(row.name, number[row.bus], row.kind, row.microgrid, row.spare)
             for row in (*feeder.inverters, *feeder.spares)
         ),
+        loads=tuple(
+            MapLoad(load.name, number[load.bus], load.S.real, load.S.imag) for load in named_loads(feeder).values()
+        ),
         source=-1 if feeder.source is None else number[feeder.source.bus],
         to_scale=has_coordinates(feeder),
     )
@@ -85,6 +102,7 @@ def read_feeder_map(payload: bytes) -> FeederMap | None:
         *(end for a, b, _ in found.branches for end in (a, b)),
         *(end for switch in found.switches for end in (switch.a, switch.b)),
         *(inverter.bus for inverter in found.inverters),
+        *(load.bus for load in found.loads),
     ]
     fits = all(0 <= number < len(found.buses) for number in numbers) and -1 <= found.source < len(found.buses)
     return found if fits else None

@@ -13,7 +13,7 @@ from scenarios.live.feeder_map import feeder_map
 from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
 from scenarios.live.run_speed import SPEEDS
 from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
+from scenarios.schema.configs import as_in, configs
 from scenarios.schema.netem_tables import netem_of, setup_of
 from wire.driver.command_line import command_line
 from wire.journal import RecordLevel
@@ -108,7 +108,7 @@ def configure(
         connect=beyond,
         wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
         strict=options.strict,
-        feeder_map=msgspec.to_builtins(feeder_map(feeder)),
+        feeder_map=msgspec.to_builtins(feeder_map(as_in(scenario, feeder))),
         agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
     )
     return plant, everyone

@@ -16,9 +16,9 @@ from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
 from wire.codec import encode
 from wire.driver.command_line import command_line
-from wire.messages import Answer, Command, LinkAcknowledgement
+from wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
 
-Verb = Literal["open", "close", "synchronise", "stop", "down", "status", "link", "links"]
+Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
 ANSWER = 5.0
 """Longest wait (s) for the answer of a plant that is there."""
@@ -40,7 +40,7 @@ class RefusedError(ValueError):
     """The plant has refused a command; the message is the plant's."""
 
 
-def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
+def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | None = None) -> str:
     """Give the plant a command and return its answer.
 
     Raises
@@ -50,7 +50,7 @@ def ask(client: RunClient, verb: Verb, argument: str = "") -> str:
     NobodyError
         If it does not answer.
     """
-    answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument)
+    answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument, load=load)
     return answer.text
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+from itertools import chain
 from typing import Literal
 
 import msgspec
@@ -14,12 +15,13 @@ from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.live.link_requests import check_link_command, command_links, links_of_run
+from scenarios.live.load_request import load_setting
 from scenarios.live.run_address import ENDPOINT, RUN, RunAddress, UsageError, check_name
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.run_requests import ask
 from wire.bounds import Text
 
-Verb = Literal["open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all"]
+Verb = Literal["open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"]
 
 FIND = 1.5
 """Longest wait (s) for the plant of a run that the page follows already."""
@@ -30,11 +32,17 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     verb: Verb
     subject: Text = ""
-    """The switch, the agent, or one end of the link."""
+    """The switch, the agent, the load, or one end of the link."""
     other: Text = ""
     """The other end of the link; both ways."""
     value: float = 0.0
     """Delay (s) or probability of a loss."""
+    factor: float | None = None
+    """Factor on a load's power in its table."""
+    P_kW: float | None = None
+    """Real power of a load at nominal voltage (kW)."""
+    Q_kvar: float | None = None
+    """Reactive power of a load at nominal voltage (kvar)."""
 
     def words(self) -> list[str]:
         """Return the words of the command that does the same.
@@ -43,6 +51,8 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         --------
         >>> PageAction(verb="cut", subject="inv1", other="inv4").words()
         ['link', 'cut', 'inv1', 'inv4']
+        >>> PageAction(verb="load", subject="48", P_kW=300.0, Q_kvar=90.0).words()
+        ['load', '48', '--P', '300', '--Q', '90']
         """
         match self.verb:
             case "open" | "close":
@@ -57,6 +67,10 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
                 return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.verb}", f"{self.value:g}"]
             case "heal all":
                 return ["link", "heal"]
+            case "load":
+                given = {"--factor": self.factor, "--P": self.P_kW, "--Q": self.Q_kvar}
+                options = [(name, f"{value:.12g}") for name, value in given.items() if value is not None]
+                return ["load", self.subject, *chain.from_iterable(options)]
         return ["link", self.verb, self.subject, self.other]
 
     def link_command(self) -> LinkCommand:
@@ -117,6 +131,9 @@ class ActionClient:
         match action.verb:
             case "open" | "close" | "synchronise" | "stop":
                 return ask(client, action.verb, action.subject)
+            case "load":
+                setting = load_setting(action.factor, action.P_kW, action.Q_kvar)
+                return ask(client, "load", action.subject, setting)
         for name in (action.subject, action.other):
             if action.verb != "heal all":
                 check_name("LINKS", name)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import errno
 import ipaddress
+import secrets
 import socket
 
 from scenarios.live.run_address import UsageError
 
 ADDRESS, PORT = "127.0.0.1", 8123
 """Where it listens by default."""
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+"""Names of this host's loopback in the address of a page."""
 
 
 def is_this_host(address: str) -> bool:
@@ -55,6 +59,22 @@ def listen(address: str, port: int) -> socket.socket:
             ) from None
         raise UsageError(f"--address: {address} cannot be listened on: {error.strerror}") from None
     return listening
+
+
+def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
+    """Return the token that a page must know, and the names under which the page answers; () takes any name.
+
+    On this host's loopback no token is needed, and only names of this host are taken. Beyond it a token is: without a
+    given one it is made up.
+
+    Examples
+    --------
+    >>> access("127.0.0.1", "")
+    ('', ('127.0.0.1', 'localhost', '[::1]'))
+    """
+    if is_this_host(address):
+        return token, tuple(dict.fromkeys((*LOOPBACK, address)))
+    return token or secrets.token_urlsafe(16), ()
 
 
 def url_of(listening: socket.socket, address: str) -> str:

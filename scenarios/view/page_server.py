@@ -32,6 +32,8 @@ FILES = {
     "view.css": "text/css",
     "view.js": "text/javascript",
     "diagram.js": "text/javascript",
+    "diagram_keys.js": "text/javascript",
+    "load_dialog.js": "text/javascript",
     "strips.js": "text/javascript",
     "player.js": "text/javascript",
 }
@@ -50,7 +52,7 @@ HEADERS = {
     "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data:; "
     "frame-ancestors 'none'; base-uri 'none'; form-action 'self'",
     "X-Content-Type-Options": "nosniff",
-    "Referrer-Policy": "no-referrer",
+    "Referrer-Policy": "same-origin",  # without any, a browser posts the token as of no origin
     "Cache-Control": "no-store",
 }
 

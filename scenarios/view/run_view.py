@@ -48,6 +48,8 @@ class Cursor(msgspec.Struct, frozen=True):
     """Version of its links."""
     switches: int = -1
     """Version of its switches."""
+    loads: int = -1
+    """Version of the loads that were set."""
 
 
 class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -71,6 +73,8 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Links into each agent whose links have changed."""
     switches: dict[str, bool] | None = None
     """Position of each switch, if any has changed: whether it is closed."""
+    loads: dict[str, tuple[float, float]] | None = None
+    """Real (W) and reactive power (var) of each load that was set in this run, if any has changed."""
 
 
 class RunView:
@@ -87,7 +91,7 @@ class RunView:
         self.feeder_map: FeederMap | None = None
         """The one-line diagram; None until it has come."""
         self.wants_status = True
-        """Whether the plant should be asked for its status: at first, after switching, and after a restart."""
+        """Whether to ask the plant for its status: at first, after a change of switches or loads, after a restart."""
         self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates()
         self._configs: dict[str, AgentConfig] = {}
         self._names: tuple[str, ...] = ()
@@ -97,6 +101,8 @@ class RunView:
         self._count = 0
         self._switches: dict[str, bool] = {}
         self._switches_version = 0
+        self._loads: dict[str, tuple[float, float]] = {}
+        self._loads_version = 0
         self._into: dict[str, tuple[int, tuple[LinkView, ...]]] = {}
         """Links into each agent, with the version at which they changed."""
         self._version = 0
@@ -138,6 +144,8 @@ class RunView:
         self.wants_status = False
         if status.switches != self._switches:
             self._switches, self._switches_version = status.switches, self._switches_version + 1
+        if status.loads != self._loads:
+            self._loads, self._loads_version = status.loads, self._loads_version + 1
         self._take_events(status.events, old=True)
 
     def status(self, message: AgentStatus, now: float) -> None:
@@ -187,6 +195,7 @@ class RunView:
             events=tuple(event for event in self._events if event.number > cursor.event),
             links={name: links for name, (version, links) in self._into.items() if version > cursor.links},
             switches=self._switches if self._switches_version != cursor.switches else None,
+            loads=self._loads if self._loads_version != cursor.loads else None,
         )
         later = Cursor(
             run=self._run,
@@ -194,6 +203,7 @@ class RunView:
             event=self._count,
             links=self._version,
             switches=self._switches_version,
+            loads=self._loads_version,
         )
         return frame, later
 
@@ -216,7 +226,7 @@ class RunView:
             self._known_events.append(event)
             self._count += 1
             self._events.append(EventView(self._count, event.t, event.kind, event.subject, event.text))
-            self.wants_status |= event.kind == "switch" and not old
+            self.wants_status |= event.kind in ("switch", "load") and not old
 
     def _renew_links(self, receiver: str) -> None:
         config = self._configs.get(receiver)

@@ -34,7 +34,9 @@ BODIES: dict[str, dict[str, Any]] = {
     "Journal": dict(data=b"entries"),
     "LinkRequest": dict(link_command={"heal": {"on": "*"}}, reply_to="z1"),
     "LinkAcknowledgement": dict(ok=True, text="done", reply_to="z1", data=b""),
-    "Command": dict(verb="status", argument="", link_command={"x": 1.0}, reply_to="z1"),
+    "Command": dict(
+        verb="status", argument="", link_command={"x": 1.0}, load=dict(factor=None, P=1e3, Q=None), reply_to="z1",
+    ),
     "Answer": dict(ok=True, text="done", data={"t": 1.0}),
     "AgentStatus": dict(
         phase="running", waits_for="", island="inv1", neighbours=("inv2",), ages=(0.02,), used=("inv2",), received=9,

@@ -13,7 +13,7 @@ from plant.plant_config import PlantConfig
 from plant.plant_process import run_plant
 from scenarios.emulation.emulated_links import links_of
 from wire.driver.process import main
-from wire.messages import PlantEvent
+from wire.messages import LoadSetting, PlantEvent
 
 M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
 """Droop (pu), nominal frequency (Hz) and voltage (V), rating (W), load per inverter in the island (pu)."""
@@ -48,6 +48,7 @@ class ToyPlant:
         self._tick, self._stands = 0, "close"
         self._rows: list[tuple[float, ...]] = [self._row()]
         self._events: list[PlantEvent] = []
+        self._loads: dict[str, complex] = {}
 
     def measure(self) -> dict[str, Reading]:
         """Solve the droops."""
@@ -96,6 +97,19 @@ class ToyPlant:
         self._events.append(PlantEvent(t=self._t, kind="switch", subject=name, text=f"{name}: {action}"))
         self._stands, before = action, self._stands
         return action == before
+
+    @property
+    def loads(self) -> dict[str, complex]:
+        """The only load, if it was set."""
+        return self._loads
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Set the only load there is, which does nothing but tell."""
+        if name != "load1":
+            raise ValueError(f'no load "{name}"; loads are load1')
+        self._loads[name] = complex(setting.P or 0.0, setting.Q or 0.0)
+        self._events.append(PlantEvent(t=self._t, kind="load", subject=name, text=f"{name} set"))
+        return f"{name}: {self._loads[name]:g} VA"
 
     def connect(self, name: str, on: bool) -> None:
         """Put an inverter on the bus or take it off; off, it takes no part in the droops."""

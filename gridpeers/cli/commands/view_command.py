@@ -34,7 +34,7 @@ def view(
     connect: Connect = None,
     wait: Wait = 5.0,
     control: Annotated[
-        bool, typer.Option("--control", help="Let the page switch, stop and start agents, cut and heal links.")
+        bool, typer.Option("--control", help="Let the page act: switches, loads, agents, links.")
     ] = False,
     address: Annotated[
         str, typer.Option("--address", metavar="HOST", help="Where the page listens; any other asks for a token.")
@@ -99,18 +99,14 @@ def _serve(
 ) -> NoReturn:
     """Serve pages until a signal comes."""
     with usage_errors():
-        import secrets
-
-        from scenarios.view.page_address import is_this_host, listen, url_of
+        from scenarios.view.page_address import access, listen, url_of
 
         listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
         from scenarios.view.page_server import PageOptions, PageServer
         from wire.driver.drive import StoppedError
 
-        here = is_this_host(address)
-        token = token or ("" if here else secrets.token_urlsafe(16))
-        hosts = ("127.0.0.1", "localhost", "[::1]", address) if here else ()
+        token, hosts = access(address, token)
         watch_readers(quits=False)
         signal = "SIGINT"
         typer.echo(line(url_of(listening, address) + (f"?token={token}" if token else "")))

@@ -40,7 +40,7 @@ class Departures:
     """Measured windows of the scenario, as it means them, that end after the first departure or miss rows: the plant
     remembers whatever happened to it."""
     happened: ScenarioModel
-    """The scenario with the events that came, those among them that people made by operating switches."""
+    """The scenario with the events that came, among them those that people made on switches and loads."""
     windows: LiveWindows
     """The windows of these events."""
     live: Mapping[str, str]
@@ -120,11 +120,13 @@ def compare(
 
 
 def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
-    """Yield the switches that people operated; opening an open switch changes nothing."""
+    """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
     planned = [
         (event.t_s, switch_name(feeder, name)) for event in scenario.events for name in (*event.open, *event.close)
     ]
     for event in events:
+        if event.kind == "load":  # no scenario sets one
+            yield event
         if event.kind != "switch" or event.text.endswith(" already"):
             continue
         if not any(abs(event.t - t) < NEAR and event.subject == name for t, name in planned):

@@ -53,12 +53,14 @@ def _marks(departures: Iterable[PlantEvent]) -> Iterator[Mark]:
             by_time.setdefault(event.t, []).append(event)
     for t, of in by_time.items():
         what = ", ".join(dict.fromkeys(text for event in of if (text := _in_short(event))))
-        yield Mark("live" if any(event.kind == "switch" for event in of) else "", t, what)
+        yield Mark("live" if any(event.kind in ("switch", "load") for event in of) else "", t, what)
 
 
 def _in_short(event: PlantEvent) -> str:
     """Return a departure in two words; "" if that takes more."""
     if event.kind == "link":
         return "links"
+    if event.kind == "load":
+        return f"load {event.subject}"
     match = re.match(r"(?:switch )?(\S+)(?: \(.*\))? (opened|closed|joined|left|died)\b", event.text)
     return f"{match[1]} {PRESENT[match[2]]}" if match else ""

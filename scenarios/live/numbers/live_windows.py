@@ -1,4 +1,4 @@
-"""Windows of measurement of a live run: of its scenario's events, and of switches that people operated. Pure."""
+"""Windows of measurement of a live run: of its scenario's events, and of people's on switches and loads. Pure."""
 
 from __future__ import annotations
 
@@ -30,8 +30,10 @@ class LiveWindows:
     """Windows without numbers, as rows are missing at their end, where they are measured."""
 
 
-def live_events(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
-    """Return the switches that people operated, in the order of time, as events; those of one step are one event.
+def live_events(done: Iterable[PlantEvent]) -> tuple[Event, ...]:
+    """Return the switches that people operated and the loads that they set as events, in the order of time.
+
+    Those of one step are one event.
 
     Examples
     --------
@@ -40,9 +42,9 @@ def live_events(switched: Iterable[PlantEvent]) -> tuple[Event, ...]:
     [('live at 2.5 s', ('67s-67',), ())]
     """
     events = []
-    for t, group in groupby(switched, key=lambda event: event.t):
+    for t, group in groupby(done, key=lambda event: event.t):
         # of several operations of a switch in one step, the last one counts
-        last = {event.subject: event.text.endswith(" opened") for event in group}
+        last = {event.subject: event.text.endswith(" opened") for event in group if event.kind == "switch"}
         events.append(
             Event(
                 label=f"live at {round(t, 3):.12g} s",

@@ -43,6 +43,8 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Agents whose link to or from the plant has an emulated fault."""
     switches: dict[str, bool] = {}
     """Position of each switch, by its name: whether it is closed."""
+    loads: dict[str, tuple[float, float]] = {}
+    """Real (W) and reactive power (var) at nominal voltage of each load that was set during the run."""
 
 
 class RunMonitor:

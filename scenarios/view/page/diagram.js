@@ -1,4 +1,7 @@
 // The feeder's one-line diagram with its switches and inverters, and the communication links on top.
+import { DiagramKeys, linkWords } from "./diagram_keys.js";
+import { loadWords } from "./load_dialog.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 const make = (name, attributes = {}, parent) => {
   const element = document.createElementNS(SVG, name);
@@ -12,7 +15,8 @@ const pairOf = (a, b) => a < b ? `${a}|${b}` : `${b}|${a}`;
 export class Diagram {
   // on(kind, subject): a click; look(event, kind, subject): the pointer is above something, or above nothing
   constructor(svg, on, look) {
-    this.svg = svg; this.on = on; this.look = look; this.map = null; this.inverters = new Map(); this.switches = new Map(); this.pairs = new Map();
+    this.svg = svg; this.on = on; this.look = look; this.map = null; this.inverters = new Map(); this.switches = new Map(); this.loads = new Map(); this.pairs = new Map();
+    this.keys = new DiagramKeys(svg, on, look);
     new ResizeObserver(() => this.layout()).observe(svg.parentElement);
   }
   setMap(map, colourOf) { this.map = map; this.colourOf = colourOf; this.layout(); }
@@ -20,6 +24,7 @@ export class Diagram {
   layout() {
     const map = this.map, W = this.svg.parentElement.clientWidth, H = this.svg.parentElement.clientHeight;
     if (!map || !W || !map.buses.length) return;
+    const had = this.keys.focused();
     this.svg.setAttribute("viewBox", `0 0 ${W} ${H}`); this.svg.replaceChildren();
     const xs = map.buses.map(b => b[1]), ys = map.buses.map(b => b[2]), few = map.inverters.length <= 24;
     const [x0, x1, y0, y1] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
@@ -32,9 +37,16 @@ export class Diagram {
     const byPhases = new Map();
     for (const [a, b, phases] of map.branches) byPhases.set(phases, (byPhases.get(phases) || "") + `M${at[a].map(r1)}L${at[b].map(r1)}`);
     for (const [phases, d] of byPhases) make("path", { d, class: "branch", "stroke-width": thin * [1, 1, 1.7, 2.8][phases] }, wires);
-    this.links = make("g", { class: "links" }, this.svg);
-    const marks = make("g", {}, this.svg);
+    this.links = this.keys.group(make("g", { class: "links" }, this.svg), "Links");
+    const marks = this.keys.group(make("g", {}, this.svg), "Switches"), small = this.keys.group(make("g", {}, this.svg), "Loads");
     this.marks = make("g", { class: "links" }, this.svg);
+    this.loads.clear(); this.shownLoads = "";
+    for (const load of map.loads || []) {
+      const [x, y] = at[load.bus], size = few ? 3.5 : 2.5, g = make("g", { class: "load", "data-load": load.name }, small);
+      make("rect", { class: "grab", x: x - size - 1.5, y: y + 1, width: 2 * size + 3, height: 2 * size + 4 }, g);
+      make("path", { d: `M${r1(x - size)} ${r1(y + 3)}h${2 * size}l${-size} ${r1(1.7 * size)}z` }, g);
+      this.hear(g, "load", load.name); this.loads.set(load.name, { g, load });
+    }
     this.switches.clear();
     for (const s of map.switches) {
       const [a, b] = [at[s.a], at[s.b]], x = (a[0] + b[0]) / 2, y = (a[1] + b[1]) / 2;
@@ -43,10 +55,10 @@ export class Diagram {
       make("rect", { class: "grab", x: x - 11, y: y - 11, width: 22, height: 22 }, g);
       make("rect", { x: x - 4.5, y: y - 4.5, width: 9, height: 9, rx: 1.5 }, g);
       if (map.switches.length <= 40) make("text", { x: x + 8, y: y + 13 }, g).textContent = s.alias || s.name;
-      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, state: null });
+      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, title: s.alias ? `${s.alias} (${s.name})` : s.name });
     }
     if (map.source >= 0) { const [x, y] = at[map.source]; make("path", { class: "substation", d: `M${x} ${y - 9}l9 9l-9 9l-9-9z` }, marks); }
-    const nodes = make("g", {}, this.svg), r = few ? 9 : map.inverters.length > 60 ? 5 : 6.5, taken = new Map();
+    const nodes = this.keys.group(make("g", {}, this.svg), "Inverters"), r = few ? 9 : map.inverters.length > 60 ? 5 : 6.5, taken = new Map();
     this.inverters.clear();
     for (const row of map.inverters) {
       let [x, y] = at[row.bus];
@@ -58,11 +70,12 @@ export class Diagram {
       if (row.kind === "GFM") make("rect", { class: "body", x: -r, y: -r, width: 2 * r, height: 2 * r, rx: 3, style: `fill:${fill}` }, g);
       else make("circle", { class: "body", r, style: `fill:${fill}` }, g);
       this.hear(g, "agent", row.name);
-      this.inverters.set(row.name, { g, value: null, x, y });
+      this.inverters.set(row.name, { g, kind: row.kind, value: null, x, y });
     }
     if (few) this.label(r, W);
     this.pairs.clear();
     if (this.last) this.update(...this.last);
+    this.keys.settle(had);
   }
 
   // Each label goes where it covers least of the marks and of the labels before it.
@@ -82,15 +95,18 @@ export class Diagram {
   }
 
   hear(element, kind, subject) {
+    this.keys.add(element, kind, subject);
     element.addEventListener("click", () => this.on(kind, subject));
     element.addEventListener("pointermove", event => this.look(event, kind, subject));
     element.addEventListener("pointerleave", event => this.look(event, "", ""));
   }
 
-  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V }
-  update(links, switches, states, pending, lit) {
-    this.last = [links, switches, states, pending, lit];
+  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V }; loads: name -> [P, Q] of those that were set
+  update(links, switches, states, pending, lit, loads = {}) {
+    this.last = [links, switches, states, pending, lit, loads];
     if (!this.links) return;
+    const had = this.keys.focused(), before = this.pairs.size;
+    let news = false;
     set(this.links, "class", links.size > 120 ? "links many" : "links");
     for (const [key, link] of links) {
       let drawn = this.pairs.get(key);
@@ -103,8 +119,10 @@ export class Diagram {
         this.hear(hit, "link", key);
         drawn = { hit, path, mark: null, x: (from.x + 2 * mx + to.x) / 4, y: (from.y + 2 * my + to.y) / 4 };
         this.pairs.set(key, drawn);
+        news = true;
       }
       const bright = lit && (link.a === lit || link.b === lit) ? " lit" : "";
+      set(drawn.hit, "aria-label", linkWords(link));
       set(drawn.path, "class", `link ${link.kind}${pending.has(key) ? " pending" : ""}${bright}`);
       set(drawn.path, "stroke-width", String(r1(link.kind === "impaired" || link.kind === "cut" ? 2.2 : .7 + 1.9 * Math.min(1, link.rate / 50))));
       const mark = link.kind === "cut" ? "cut" : link.kind === "impaired" ? link.text : "";
@@ -116,11 +134,26 @@ export class Diagram {
       }
     }
     for (const [key, drawn] of this.pairs) if (!links.has(key)) { drawn.hit.remove(); drawn.path.remove(); drawn.mark?.remove(); this.pairs.delete(key); }
-    for (const [name, drawn] of this.switches) set(drawn.g, "class", `switch ${switches[name] ?? true ? "closed" : "open"}${pending.has(name) ? " pending" : ""}`);
+    if (news) {  // in the order of the inverters, for the keyboard
+      const place = new Map([...this.inverters.keys()].map((name, i) => [name, i])), at = key => key.split("|").reduce((sum, name) => sum * 1e4 + place.get(name), 0);
+      for (const [, drawn] of [...this.pairs].sort(([a], [b]) => at(a) - at(b))) this.links.append(drawn.hit, drawn.path);
+    }
+    if (news || this.pairs.size !== before) this.keys.settle(had);
+    for (const [name, drawn] of this.switches) {
+      const closed = switches[name] ?? true;
+      set(drawn.g, "class", `switch ${closed ? "closed" : "open"}${pending.has(name) ? " pending" : ""}`); set(drawn.g, "aria-label", `switch ${drawn.title}, ${closed ? "closed" : "open"}`);
+    }
+    const shown = JSON.stringify([loads, [...pending.keys()]]);
+    if (shown !== this.shownLoads) for (const [name, { g, load }] of this.loads) {
+      set(g, "class", `load${loads[name] ? " set" : ""}${pending.has(`load ${name}`) ? " pending" : ""}`);
+      set(g, "aria-label", `load ${name}, ${loadWords(load, loads[name])}`);
+    }
+    this.shownLoads = shown;
     for (const [name, drawn] of this.inverters) {
       const state = states.get(name) || { absent: true };
       const off = state.V !== null && state.V !== undefined && (state.V < .95 || state.V > 1.05);
       set(drawn.g, "class", `inverter${state.absent ? " absent" : ""}${off ? " off-voltage" : ""}${pending.has(name) ? " pending" : ""}${name === lit ? " lit" : ""}`);
+      set(drawn.g, "aria-label", `inverter ${name}, ${drawn.kind}${state.absent ? ", no agent" : ""}${off ? ", voltage beyond 0.95 to 1.05 pu" : ""}`);
       if (drawn.value) { const text = state.V === null || state.V === undefined ? "" : `${state.V.toFixed(3)} pu`; if (drawn.value.textContent !== text) drawn.value.textContent = text; }
     }
   }

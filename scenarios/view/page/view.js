@@ -1,14 +1,16 @@
 // The page of a run: takes frames from the server, shows them, and sends what is clicked.
 import { Diagram, pairOf } from "./diagram.js";
+import { diagramText } from "./diagram_keys.js";
+import { LoadDialog, loadWords } from "./load_dialog.js";
 import { Player } from "./player.js";
 import { Strips } from "./strips.js";
 
 const $ = id => document.getElementById(id);
 const SILENT = 1000; // ms without a frame after which the numbers are old: the server sends four a second
-const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
+const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, loads: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
 window.gridpeersView = S;
 
-const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases"));
+const diagram = new Diagram($("diagram"), click, look), strips = new Strips($("canvases")), loadDialog = new LoadDialog(act);
 const player = new Player($, ask, () => strips.points.length ? strips.latest : -1, () => S.chosen);
 window.gridpeersPlayer = player;
 const number = (value, digits) => value === null || value === undefined ? "–" : value.toFixed(digits).replace(/^-(0\.?0*)$/, "$1");
@@ -54,6 +56,7 @@ function take(message) {
     $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; put($("strips-title"), S.hello.record ? "30 s until then" : "Last 30 s");
     $("rights").textContent = S.hello.record ? `${S.hello.where}: a record, which only looks` : S.hello.control ? "" : "looks only; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
+    diagram.keys.setRoles(kind => S.hello.control || S.hello.record && kind === "agent" ? "button" : "img");
     clear();
   } else if (message.record) { takeRecord(message.record); }
   else if (message.news) { player.take(message.news); if (S.frame) render(); }
@@ -61,6 +64,7 @@ function take(message) {
   else if (message.problem) { player.failed(); put($("live-text"), message.problem); }
   else if (message.map) {
     S.map = message.map; recolour(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
+    fill($("load"), (S.map.loads || []).map(load => [load.name, load.name])); $("load-choice").hidden = !S.map.loads?.length;
   } else if (message.done) { done(message.done); }
   else if (message.frame) { takeFrame(message.frame); }
 }
@@ -72,6 +76,7 @@ function takeFrame(frame) {
   if (frame.points) strips.add(frame.points);
   if (frame.links) { for (const [dst, links] of Object.entries(frame.links)) S.links.set(dst, links); S.pairs = pairs(); }
   if (frame.switches) { S.switches = frame.switches; for (const name of Object.keys(frame.switches)) S.pending.delete(name); }
+  if (frame.loads) { S.loads = frame.loads; for (const key of [...S.pending.keys()]) if (key.startsWith("load ")) S.pending.delete(key); }
   S.inverters = new Map(frame.inverters.map(one => [one.name, one]));
   for (const event of frame.events || []) {
     S.events.push(event);
@@ -114,7 +119,8 @@ function draw() {
   S.pairs ||= pairs();
   const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V }]));
   for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
-  diagram.update(S.pairs, S.switches, states, S.pending, S.lit);
+  diagram.update(S.pairs, S.switches, states, S.pending, S.lit, S.loads);
+  put($("diagram-text"), `${current ? "" : "Not of now, but as it was last. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads)}`);
   const speed = Number((frame.pace.match(/speed ([0-9.]+)/) || [0, 1])[1]);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
   // most frames have statuses alone: the strips, which take most of the time, stay as they are
@@ -189,6 +195,7 @@ function showTip() {
 function tipText(kind, subject) {
   const does = verb => S.hello?.control || S.hello?.record && verb === "show how it decided" ? `\nclick: ${verb}` : "";
   if (kind === "switch") return `switch ${subject}: ${S.switches[subject] ?? true ? "closed" : "open"}${does(S.switches[subject] ?? true ? "open it" : "close it")}`;
+  if (kind === "load") { const load = loadOf(subject); return load ? `load ${subject}: ${loadWords(load, S.loads[subject])}${does("set it")}` : ""; }
   if (kind === "agent") {
     const one = S.inverters.get(subject);
     if (!one) return subject;
@@ -202,9 +209,11 @@ function tipText(kind, subject) {
 }
 
 // ---- what is clicked
+function loadOf(name) { return S.map?.loads?.find(load => load.name === name); }
 function click(kind, subject) {
   if (S.hello?.record && kind === "agent") choose(S.chosen === subject ? "" : subject);
   if (!S.hello?.control || S.pending.has(subject)) return;
+  if (kind === "load") { loadDialog.open(loadOf(subject), S.loads[subject]); return; }
   if (kind === "switch") act({ verb: S.switches[subject] ?? true ? "open" : "close", subject }, subject);
   else if (kind === "agent") act({ verb: S.inverters.get(subject)?.note === "no agent" ? "start" : "stop", subject }, subject);
   else {
@@ -228,6 +237,7 @@ $("link-form").addEventListener("submit", event => {
   act(verb === "heal all" ? { verb } : { verb, subject: a, other: b, value: Number($(verb)?.value || 0) }, verb === "heal all" ? "heal all" : pairOf(a, b));
 });
 $("switch-form").addEventListener("submit", event => { event.preventDefault(); act({ verb: event.submitter.value, subject: $("switch").value }, $("switch").value); });
+$("load-choice").addEventListener("submit", event => { event.preventDefault(); click("load", $("load").value); });
 
 setInterval(() => { if (performance.now() - S.heard > SILENT) render(); }, 250);
 connect();

@@ -9,6 +9,7 @@ import signal
 import subprocess
 from pathlib import Path
 
+import pandas
 import pytest
 
 from tests.command_line import invoke
@@ -95,6 +96,39 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     assert window == {"t_s": window["t_s"], "end_s": live["ended_s"], "what": "switch 13-152 opened"}
     measured = metrics["cases"]["IV"][label]
     assert (measured["f_error_Hz"] is None) == ("f_error_Hz" in measured.get("reasons", {}))
+
+
+def test_a_load_is_set_while_the_run_goes_on(desk: Desk) -> None:
+    """The answer has the power or why not; events and the record have it as an event, and the inverters carry it."""
+    plant = plant_of(desk, "--out", "here")
+    assert desk.type("event", "open", "13-152")[0] == 0
+    plant.expect("13-152 opened")
+
+    code, text = desk.type("load", "48", "--P", "0", "--Q", "0")
+    assert (code, text.partition(", at t")[0]) == (0, "load 48: 0 kW and 0 kvar at nominal voltage, 0 times its table")
+    off = float(plant.expect(r"([0-9.]+) s  load 48 set to 0 kW and 0 kvar at nominal voltage")[1])
+    code, text = desk.type("load", "48x", "--factor", "2")
+    assert (code, text) == (2, 'gridpeers: load "48x": no such load; did you mean "48"?\n')
+    code, text = desk.type("load", "48", "--P", "315000")
+    assert (code, "did you mean 315 (315000 W)?" in text) == (2, True)
+    code, text = desk.type("load", "48", "--factor", "1.5")
+    assert (code, text.partition(", at t")[0]) == (
+        0,
+        "load 48: 315 kW and 225 kvar at nominal voltage, 1.5 times its table",
+    )
+    on = float(plant.expect(r"([0-9.]+) s  load 48 set to 315 kW")[1])
+    assert desk.type("down")[0] == 0
+    plant.expect("NOTE  case IV: events that the scenario does not have: .*; live at .* s: load 48 set to 0 kW")
+    assert plant.end() == 0
+
+    folder = desk.folder / "here" / "IV"
+    assert re.search(r",load,48,", (folder / "events.csv").read_text())
+    history = pandas.read_csv(folder / "history.csv")
+    P = history.filter(regex="_P_W$").sum(axis=1) / 1e3
+    rows = [(P[history["t_s"] < t + 1e-6].iloc[-1], P[history["t_s"] > t + 1e-6].iloc[0]) for t in (off, on)]
+    drop, rise = (float(after - before) for before, after in rows)
+    assert -210.0 < drop < -130.0, "kW: 210 of constant impedance, less what the others take at the higher voltage"
+    assert rise == pytest.approx(-1.5 * drop, rel=0.1)
 
 
 def test_what_befalls_an_agent_or_the_plant_is_told_in_the_terminals(desk: Desk) -> None:

@@ -12,44 +12,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.processes.terminals import Desk, Terminal
+from tests.processes.realtime.browsers import SLOW, accessible, page_of, run_of, view_of
+from tests.processes.terminals import Desk
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser
 
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
-
-WAIT = 40_000
-"""Longest wait (ms) for anything on the page."""
-
-SLOW = "0.2"
-"""Speed of the runs: a control period is 100 ms of wall time, so that a busy machine keeps pace."""
-
-
-def run_of(desk: Desk) -> Terminal:
-    """A plant, with the agents of inv1, inv2 and inv4 in one terminal."""
-    agents = desk.open("agent", "inv1", "inv2", "inv4")
-    words = ("--run", "lab", "--listen", desk.options[-1], "--wait", "0", "--speed", SLOW)
-    plant = desk.open_bare("plant", "calm.toml", *words)
-    plant.expect("t = 0; speed")
-    agents.expect("inv4: joins at")
-    return plant
-
-
-def view_of(desk: Desk, *words: str) -> tuple[Terminal, str]:
-    """A view of the run, and the address that it printed."""
-    view = desk.open("view", "--port", "0", *words)
-    return view, view.expect(r"open (http://\S+) in a browser")[1]
-
-
-def page_of(browser: Browser, url: str) -> Page:
-    """The page, with numbers of now on it."""
-    page = browser.new_page(viewport={"width": 1500, "height": 1000})
-    page.set_default_timeout(WAIT)
-    page.goto(url)
-    page.wait_for_selector('body[data-live="live"]')
-    return page
 
 
 def status(url: str, **headers: str) -> int:
@@ -132,9 +102,150 @@ def test_a_frozen_plant_and_a_restarted_one_are_told(desk: Desk, browser: Browse
     page.evaluate("""() => gridpeersView.socket.send('{"verb":"open","subject":"13-152"}')""")
     page.wait_for_selector("#command-list li.bad :text('only looks')", state="attached")
 
+    view.signal(signal.SIGSTOP)
+    page.wait_for_selector('body[data-live="lost"]')
+    assert "nothing here is of now" in page.locator("#live").inner_text()
+    view.signal(signal.SIGCONT)
+    page.wait_for_selector('body[data-live="live"]')
     view.signal(signal.SIGINT)
     view.end()
     page.wait_for_selector('body[data-live="lost"]')
+
+
+def test_a_click_on_a_load_sets_it(desk: Desk, browser: Browser) -> None:
+    """By factor or in kW and kvar, with the command beside it, on every open page; what makes no sense is refused."""
+    plant = run_of(desk)
+    _, url = view_of(desk, "--control")
+    page, other = page_of(browser, url), page_of(browser, url)
+
+    page.wait_for_selector('[data-load="48"]', state="attached")
+    page.locator('[data-load="48"]').dispatch_event("click")
+    assert page.locator("#load-now").inner_text() == "210 kW and 150 kvar at nominal voltage"
+    page.locator("#load-factor").fill("1.5")
+    page.keyboard.press("Enter")
+    assert not page.locator("#load-dialog").is_visible()
+    for each in (page, other):
+        each.wait_for_selector('[data-load="48"].set', state="attached")
+    plant.expect("load 48 set to 315 kW and 225 kvar at nominal voltage, 1.5 times its table")
+    page.wait_for_selector("#event-list :text('load 48 set to 315 kW')")
+    options = " ".join(desk.options)
+    assert page.locator("#command-list code").first.inner_text() == f"gridpeers load 48 --factor 1.5 {options}"
+    assert "Loads set: 48 (315 kW, 225 kvar)." in other.locator("#diagram-text").inner_text()
+
+    page.get_by_label("load", exact=True).select_option("48")
+    page.locator("#load-choice button").click()
+    assert page.locator("#load-now").inner_text().startswith("set to 315 kW and 225 kvar; in its table 210 kW")
+    page.locator("#load-P").fill("210000")
+    page.locator("#load-power-form button").click()
+    refused = page.wait_for_selector("#command-list li.bad").inner_text()
+    assert f"gridpeers load 48 --P 210000 --Q 225 {options}" in refused
+    assert "did you mean 210 (210000 W)?" in refused
+    assert desk.type("load", "48", "--factor", "1")[0] == 0
+    for each in (page, other):
+        each.wait_for_selector('[data-load="48"]:not(.set)', state="attached")
+
+
+def test_the_diagram_by_keyboard_and_for_a_screen_reader(desk: Desk, browser: Browser) -> None:
+    """Everything that can be clicked has a role, a name with its state, a place in the order of focus and a key."""
+    run_of(desk)
+    _, url = view_of(desk, "--control")
+    page = page_of(browser, url)
+    page.wait_for_selector('[data-link="inv2|inv4"] + .link.used', state="attached")
+    found = accessible(page)
+
+    names = set(found["button"])
+    assert {f"link {pair}, heard" for pair in ("inv1 to inv2", "inv1 to inv4", "inv2 to inv4")} <= names
+    assert {"switch 13-152, closed", "inverter inv1, GFM", "inverter inv3, GFL, no agent"} <= names
+    assert "load 48, 210 kW and 150 kvar at nominal voltage" in names
+    assert "Stop the agent of inv1" in names
+    assert all(found["button"]), "a button without a name says nothing"
+    groups = {"Links", "Switches", "Loads", "Inverters", "One-line diagram of the feeder with its communication links"}
+    assert groups <= set(found["group"])
+    assert {"Feeder and links", "Last 30 s", "Agents", "Events", "Commands"} <= set(found["region"])
+    text = page.locator("#diagram-text").inner_text()
+    assert re.match(r"10 inverters, without an agent: inv3, .* and 1 more\. .*3 links, all heard\.$", text)
+    assert "switches, " in text
+
+    focused = "() => document.activeElement.getAttribute('aria-label')"
+    page.locator("input[name=tool]:checked").focus()
+    page.keyboard.press("Tab")
+    assert page.evaluate(focused) == "link inv1 to inv2, heard"
+    page.keyboard.press("End")
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate(focused) == "link inv1 to inv2, heard", "after the last one comes the first"
+    assert "inv1 \N{RIGHTWARDS ARROW} inv2: used" in page.locator("#tip").inner_text()
+    page.keyboard.press("Enter")
+    page.wait_for_selector('[aria-label="link inv1 to inv2, cut"]', state="attached")
+    assert page.evaluate(focused) == "link inv1 to inv2, cut", "the focus stays"
+    assert "1 cut (inv1\N{EN DASH}inv2)" in page.locator("#diagram-text").inner_text()
+
+    for kind in ("switch ", "load ", "inverter "):
+        page.keyboard.press("Tab")
+        assert page.evaluate(focused).startswith(kind), "one stop of the tab key for each kind"
+        assert page.evaluate("() => getComputedStyle(document.activeElement).outlineStyle") == "solid"
+        if kind == "switch ":
+            page.locator('[data-switch="13-152"]').focus()
+            page.keyboard.press("Space")
+            page.wait_for_selector('[aria-label="switch 13-152, open"]', state="attached")
+        if kind == "load ":
+            page.locator('[data-load="48"]').focus()
+            page.keyboard.press("Enter")
+            assert accessible(page)["dialog"] == ["Load 48"]
+            page.keyboard.press("Escape")
+            assert page.evaluate(focused).startswith("load 48"), "the focus comes back from the dialog"
+    page.set_viewport_size({"width": 1200, "height": 800})
+    page.wait_for_function("() => document.querySelector('#diagram').getAttribute('viewBox').split(' ')[2] < 800")
+    assert page.evaluate(focused).startswith("inverter "), "a diagram that is drawn anew keeps the focus"
+
+
+def test_a_page_that_only_looks_offers_nothing_to_press(desk: Desk, browser: Browser) -> None:
+    """Without --control the diagram is of images; Enter does nothing; what ended is told, and no number stays."""
+    run_of(desk)
+    _, url = view_of(desk)
+    page = page_of(browser, url)
+    page.wait_for_selector('[data-link="inv1|inv2"] + .link.used', state="attached")
+    found = accessible(page)
+
+    assert "link inv1 to inv2, heard" in found["image"]
+    assert not [name for name in found.get("button", []) if name.startswith(("link", "switch", "load", "inverter"))]
+    page.locator('[data-load="48"]').focus()
+    page.keyboard.press("Enter")
+    assert not page.locator("#load-dialog").is_visible()
+
+    assert desk.type("down")[0] == 0
+    page.wait_for_selector('body[data-live="ended"]')
+    assert "The run has ended" in page.locator("#live").inner_text()
+    assert page.locator("#diagram-text").inner_text().startswith("Not of now")
+    assert page.locator("tbody tr").first.locator("td").all_inner_texts()[:9] == ["\N{EN DASH}"] * 9
+
+
+def test_two_views_of_one_run_and_a_token_for_one_of_them(desk: Desk, browser: Browser) -> None:
+    """Each has its own port and its own rights; without the token no frame comes, with it the page is as any other."""
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+
+    plant = run_of(desk)
+    _, url = view_of(desk, "--control")
+    _, closed = view_of(desk, "--token", "mine")
+    bare = closed.partition("?")[0]
+    page = page_of(browser, url)
+
+    with pytest.raises(InvalidStatus):
+        connect(bare.replace("http", "ws") + "frames")
+    looking = browser.new_page()
+    looking.goto(bare)
+    looking.get_by_label("Token").fill("yours")
+    looking.keyboard.press("Enter")
+    looking.get_by_role("alert").filter(has_text="That is not the token of this view.").wait_for()
+    looking.get_by_label("Token").fill("mine")
+    looking.keyboard.press("Enter")
+    looking.wait_for_selector('body[data-live="live"]', timeout=40_000)
+    assert looking.url == bare, "the token does not stay in the address"
+
+    page.locator('[data-switch="13-152"]').dispatch_event("click")
+    plant.expect("switch 13-152 opened")
+    looking.wait_for_selector('[data-switch="13-152"].open', state="attached", timeout=40_000)
+    assert looking.locator("#control").is_hidden()
 
 
 def test_the_page_is_for_those_who_may_see_it(desk: Desk) -> None:

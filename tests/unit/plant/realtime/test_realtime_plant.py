@@ -14,7 +14,19 @@ from wire.actions import Fetch, Publish
 from wire.codec import decode, encode
 from wire.driver.drive import StoppedError
 from wire.keys import Keys
-from wire.messages import Answer, Command, Leave, Measurement, Message, PlantEvent, State, Stop, Telemetry, Waiting
+from wire.messages import (
+    Answer,
+    Command,
+    Leave,
+    LoadSetting,
+    Measurement,
+    Message,
+    PlantEvent,
+    State,
+    Stop,
+    Telemetry,
+    Waiting,
+)
 
 KEYS = Keys("toy")
 T_C = 0.02
@@ -87,10 +99,10 @@ class Lab:
         """An agent says that it leaves."""
         self.hear(KEYS.leave(name), Leave(sender=name, epoch=life, seq=0, t=0.0))
 
-    def ask(self, verb: Any, argument: str | dict[str, Any] = "") -> Answer:
+    def ask(self, verb: Any, argument: str | dict[str, Any] = "", **further: Any) -> Answer:
         """Send a command with a name, or with a command to links."""
         content = {"argument": argument} if isinstance(argument, str) else {"link_command": argument}
-        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **content)
+        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **content, **further)
         self.hear(KEYS.command, command)
         key, answer = next((key, m) for key, m in reversed(self.sent) if isinstance(m, Answer))
         assert (key, answer.seq) == (KEYS.answer("z1"), 7)
@@ -290,8 +302,20 @@ def test_commands_are_done_and_answered() -> None:
     assert [event.text for event in lab.events("switch")] == ["sw1: open", "sw1: open"]
 
 
+def test_a_load_is_set_and_a_status_has_it() -> None:
+    """The answer says the power; the status has it until the run ends."""
+    lab = running()
+    set_ = lab.ask("load", "load1", load=LoadSetting(P=2e3, Q=-1e3))
+    wrong = lab.ask("load", "load7", load=LoadSetting(factor=0.5))
+
+    assert (set_.ok, set_.text) == (True, "load1: 2000-1000j VA, at t = 0.00 s")
+    assert (wrong.ok, wrong.text) == (False, 'no load "load7"; loads are load1')
+    assert lab.ask("status").data["loads"] == {"load1": [2e3, -1e3]}
+
+
 @pytest.mark.parametrize(("verb", "argument", "text"), [
     ("open", "sw7", 'no switch "sw7"; switches are sw1'),
+    ("load", "load1", "load load1: nothing is to be set; give a factor, or real or reactive power"),
     ("stop", "inv7", 'no agent "inv7" is running; running are: inv1, inv2, inv3'),
 ])  # fmt: skip
 def test_what_cannot_be_done_is_answered_with_what_there_is(verb: str, argument: str, text: str) -> None:

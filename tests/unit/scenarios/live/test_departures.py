@@ -57,6 +57,12 @@ BACK = told("roster", 3.4, "inv2", "inv2 joined, at t = 3.4 s")
         ("islanding", [told("roster", 0.0, "inv10", "inv10 joined, at t = 0 s")], ("event1", "event2"), ["inv10"]),
         ("islanding", [ABSENT], ("event1", "event2"), ["0.00 s  started without the agents of inv3"]),
         ("islanding", [told("link", 4.5, "links", "link command 1: * -> *: cut")], ("event2",), ["link command 1"]),
+        (
+            "islanding",
+            [told("load", 5.0, "48", "load 48 set to 315 kW")],
+            ("event2",),
+            ["5.00 s  load 48 set to 315 kW"],
+        ),
         ("plug-n-play", [LEFT, BACK], (), []),
         ("plug-n-play", [LEFT], ("return",), ["3.00 s  inv2 was to join, and nobody started it in time"]),
         ("plug-n-play", [], ("leave", "return"), ["2.00 s  inv2 was to leave", "3.00 s  inv2 was to join"]),
@@ -162,6 +168,14 @@ def switch(t: float, what: str = "opened", name: str = "sw1_2 (67s-67)") -> Plan
         ([switch(2.5)], 3.0, "event1 1-2.5, live at 2.5 s 2.5-3", "", "event2"),
         # too little time to measure anything that is steady
         ([switch(1.1), switch(6.9)], 7.0, "live at 1.1 s 1.1-4, event2 4-6.9", "event1, live at 6.9 s", ""),
+        # a load that somebody set, as a switch
+        (
+            [told("load", 2.5, "48", "load 48 set to 9 kW")],
+            7.0,
+            "event1 1-2.5, live at 2.5 s 2.5-4, event2 4-7",
+            "",
+            "",
+        ),
         # at the moment of an event of the scenario, a switch is part of that; one that was open already is nothing
         ([switch(1.0), switch(2.0, "was open already")], 7.0, "event1 1-4, event2 4-7", "", ""),
     ],

@@ -16,7 +16,7 @@ from scenarios.live.live_options import LiveOptions, configure
 from scenarios.schema import load_scenario
 from tests.command_line import invoke
 
-COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "view", "stop", "event")
+COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "view", "stop", "event", "load")
 
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -66,6 +66,16 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["status", "--run", "$x"], '--run: "$x" cannot be part of a Zenoh key'),
         (["event", "toggle", "sw1_2"], '"toggle" cannot be done to a switch; write open or close'),
         (["event", "open"], "SWITCH is missing"),
+        (["load"], "LOAD is missing"),
+        (["load", "48"], "nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)"),
+        (["load", "48", "--factor", "2", "--P", "9"], "--factor: goes with neither --P nor --Q"),
+        (
+            ["load", "48", "--factor", "-1"],
+            "--factor: a factor on a load must not be negative, got -1; 0 to 10",
+        ),
+        (["load", "48", "--factor", "150"], "--factor: 150 is not plausible for a factor on a load (0 to 10)"),
+        (["load", "48", "--Q", "nan"], "--Q: must be a finite number, at most 1e+08, got nan"),
+        (["load", "48", "--P", "-inf"], "--P: must be a finite number, at most 1e+08, got -inf"),
         (["stop"], "INVERTER is missing"),
     ],
 )

@@ -170,6 +170,26 @@ def test_links_into_a_silent_agent_are_not_shown(view: RunView) -> None:
     assert view.frame(cursor, 5.0)[0].links == {"inv1": ()}
 
 
+def test_loads_that_were_set_come_when_they_change(view: RunView) -> None:
+    """As the switches: an event asks for them, a page gets them once, and those of a new plant begin anew."""
+    pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+    as_begun = PlantStatus(phase="running", t=1.0, speed=1.0, pacing=pacing)
+    view.plant_status(as_begun)
+    frame, cursor = view.frame(Cursor(), 1.0)
+    assert frame.loads == {}
+    assert view.frame(cursor, 1.0)[0].loads is None
+
+    view.telemetry(telemetry(1.0, 7, PlantEvent(t=1.0, kind="load", subject="48", text="load 48 set")), 1.1)
+    assert view.wants_status
+    view.plant_status(msgspec.structs.replace(as_begun, loads={"48": (3e5, 1e5)}))
+    frame, cursor = view.frame(cursor, 1.2)
+    assert frame.loads == {"48": (3e5, 1e5)}
+
+    view.telemetry(telemetry(0.1, 8), 2.0)
+    view.plant_status(as_begun)
+    assert view.frame(cursor, 2.0)[0].loads == {}
+
+
 def test_switches_come_when_they_change(view: RunView) -> None:
     """An event of a switch asks for the positions; a page gets them once."""
     pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)

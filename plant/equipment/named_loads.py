@@ -1,0 +1,115 @@
+"""The loads of a feeder by name, and the same feeder with other powers of some of them. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import msgspec
+from msgspec.structs import replace
+
+from plant.equipment.equipment import Feeder, Load
+from wire.schema.plausible import Plausible
+from wire.schema.suggestion import first_of, suggestion
+
+FACTOR = Plausible("a factor on a load", 0.0, 10.0)
+"""Factors on the power that a load has in the feeder's tables."""
+
+LEAST = 0.01
+"""Part of the sum of its branches' sizes below which a load's total says nothing of how its branches share it."""
+
+
+class NamedLoad(msgspec.Struct, frozen=True, kw_only=True):
+    """A load as people speak of it: all rows of our own tables at one bus, or all parts of one imported load."""
+
+    name: str
+    """Name: that of the bus, or of the imported load."""
+    bus: str
+    S: complex
+    """Power at nominal voltage (VA), of all branches."""
+
+
+def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
+    """Return the loads of a feeder by name, in the order of its tables.
+
+    Examples
+    --------
+    >>> from plant.tables import read_feeder
+    >>> named_loads(read_feeder("microgrid123"))["48"]
+    NamedLoad(name='48', bus='48', S=(210000+150000j))
+    """
+    found: dict[str, NamedLoad] = {}
+    for name, bus, S in (
+        *((load.bus, load.bus, sum(load.S)) for load in feeder.loads),
+        *((part.name, part.bus, part.S) for part in feeder.load_parts),
+    ):
+        first = found.get(name, NamedLoad(name=name, bus=bus, S=0j))
+        found[name] = replace(first, S=first.S + S)
+    return found
+
+
+def load_name(loads: Mapping[str, NamedLoad], text: str) -> str:
+    """Return the name of a load by its name, or by its bus where that has one load alone.
+
+    Raises
+    ------
+    ValueError
+        If there is no such load; the message says what was probably meant.
+    """
+    if text in loads:
+        return text
+    here = [load.name for load in loads.values() if load.bus == text]
+    if len(here) == 1:
+        return here[0]
+    if here:
+        raise ValueError(f'load "{text}": bus {text} has {len(here)} loads: {first_of(here, 8)}; name one of them')
+    raise ValueError(f'load "{text}": no such load; {suggestion(text, loads, "loads")}')
+
+
+def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
+    """Return a feeder in which some loads have another power at nominal voltage (VA), by name.
+
+    The branches of a load keep their shares of its real and of its reactive power. What has no shares, as the reactive
+    power of a load that has none, is shared in proportion to the branches' apparent power.
+    """
+    of_bus: dict[str, list[complex]] = {}
+    of_part: dict[str, list[complex]] = {}
+    for load in feeder.loads:
+        of_bus.setdefault(load.bus, []).extend(load.S)
+    for part in feeder.load_parts:
+        of_part.setdefault(part.name, []).append(part.S)
+    bus = {name: iter(_shared(of_bus[name], S)) for name, S in powers.items() if name in of_bus}
+    of = {name: iter(_shared(of_part[name], S)) for name, S in powers.items() if name in of_part}
+    return replace(
+        feeder,
+        loads=tuple(
+            replace(load, S=(next(bus[load.bus]), next(bus[load.bus]), next(bus[load.bus])))
+            if load.bus in bus
+            else load
+            for load in feeder.loads
+        ),
+        load_parts=tuple(
+            replace(part, S=next(of[part.name])) if part.name in of else part for part in feeder.load_parts
+        ),
+    )
+
+
+def _with_next(load: Load, powers: Iterator[complex] | None) -> Load:
+    """Return a row with the next three powers (VA), if there are any."""
+    return load if powers is None else replace(load, S=(next(powers), next(powers), next(powers)))
+
+
+def _shared(branches: Sequence[complex], total: complex) -> list[complex]:
+    """Return the powers (VA) of a load's branches for another total."""
+    P = _scaled([S.real for S in branches], [abs(S) for S in branches], total.real)
+    Q = _scaled([S.imag for S in branches], [abs(S) for S in branches], total.imag)
+    return [complex(p, q) for p, q in zip(P, Q, strict=True)]
+
+
+def _scaled(values: Sequence[float], sizes: Sequence[float], total: float) -> list[float]:
+    before = sum(values)
+    if abs(before) > LEAST * sum(map(abs, values)):
+        return [value * (total / before) for value in values]
+    whole = sum(sizes)
+    return [
+        value + (total - before) * size / whole if whole else value for value, size in zip(values, sizes, strict=True)
+    ]

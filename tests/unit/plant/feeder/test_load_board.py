@@ -1,0 +1,144 @@
+"""Loads that people set while a run goes on: what the plant then has, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from plant.equipment.named_loads import named_loads, with_powers
+from plant.feeder import Plant
+from plant.feeder.load_board import LoadBoard
+from plant.network import Network
+from plant.plant_config import PlantSettings, SwitchEvent
+from plant.tables import read_feeder
+from wire.messages import LoadSetting
+
+T_C = 0.02
+
+
+def plant(feeder: str = "microgrid123", *events: SwitchEvent) -> Plant:
+    """A plant of ours."""
+    return Plant(Network(read_feeder(feeder)), PlantSettings(feeder=feeder, events=events), T_C, T_C)
+
+
+def total(p: Plant) -> float:
+    """Real power (kW) of all inverters."""
+    return sum(reading.P for reading in p.measure().values()) / 1e3
+
+
+def run(p: Plant, seconds: float) -> None:
+    """Advance."""
+    for _ in range(round(seconds / T_C)):
+        p.advance()
+
+
+ISLANDED = SwitchEvent(t=0.02, switch="13-152", action="open")
+
+
+def test_a_load_that_was_set_is_the_load_of_another_table() -> None:
+    """In an island the inverters come to the powers of a plant whose table has the load so from the beginning."""
+    p = plant("microgrid123", ISLANDED)
+    run(p, 0.1)
+    words = p.set_load("48", LoadSetting(factor=1.5))
+    at = p.tick * T_C
+    run(p, 6.0)
+
+    table = read_feeder("microgrid123")
+    S = 1.5 * named_loads(table)["48"].S
+    other = Plant(Network(with_powers(table, {"48": S})), PlantSettings(events=(ISLANDED,)), T_C, T_C)
+    run(other, 6.1)
+
+    assert words == "load 48: 315 kW and 225 kvar at nominal voltage, 1.5 times its table"
+    (told,) = [event for event in p.take_events() if event.kind == "load"]
+    assert (told.t, told.subject) == (pytest.approx(at), "48")
+    assert told.text == "load 48 set to 315 kW and 225 kvar at nominal voltage, 1.5 times its table"
+    assert p.loads == {"48": S}
+    for name, reading in p.measure().items():
+        assert pytest.approx([getattr(other.measure()[name], key) for key in ("P", "Q", "V")], rel=1e-4) == [
+            reading.P,
+            reading.Q,
+            reading.V,
+        ]
+
+
+def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
+    """Nothing of a setting stays once the load has its table's power again: the network is the first one."""
+    first = Network(read_feeder("microgrid123"))
+    board = LoadBoard(first)
+    board.put("48", LoadSetting(P=0.0, Q=0.0))
+    off, _ = board.apply(0.1)
+    assert not board.waits
+    board.put("48", LoadSetting(factor=1.0))
+    again, (event,) = board.apply(0.2)
+
+    assert event.text == "load 48 set to 210 kW and 150 kvar at nominal voltage, as in its table"
+    assert board.changed == {}
+    assert len(off.loads()) == len(first.loads()), "a load that is set to nothing keeps its branches"
+    assert (again.Y_loads != first.Y_loads).nnz == 0
+    np.testing.assert_array_equal(again.loads().law.S, first.loads().law.S)
+    np.testing.assert_array_equal(again.loads().law.I0, first.loads().law.I0)
+
+
+def test_nothing_and_ten_times_are_taken(network: Network) -> None:
+    """Zero power leaves the other loads; what an island cannot feed de-energises it, which the run survives."""
+    p = plant("microgrid123", ISLANDED)
+    run(p, 0.1)
+    before = total(p)
+    for name in named_loads(network.feeder):
+        p.set_load(name, LoadSetting(factor=0.0))
+    run(p, 0.5)
+    assert abs(total(p)) < 0.05 * before
+
+    for name in named_loads(network.feeder):
+        p.set_load(name, LoadSetting(factor=10.0))
+    run(p, 0.5)
+    assert any(event.kind == "trip" for event in p.take_events())
+    assert all(np.isfinite(reading.P) for reading in p.measure().values())
+
+
+def test_what_is_left_out_stays() -> None:
+    """--P alone keeps the reactive power, also that of a setting that has not come into force yet."""
+    board = LoadBoard(Network(read_feeder("microgrid123")))
+
+    assert board.put("48", LoadSetting(Q=60e3)).startswith("load 48: 210 kW and 60 kvar")
+    assert board.put("48", LoadSetting(P=300e3)).startswith("load 48: 300 kW and 60 kvar at nominal voltage")
+    board.apply(0.0)
+    assert board.put("48", LoadSetting(P=100e3)).startswith("load 48: 100 kW and 60 kvar")
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "said"),
+    [
+        ("1000", LoadSetting(factor=1.0), 'load "1000": no such load; did you mean "100"?'),
+        ("48", LoadSetting(factor=-1.0), "load 48: a factor on a load must not be negative, got -1"),
+        ("48", LoadSetting(factor=11.0), r"load 48: 11 is not plausible for a factor on a load \(0 to 10\)"),
+        ("48", LoadSetting(P=-1.0), "load 48: the real power of a load must not be negative, got -0.001 kW"),
+        ("48", LoadSetting(P=210e6), r"210000 kW is not plausible .*; did you mean 210 \(210000 W\)\?"),
+        ("48", LoadSetting(), "load 48: takes either a factor, or real or reactive power"),
+        ("48", LoadSetting(factor=1.0, P=1e3), "load 48: takes either a factor, or real or reactive power"),
+        ("48", LoadSetting(Q=-90e6), "-90000 kvar is not plausible for the reactive power of a load"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_and_changes_nothing(name: str, setting: LoadSetting, said: str) -> None:
+    """The message says what would be right."""
+    board = LoadBoard(Network(read_feeder("microgrid123")))
+
+    with pytest.raises(ValueError, match=said):
+        board.put(name, setting)
+    assert not board.waits
+
+
+def test_all_models_of_load_are_scaled(network: Network) -> None:
+    """Constant power, current and impedance each draw half of it at the same voltages."""
+    table = network.feeder
+    half = {name: 0.5 * load.S for name, load in named_loads(table).items()}
+    V = network.nominal * 0.97
+    for model in ("P", "I", "Z"):
+        whole = Network(replace(table, loads=tuple(replace(load, model=model) for load in table.loads)))
+        less = whole.with_loads(with_powers(whole.feeder, half))
+        drawn = [
+            network.loads().currents(V) + network.Y_loads @ V  # both parts: one of them is nothing
+            for network in (whole, less)
+        ]
+        np.testing.assert_allclose(drawn[1], 0.5 * drawn[0], atol=1e-9)
