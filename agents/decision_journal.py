@@ -12,6 +12,8 @@ from math import inf
 from agents.agent import Agent
 from wire.journal import Decision, JournalBuffer
 
+_NOT_SATURATED = (0, 0)
+
 
 class DecisionJournal:
     """Note the decisions of one agent.
@@ -31,6 +33,8 @@ class DecisionJournal:
         self._states: list[int | None] = []
         self._others: tuple[object, ...] = ()
         """Its further parts, but for the tick."""
+        self._plain: Sequence[str] | None = None
+        """Its in-neighbours if it says nothing but that: all of the tick before, none weighed; else None."""
         self._weighs = not agent.weighs_alike
 
     @property
@@ -60,6 +64,15 @@ class DecisionJournal:
         """
         agent = self._agent
         heard, used = agent.heard, agent.around
+        if neighbours is self._plain and not measurement and len(used) == len(neighbours):
+            before = tick - 1  # mostly nothing has changed, and a look at the numbers suffices
+            for name in neighbours:
+                state = heard.get(name)
+                if state is None or state.seq != before:
+                    break
+            else:
+                if agent.saturated == _NOT_SATURATED:
+                    return False
         try:
             states: list[int | None] = [tick - heard[name].seq for name in neighbours]
         except KeyError:
@@ -70,6 +83,8 @@ class DecisionJournal:
         if states == self._states and neighbours == self._neighbours and others == self._others:
             return False
         self._neighbours, self._states, self._others = neighbours, states, others
+        plain = states == [1] * len(states) and others == (0, [], [], _NOT_SATURATED) and not self._weighs
+        self._plain = neighbours if plain else None
         if weights:
             weights = self._all_weights(neighbours)
         self.journal.add(Decision(tick, measurement, list(neighbours), states, unused, weights, agent.saturated))

@@ -66,7 +66,6 @@ class DirectPlant(LockstepPlant):
     def _report_journal(self, *, last: bool = False) -> None:
         if self.journal is None or self._tick_traffic is None:
             return
-        self._tick_traffic.settle()
         if len(self.journal) < LOT and not last:  # some milliseconds of this run: no kill can take more
             return
         for journal in self._take_journal(self.config.epoch, self.t):

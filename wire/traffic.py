@@ -57,8 +57,6 @@ class TickTraffic:
         """The list of a tick to which messages on a key belong."""
         self._measurements: list[Any] = []
         self._states: list[Any] = []
-        self._direct: list[tuple[int, Sequence[Measurement], Sequence[State]]] = []
-        """Ticks of a plant that shares a process with its agents, yet to be encoded."""
         for name in names:
             self._of_tick[keys.measurement(name)] = self._measurements
             self._of_tick[keys.state(name)] = self._states
@@ -92,18 +90,15 @@ class TickTraffic:
     def exchanged(self, tick: int, measurements: Sequence[Measurement], states: Sequence[State]) -> None:
         """Note a tick in which plant and agents share a process, and send nothing.
 
-        It is encoded with others by `settle`: ten ticks in one go take half of the time of ten by themselves.
+        It is encoded at once: to keep the messages of ten ticks for one go is dearer than to encode them, as what is
+        made meanwhile finds its memory cold.
         """
-        self._direct.append((tick, measurements, states))
-
-    def settle(self) -> None:
-        """Bring the ticks that were only noted into the journal."""
-        add = self._journal.add
-        for tick, measurements, states in self._direct:
-            for i in range(0, max(len(measurements), len(states)), AT_ONCE):
-                part = slice(i, i + AT_ONCE)
-                add(Exchange(tick, list(map(astuple, measurements[part])), list(map(astuple, states[part]))))
-        self._direct.clear()
+        if len(measurements) <= AT_ONCE:
+            self._journal.add(Exchange(tick, list(map(astuple, measurements)), list(map(astuple, states))))
+            return
+        for i in range(0, len(measurements), AT_ONCE):
+            part = slice(i, i + AT_ONCE)
+            self._journal.add(Exchange(tick, list(map(astuple, measurements[part])), list(map(astuple, states[part]))))
 
     def ticked(self, tick: int) -> None:
         """Note that tick k is complete, or that it ends as it is."""
