@@ -5,6 +5,7 @@ The drivers (`scenarios.drivers`) are given configurations here, and their telem
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import platform
 import traceback
@@ -14,6 +15,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cache
 from importlib import import_module, metadata
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import msgspec
@@ -29,7 +31,7 @@ from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchm
 from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.run_files import no_room, refusal, set_broken, set_status, shown, write_whole
+from scenarios.results.run_files import no_room, refusal, set_broken, set_complete, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugin_keys import claims_of
@@ -112,26 +114,40 @@ def _logged(request: Request, progress: Progress) -> RunReport:
     """Run all cases; what breaks them is in the log, an error of the program with its traceback."""
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
-    with file.open("w", encoding="utf-8") as log:
-        try:
-            return _run(request, progress, log)
-        except (BrokenRunError, OutputLostError) as error:
-            print(f"broken: {error}", file=log)
-            raise
-        except Exception as error:
-            if no_room(error) or not file.exists():  # the folder is gone, and with it this log
+    try:
+        with file.open("w", encoding="utf-8") as log:
+            try:
+                return _run(request, progress, log)
+            except (BrokenRunError, OutputLostError) as error:
+                print(f"broken: {error}", file=log)
                 raise
-            traceback.print_exc(file=log)
-            raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
+            except Exception as error:
+                if no_room(error) or not file.exists():  # the folder is gone, and with it this log
+                    raise
+                traceback.print_exc(file=log)
+                raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
+    except OSError as error:
+        _log_no_room(file, f"broken: {refusal(request.folder, error)}\n")
+        raise
+
+
+def _log_no_room(file: Path, line: str) -> None:
+    """Add a line to a log whose disk is full, if there is room for it; an empty log is not left behind."""
+    with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError), file.open("a", encoding="utf-8") as log:
+            log.write(line)
+        if not file.stat().st_size:
+            file.unlink()
 
 
 def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     scenario, folder, place = request.scenario, request.folder, shown(request.folder)
-    write_whole(folder / "scenario.toml", to_toml(scenario, _as_run(request)))
+    text = to_toml(scenario, _as_run(request))
+    write_whole(folder / "scenario.toml", text)
     recorded, notes = {}, []
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
-        recorded[case], outcome = _run_case(request, case, progress)
+        recorded[case], outcome = _run_case(request, case, text, progress)
         from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
@@ -185,7 +201,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             folder=place + "/" if request.lasting else "",
         )
         write_whole(folder / "report.txt", plain(report))
-    set_status(folder, "complete")
+    ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
+    set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
     return report
 
 
@@ -217,11 +234,11 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     }
 
 
-def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded, Outcome]:
-    """Run one case by the driver asked for, and record it."""
+def _run_case(request: Request, case: str, toml: str, progress: Progress) -> tuple[Recorded, Outcome]:
+    """Run one case by the driver asked for, and record it; `toml` is the scenario as run."""
     time = request.scenario.time
     plant, agents = _configs(request, case)
-    record = _record_info(request, case, plant, agents)
+    record = _record_info(request, case, toml, plant, agents)
     self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
     ahead = request.lasting and request.clock == "simulated"  # in real time nothing else may take a core
     with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
@@ -266,14 +283,16 @@ def _run_case(request: Request, case: str, progress: Progress) -> tuple[Recorded
             raise BrokenRunError(f"case {case}: {error}") from error
 
 
-def _record_info(request: Request, case: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> RecordInfo:
+def _record_info(
+    request: Request, case: str, toml: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]
+) -> RecordInfo:
     """Return what the record of a case says about its run."""
     scenario, real = request.scenario, request.clock == "wall"
     return RecordInfo(
         level=plant.record,
         scenario=scenario.name,
         case=case,
-        toml=to_toml(scenario, _as_run(request)),
+        toml=toml,
         seed=scenario.seed,
         driver=request.driver,
         versions=versions(),

@@ -12,7 +12,7 @@ from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from plant.tables import read_feeder
 from scenarios.results.file_sizes import file_sizes, require_room
-from scenarios.results.run_files import FolderError
+from scenarios.results.run_files import FolderError, is_complete
 from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
 from scenarios.schema import ScenarioError
@@ -106,7 +106,7 @@ def read(folder: str | Path) -> Result | Results:
         hint = f"; {path / 'latest'} is one" if (path / "latest" / "status.txt").is_file() else ""
         raise FolderError(f"{folder}: this is no folder of a run, which has a file status.txt{hint}")
     status = (path / "status.txt").read_text(encoding="utf-8", errors="replace").strip()
-    if status != "complete":
+    if not is_complete(status):
         raise FolderError(f'{folder}: the run has no results: its status is "{status}"')
     try:
         text, tables = read_toml(path / "scenario.toml")

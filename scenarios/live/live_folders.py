@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.record.record_info import RecordInfo
-from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_status, write_whole
+from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
 from scenarios.run import versions
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
@@ -35,10 +35,10 @@ class Folders:
     whole: Path | None = None
     """The run folder; None if there is none."""
 
-    def complete(self) -> None:
-        """Write to status.txt that the folder is complete."""
+    def complete(self, *missing: str) -> None:
+        """Write to status.txt that the folder is complete, and sentences on what is missing beside."""
         if self.whole is not None:
-            set_status(self.whole, "complete")
+            set_complete(self.whole, filter(None, missing))
 
     def broken(self, why: str) -> None:
         """Write to status.txt why the folder is not complete."""

@@ -235,7 +235,8 @@ class DecisionReader:
                     message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
                 else:
                     continue
-                if since - 1e-9 <= message.t <= until + 1e-9:
+                t = journal.t if message.rejected or message.t < 0.0 else message.t  # a rejected one may say any time
+                if since - 1e-9 <= t <= until + 1e-9:
                     yield message
 
 

@@ -8,13 +8,17 @@ from pathlib import Path
 from scenarios.record.record_channels import TOPICS, channels
 from scenarios.record.record_info import FILE, RecordInfo
 from scenarios.record.record_writer import RecordWriter
-from scenarios.record.viewer_messages import PhysicsTemplate, event_json, nanoseconds
+from scenarios.record.viewer_messages import NANO, PhysicsTemplate, event_json, nanoseconds
 from wire.codec import payload_of
 from wire.messages import Journal, LinkReport, LinkRequest, Telemetry
 
 VIEW_STEP, LIVE_VIEW_STEP = 0.2, 0.05
 """Least distance (s) of the rows that viewers get in simulated time, where each takes as long as a decision, and in
 wall-clock time, where they take a quarter of the file at 0.01 s. All rows are in the telemetry."""
+
+BESIDE, AHEAD = 2_000_000, 60.0
+"""Room (bytes) that a full disk keeps for events, log, report and figures; and time (s) for whose rows it keeps some,
+of a run without an end."""
 
 
 class Recording:
@@ -42,8 +46,11 @@ class Recording:
         self._step = nanoseconds(LIVE_VIEW_STEP if info.clock == "wall" else VIEW_STEP)
         self._t = 0.0
         """Time (s) of the last telemetry."""
-        self._shown: int | None = None
-        """Time (ns) of the last row for viewers."""
+        self._next = 0.0
+        """Time (s) from which on a row is the next for viewers."""
+        self._end = info.plant.end
+        self._history = 0
+        """Bytes of history.csv so far."""
 
     @property
     def failure(self) -> str:
@@ -56,14 +63,19 @@ class Recording:
     def telemetry(self, message: Telemetry, lines: Sequence[bytes]) -> None:
         """Record rows and events; `lines` are the rows' lines in history.csv."""
         writer, self._t = self._writer, message.t
+        self._history += sum(map(len, lines))
+        if message.t > 0.0:
+            ahead = AHEAD if self._end is None else self._end - message.t
+            writer.spare = BESIDE + self._history * ahead / message.t
         if self._template is None:
             self._template = PhysicsTemplate(message.inverters, self._quantities)
         writer.add("telemetry", nanoseconds(message.t), message.seq, payload_of(message))
         for row, line in zip(message.rows, lines, strict=True):
+            if row[0] < self._next:
+                continue
             at = nanoseconds(row[0])
-            if self._shown is None or at - self._shown >= self._step:
-                self._shown = at
-                writer.add("physics", at, 0, self._template.of(line, row))
+            self._next = (at + self._step) / NANO - 0.5 / NANO
+            writer.add("physics", at, 0, self._template.of(line, row))
         for event in message.events:
             writer.add("events", nanoseconds(event.t), 0, event_json(event))
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from scenarios.drivers.forking import ForkedProcess, ForkServerError
 from scenarios.drivers.warm_servers import figure_server
+from wire.driver.cores import usable_cores
 
 if TYPE_CHECKING:
     from scenarios.results.plots.drawing import Drawing
@@ -81,5 +82,4 @@ def _end(started: Sequence[ForkedProcess]) -> None:
 
 def _cores() -> int:
     """Return the number of cores for drawing."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return min(cores, MOST)
+    return min(usable_cores(), MOST)

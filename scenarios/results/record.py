@@ -11,6 +11,7 @@ import contextlib
 import csv
 import hashlib
 from collections.abc import Iterator, Sequence
+from io import StringIO
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, BinaryIO
@@ -19,6 +20,7 @@ import msgspec
 
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_record import LinkRecord
+from scenarios.results.run_files import write_whole
 from wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 if TYPE_CHECKING:
@@ -63,6 +65,8 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     """Of the bytes of history.csv."""
     reproducible: bool
     """Whether the same scenario and seed give the same bytes again."""
+    record_failure: str = ""
+    """Sentence on why run.mcap ends early, or is not there; empty if it is whole, or was not asked for."""
 
 
 class RecordError(RuntimeError):
@@ -272,6 +276,7 @@ class Recorder:
             link_lines=tuple(link_lines),
             sha256=self._hash.hexdigest(),
             reproducible=self.reproducible,
+            record_failure=self.record_failure,
         )
 
     def close(self) -> None:
@@ -303,9 +308,8 @@ class Recorder:
             self._file.write(bytes_)
 
     def _write_events(self, folder: Path) -> None:
-        partial = folder / "events.partial.csv"
-        with partial.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(("t_s", "kind", "subject", "text"))
-            writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self.events)
-        partial.rename(folder / "events.csv")
+        text = StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(("t_s", "kind", "subject", "text"))
+        writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self.events)
+        write_whole(folder / "events.csv", text.getvalue())

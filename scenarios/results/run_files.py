@@ -70,8 +70,24 @@ def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
 
 
 def set_status(folder: Path, status: str) -> None:
-    """Write the one line of status.txt: "running", "complete", or "broken: why"."""
+    """Write the one line of status.txt: "running", "complete", "complete: what is missing", or "broken: why"."""
     write_whole(folder / "status.txt", status.replace("\n", " ") + "\n")
+
+
+def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
+    """Write to status.txt that a run came to its end and has its results, and sentences on what is missing beside."""
+    set_status(folder, ": ".join(filter(None, ("complete", "; ".join(missing)))))
+
+
+def is_complete(status: str) -> bool:
+    """Return whether the run of a status came to its end and has its results.
+
+    Examples
+    --------
+    >>> is_complete("complete"), is_complete("complete: the record ends at 3 s"), is_complete("running")
+    (True, True, False)
+    """
+    return status.partition(":")[0] == "complete"
 
 
 def set_broken(folder: Path, why: str) -> None:

@@ -1,4 +1,8 @@
-"""Kill commands at random moments and see what their records lack: ``python -m tests.record.killed_commands 20``."""
+"""Kill commands at random moments, see what their records lack, and read them by every command that reads a record.
+
+python -m tests.record.killed_commands 20               so many runs of each clock
+python -m tests.record.killed_commands 5 plant inv1     kills the plant, and an agent, instead of the command
+"""
 
 from __future__ import annotations
 
@@ -15,6 +19,7 @@ from typing import Literal, NamedTuple
 from scenarios.record.recomputation import recomputed
 from scenarios.record.record_reader import RunRecord
 from scenarios.results.record import PARTIAL
+from tests.record.reader_commands import assert_commands_read
 
 LONG = """
 [time]
@@ -26,10 +31,21 @@ open = ["13-152"]
 [case.IV]
 secondary = "all"
 graph = "full"
+"""
+
+LOSSY = """
 [[link]]
 on = "inv1 -> *"
 loss = 0.1
 """
+
+Clock = Literal["simulated", "one process", "wall"]
+
+CLOCKS: tuple[Clock, ...] = ("simulated", "one process", "wall")
+"""Kinds of runs: in simulated time with processes and without, and in wall-clock time."""
+
+LATEST: dict[Clock, float] = {"simulated": 2.0, "one process": 0.6, "wall": 4.0}
+"""Latest time (s) of a kill after the first row: some 30 s of run time, more of which would take minutes to be read."""
 
 
 class Left(NamedTuple):
@@ -42,15 +58,16 @@ class Left(NamedTuple):
     """Wall time (s) by which the record ends before the history, at the pace of the run."""
 
 
-def killed(folder: Path, clock: Literal["simulated", "wall"], after: float, who: str = "command") -> Left:
+def killed(folder: Path, clock: Clock, after: float, who: str = "command") -> Left:
     """Run a case until its first row is there, kill a process some time (s) later, and open what is left."""
     folder.mkdir(parents=True)
-    (folder / "long.toml").write_text(LONG, encoding="utf-8")
-    words = [sys.executable, "-m", "gridpeers", "run", "long.toml", "--clock", clock, "--out", "out"]
+    (folder / "long.toml").write_text(LONG + ("" if clock == "one process" else LOSSY), encoding="utf-8")
+    pace = ("--driver", "inprocess") if clock == "one process" else ("--clock", clock)
+    words = [sys.executable, "-m", "gridpeers", "run", "long.toml", *pace, "--out", "out"]
     command = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     history = folder / "out" / "IV" / PARTIAL
     try:
-        began = _wait_for_rows(command, history)
+        began = wait_for_rows(command, history)
         sleep(after)
         process = command.pid if who == "command" else _process(command.pid, who)
         first, t = began
@@ -59,17 +76,17 @@ def killed(folder: Path, clock: Literal["simulated", "wall"], after: float, who:
         if who == "plant":  # the run breaks, and the command closes its files
             command.wait(60.0)
         elif who != "command":
-            _wait_for_rows(command, history, more=20_000)
+            wait_for_rows(command, history, more=20_000)
     finally:
         command.kill()
         command.wait()
     last = _last_time(history)
     record = RunRecord.open(folder / "out" / "IV")
-    pace = 1.0 if clock == "wall" else max((last - t) / (killed_at - first), 1e-9)
-    return Left(record, last, max(0.0, last - record.t_end) / pace)
+    speed = 1.0 if clock == "wall" else max((last - t) / (killed_at - first), 1e-9)
+    return Left(record, last, max(0.0, last - record.t_end) / speed)
 
 
-def _wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5000) -> tuple[float, float]:
+def wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5000) -> tuple[float, float]:
     """Wait for the first rows, or some bytes more of them; return when they came, and their run time."""
     deadline = monotonic() + 120.0
     more += history.stat().st_size if history.exists() else 0
@@ -106,16 +123,25 @@ def assert_usable(left: Left, *, complete: bool = False) -> None:
 
 
 def main() -> None:
-    """Kill as many commands of each clock as asked for."""
+    """Kill as many runs of each clock as asked for, and tell the most that was lost."""
     draws = random.Random(15)
+    whom = sys.argv[2:] or ["command"]
+    lost: dict[Clock, list[float]] = {clock: [] for clock in CLOCKS}
     for number in range(int(sys.argv[1])):
-        for clock in ("simulated", "wall"):
-            after = draws.uniform(0.0, 4.0)
+        for clock in CLOCKS:
+            after, who = draws.uniform(0.0, LATEST[clock]), whom[number % len(whom)]
+            if clock == "one process" and who != "command":
+                continue
             with tempfile.TemporaryDirectory() as folder:
-                left = killed(Path(folder) / "run", "wall" if clock == "wall" else "simulated", after)
-                assert_usable(left)
-                reach = f"history to {left.history:.2f} s, record to {left.record.t_end:.2f} s"
-                print(f"{number} {clock}: killed after {after:.2f} s; {reach}: {left.lost:.2f} s lost", flush=True)
+                left = killed(Path(folder) / "run", clock, after, who)
+                assert_usable(left, complete=who == "plant")
+                assert_commands_read(left.record)
+                ends = f"history to {left.history:.2f} s, record to {left.record.t_end:.2f} s: {left.lost:.2f} s lost"
+                print(f"{number} {clock}: {who} killed after {after:.2f} s; {ends}", flush=True)
+                lost[clock].append(left.lost)
+    for clock, of in ((clock, of) for clock, of in lost.items() if of):
+        load = os.getloadavg()[0]
+        print(f"{clock}: {len(of)} records opened and were read; at most {max(of):.2f} s lost; load {load:.1f}")
 
 
 if __name__ == "__main__":

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections import deque
 from collections.abc import Callable, Sequence
 from threading import Thread
 from typing import TypeVar
+
+from wire.driver.cores import usable_cores
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -35,7 +36,7 @@ def each_on_a_core(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
             except BaseException as error:
                 errors[k] = error
 
-    threads = [Thread(target=take, daemon=True) for _ in range(min(_cores(), MOST_THREADS, len(items)) - 1)]
+    threads = [Thread(target=take, daemon=True) for _ in range(min(usable_cores(), MOST_THREADS, len(items)) - 1)]
     for thread in threads:
         thread.start()
     take()
@@ -44,8 +45,3 @@ def each_on_a_core(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
     if errors:
         raise errors[min(errors)]
     return [results[k] for k in range(len(items))]
-
-
-def _cores() -> int:
-    """Return the number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -105,6 +105,8 @@ def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) 
         yield f"without rows where they are measured, so without numbers: {_named(windows.unrecorded)}"
     if windows.too_short:
         yield f"too short to be measured: {_named(windows.too_short)}"
+    if recorded.record_failure:
+        yield f"{recorded.record_failure}; the run went on without it"
     yield from late_moves(scenario, recorded.events)
     if departures.note:
         yield departures.note
@@ -129,7 +131,7 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> 
         return outcome
     try:
         show(write_report(metrics, outcome.recorded, outcome.pacing), Console())
-        folders.complete()
+        folders.complete(outcome.recorded.record_failure)
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")
         return replace(outcome, interrupted=str(stop) or "SIGINT")

@@ -4,22 +4,45 @@ from __future__ import annotations
 
 import re
 import subprocess
+import sys
 from pathlib import Path
-from typing import Literal
 
 import pytest
 
 from scenarios.record.record_reader import RunRecord
 from tests.processes.commands.test_run_command import command
 from tests.processes.terminals import LIMITED
-from tests.record.killed_commands import assert_usable, killed
+from tests.record.full_disk import has_namespaces, kinds
+from tests.record.killed_commands import CLOCKS, Clock, assert_usable, killed
+from tests.record.reader_commands import assert_commands_read
 
 
 @pytest.mark.parametrize("clock", ["simulated", "wall"])
-@pytest.mark.parametrize("who", ["command", "plant", "inv1"])
-def test_a_killed_process_leaves_a_record(who: str, clock: Literal["simulated", "wall"], tmp_path: Path) -> None:
-    """Decisions are made again from all that is there, whether the writer or what it records was killed."""
+@pytest.mark.parametrize("who", ["plant", "inv1"])
+def test_a_killed_process_leaves_a_record(who: str, clock: Clock, tmp_path: Path) -> None:
+    """Decisions are made again from all that is there, if what it records was killed."""
     assert_usable(killed(tmp_path / "run", clock, 1.3, who), complete=who == "plant")
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_a_killed_command_leaves_a_record(clock: Clock, tmp_path: Path) -> None:
+    """It opens, lacks at most the last second, and every command that reads a record works on it."""
+    left = killed(tmp_path / "run", clock, 0.6)
+
+    assert_usable(left)
+    assert_commands_read(left.record)
+
+
+@pytest.mark.skipif(not has_namespaces(), reason="no file system can be mounted in a namespace of its own here")
+def test_on_a_full_disk_a_record_ends_and_is_read() -> None:
+    """On a small disk that is filled under way: the run says so once, ends as it can, and leaves no empty file."""
+    done = subprocess.run([sys.executable, "-m", "tests.record.full_disk"], capture_output=True, text=True, timeout=200)
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stdout.count("and is read") == len(kinds())
+
+
+ENDED = r"the record run\.mcap ends at \d\.\d\d s: File too large"
 
 
 def test_a_record_without_room_ends_and_the_run_goes_on(tmp_path: Path) -> None:
@@ -37,8 +60,8 @@ def test_a_record_without_room_ends_and_the_run_goes_on(tmp_path: Path) -> None:
 
     here = tmp_path / "here"
     assert done.returncode == 0, done.stderr
-    assert (here / "status.txt").read_text() == "complete\n"
-    told = r"the record run\.mcap ends at \d\.\d\d s: File too large; the run went on without it"
+    assert re.fullmatch(rf"complete: case calm: {ENDED}\n", (here / "status.txt").read_text())
+    told = f"{ENDED}; the run went on without it"
     assert re.search(told, (here / "report.txt").read_text())
     assert re.search(told, (here / "log" / "run.log").read_text())
     record = RunRecord.open(here / "calm")

@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from math import nan
+from pathlib import Path
+
+import msgspec
 import pytest
 from msgspec.structs import replace
 
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
+from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.explanation.explanation import explained
 from scenarios.explanation.law_step import law_step
 from scenarios.record.record_reader import RunRecord
 from scenarios.trace.flows import flows
+from tests.hostile.cases import sealed
 from tests.processes.realtime.test_live_record import recorded
 from tests.toy.toy_configs import toy_configs
+from wire.bounds import LIMIT
+from wire.codec import decode, encode
+from wire.driver.session import Session
+from wire.keys import Keys
+from wire.messages import Ready, State, Telemetry
 
 
 @pytest.fixture(scope="module")
@@ -56,3 +68,74 @@ def test_messages_take_their_time(record: RunRecord) -> None:
     assert {(flow.src, flow.dst, flow.fate) for flow in lost} == {("inv1", "inv2", "loss")}
     assert len(lost) == record.link_counts()["inv1", "inv2"].dropped["loss"] > 20
     assert {flow.dst for flow in found} == {"plant", *record.agents}
+
+
+def hostile(epoch: int) -> dict[str, bytes]:
+    """Return what a foreigner publishes as states of inv1, whose epoch it has heard, by the kind of its rejection."""
+    state = State(sender="inv1", epoch=epoch, seq=10**6, t=1.0, P_set=0.0, V_set=277.0, Q=0.0)
+    return {
+        "oversized": bytes(LIMIT + 1),
+        "corrupt": b"\xff" * 100,
+        "garbled": sealed(b"\xc1"),
+        "unknown": sealed(msgspec.msgpack.encode({"type": "Rumour", "sender": "inv1"})),
+        "not finite": encode(replace(state, P_set=nan)),
+        "implausible": encode(replace(state, P_set=1e30)),
+        "foreign": encode(replace(state, sender="inv3")),
+        "ghost": encode(replace(state, epoch=epoch - 1)),
+        "unexpected": encode(Ready(sender="inv1", epoch=epoch, seq=10**6, t=1.0)),
+        "stale": encode(replace(state, seq=0, t=0.0)),
+    }
+
+
+class Foreigner:
+    """Somebody who knows the endpoint, and publishes under the name of inv1; a callback for telemetry."""
+
+    def __init__(self, endpoint: str) -> None:
+        self._endpoint, self._session, self._key = endpoint, ExitStack(), Keys("toy").state("inv1")
+        self._published: Session | None = None
+        self._epoch = 1
+
+    def __enter__(self) -> Foreigner:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._session.close()
+
+    def __call__(self, telemetry: Telemetry) -> None:
+        """Publish everything once the losses have begun, again and again: the links of a session take their time."""
+        if self._published is None:
+            self._published = Session("foreigner", listen=("tcp/127.0.0.1:0",), connect=(self._endpoint,), clock="wall")
+            self._session.callback(self._published.close)
+            self._published.subscribe(self._key)
+        elif telemetry.t >= 0.6 and not telemetry.final:
+            for _, _, payload, _ in self._published.take(1, 0.0):
+                self._epoch = decode(payload).epoch
+            for payload in hostile(self._epoch).values():
+                self._published.publish(self._key, payload)
+
+
+def test_each_kind_of_rejected_message_is_told(tmp_path: Path) -> None:
+    """Under a neighbour's name come messages of every kind, while its own are lost: all are counted, none is used."""
+    endpoint = free_endpoint()
+    netem = Netem(seed=7, links=(Fault(on="inv1 -> inv2", loss=1.0, from_s=0.4),))
+    links = EmulationConfig(netem=netem, microgrids={f"inv{k}": "mg1" for k in (1, 2, 3)}).to_tree()
+    plant, agents = toy_configs(3, end=2.4)
+    wall = {"clock": "wall", "links": links, "record": "all"}
+    with Foreigner(endpoint) as foreigner:
+        found = recorded(
+            tmp_path,
+            replace(plant, listen=(endpoint,), **wall),
+            [replace(agent, **wall) for agent in agents],
+            foreigner,
+        )
+
+    rejected = {each.rejected for each in found.heard("inv2", since=0.0) if each.rejected}
+    assert rejected == set(hostile(1))
+    decision = next(each for each in found.decisions("inv2", since=2.2) if each.action == "law")
+    explanation = explained(found, decision, decision.t)
+    (told,) = [each.why for each in explanation.neighbours if each.name == "inv1"]
+    assert "lost on the link" in told
+    for kind in hostile(1):
+        assert (f'rejected as "{kind}"' in told) == (kind != "stale"), kind  # no state since, but one from before
+    assert all(step.problem == "" for each in found.decisions("inv2") if (step := law_step(found, each)) is not None)
+    assert {each.name for each in explanation.decision.neighbours_used} == {"inv3"}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -23,10 +24,13 @@ from scenarios.results.record import Recorder
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import TOY
 from wire.journal import Process, Token, Woken
+from wire.messages import Telemetry
 
 
-def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> RunRecord:
-    """Run the toy in wall-clock time, and return its record."""
+def recorded(
+    folder: Path, plant: PlantConfig, agents: list[AgentConfig], watch: Callable[[Telemetry], None] | None = None
+) -> RunRecord:
+    """Run the toy in wall-clock time, and return its record; `watch` sees the telemetry as it comes."""
     info = RecordInfo(
         level=plant.record,
         scenario="toy",
@@ -40,8 +44,14 @@ def recorded(folder: Path, plant: PlantConfig, agents: list[AgentConfig]) -> Run
         agents=tuple(agents),
     )
     with Recorder(folder / "wall", gaps=True, record=info) as recorder:
+
+        def note(telemetry: Telemetry) -> None:
+            if watch is not None:
+                watch(telemetry)
+            recorder(telemetry)
+
         outcome = run_processes(
-            plant, agents, folder / "log", recorder, on_links=recorder, on_journal=recorder, plant_command=TOY
+            plant, agents, folder / "log", note, on_links=recorder, on_journal=recorder, plant_command=TOY
         )
         assert outcome.broke == ""
         recorder.finish(recorder.ended, recorder.record_step)

@@ -89,7 +89,7 @@ def test_the_number_of_cores_does_not_move_a_byte(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(island_parts, "PART", 6)
     found = []
     for cores in (1, 3):
-        monkeypatch.setattr(on_all_cores, "_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(on_all_cores, "usable_cores", lambda cores=cores: cores)
         found.append(readings(islands()).tobytes())
 
     assert found[0] == found[1]
@@ -109,7 +109,7 @@ def test_an_island_without_solution_ends_as_it_does_among_all_at_once(monkeypatc
 
 def test_an_error_on_another_core_is_raised_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work that fails on any thread fails for the caller, with the first item's error."""
-    monkeypatch.setattr(on_all_cores, "_cores", lambda: 3)
+    monkeypatch.setattr(on_all_cores, "usable_cores", lambda: 3)
 
     with pytest.raises(ZeroDivisionError):
         on_all_cores.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])

@@ -19,14 +19,19 @@ from scenarios.record.record_writer import RecordWriter
 from tests.toy.toy_configs import toy_configs
 
 
-def writer(folder: Path) -> RecordWriter:
-    """Return the writer of a record in a folder."""
-    plant, agents = toy_configs(2)
-    info = RecordInfo(
+def info_of(n: int) -> RecordInfo:
+    """Return what a record says about a run of the toy plant."""
+    plant, agents = toy_configs(n)
+    return RecordInfo(
         level="all", scenario="toy", case="I", toml="", seed=1, driver="processes", versions={}, inverters=plant.agents,
         plant=plant, agents=agents,
     )  # fmt: skip
-    return RecordWriter(folder / "run.mcap", info, channels(plant.agents, ("f_Hz",)))
+
+
+def writer(folder: Path) -> RecordWriter:
+    """Return the writer of a record in a folder."""
+    info = info_of(2)
+    return RecordWriter(folder / "run.mcap", info, channels(info.inverters, ("f_Hz",)))
 
 
 def until(happens: threading.Event) -> None:
@@ -114,3 +119,23 @@ def test_the_index_of_a_long_run_takes_little_memory(tmp_path: Path, monkeypatch
         assert len(summary.chunk_indexes) == 500
         assert len(list(make_reader(file).iter_messages())) == 500
     assert len(one.index.bytes) < 500 * 150
+
+
+def test_a_record_leaves_room_to_the_other_files_of_its_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On a disk that is nearly full it ends before it takes what the history needs; the reason has the room left."""
+    one = writer(tmp_path)
+    one.spare = 3e6
+    one.add("telemetry", 10**9, 0, b"first")
+    one.close()
+    (tmp_path / "two").mkdir()
+    room = os.statvfs(tmp_path)
+    two = writer(tmp_path / "two")
+    two.spare = 3e6
+    nearly_full = os.statvfs_result((room.f_bsize, 4096, room.f_blocks, 500, 500, *room[5:]))
+    monkeypatch.setattr(record_writer.os, "fstatvfs", lambda descriptor: nearly_full)
+    two.add("telemetry", 10**9, 0, b"first")
+    two.close()
+
+    assert one.failure == ""
+    assert two.failure == "its disk has 2.0 MB left, which the run's other files need"
+    assert list(RecordFile(tmp_path / "two" / "run.mcap").messages()) == []

@@ -1,0 +1,125 @@
+"""The measures of a run from its record alone: as its report has them; of a run that was killed, up to its end."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import msgspec
+
+from plant.equipment import Feeder
+from plant.tables import FeederError, read_feeder
+from scenarios.live.numbers.departures import compare
+from scenarios.record.record_file import RecordFileError
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.event_windows import CaseRecord, Window, as_they_came, messages_saved, windows
+from scenarios.results.findings import find
+from scenarios.results.history import History
+from scenarios.results.island_membership import taken_part
+from scenarios.results.report import RunReport
+from scenarios.results.steadiness import STEADY
+from scenarios.schema import ScenarioError, ScenarioModel
+from scenarios.schema.configs import as_in
+from scenarios.schema.loading import read_tables
+from scenarios.schema.participants import with_agent
+from scenarios.schema.scenario_errors import Problems
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Measured:
+    """What of a record is measured."""
+
+    scenario: ScenarioModel
+    """As it happened."""
+    history: History
+    windows: tuple[Window, ...]
+    notes: tuple[str, ...]
+
+
+def report_of(record: RunRecord) -> RunReport:
+    """Return the report on a record: its measures in the windows of the events up to its end; no claim is judged.
+
+    The scenario's own metrics are left out: their code may be elsewhere by now.
+
+    Raises
+    ------
+    RecordFileError
+        If it has no scenario, no rows, or its feeder is not there any more.
+    """
+    scenario, feeder = _scenario_of(record)
+    case, of = record.info.case, (_live if record.info.clock == "wall" else _simulated)(record, scenario, feeder)
+    quiet = [each for message in record.telemetry() for each in message.quiet]
+    saved = messages_saved(quiet, of.windows, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
+    measured = CaseRecord(history=of.history, windows=of.windows, messages_saved=saved)
+    return RunReport(
+        scenario=scenario.name,
+        titles={case: scenario.cases[case].title},
+        findings=find(of.scenario, feeder, {case: measured}),
+        verdicts=(),
+        notes=[f"case {case}: {note}" for note in (*of.notes, *_about(record))],
+        folder="",
+    )
+
+
+def _scenario_of(record: RunRecord) -> tuple[ScenarioModel, Feeder]:
+    """Return the scenario of a record, with its one case, and its feeder."""
+    info = record.info
+    if not info.toml or not info.case:
+        raise RecordFileError(f"{record.path}: a live run without a scenario: it has no events to be measured after")
+    problems = Problems(str(record.path), info.toml)
+    try:
+        scenario = read_tables(tomllib.loads(info.toml), problems)  # not checked: to measure needs no law
+        problems.raise_if_any()
+        case = scenario.cases[info.case]
+        scenario = msgspec.structs.replace(scenario, cases={info.case: case}, metrics=())
+        return scenario, as_in(scenario, read_feeder(scenario.plant.feeder, scenario.plant.load_set))
+    except (ScenarioError, FeederError, OSError, ValueError, KeyError) as error:
+        text = "; ".join(getattr(error, "problems", ())) or str(error)
+        raise RecordFileError(f"{record.path}: what it says about its scenario cannot be read: {text}") from None
+
+
+def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
+    """Return what is measured of a run in simulated time: windows end where the record does."""
+    history = record.physics()
+    end = min(float(history.t[-1]), scenario.time.end_s)
+    came = windows(as_they_came(scenario, record.events()), scenario.time.end_s)
+    reached = [replace(window, end=min(window.end, end)) for window in came if window.start < end]
+    shortest = max(STEADY, 2.0 * scenario.time.record_s) - 1e-9
+    kept = tuple(window for window in reached if window.end - window.start >= shortest)
+    notes = []
+    if end < scenario.time.end_s - 1e-9:
+        notes.append(f"the record ends at {end:.2f} s of {scenario.time.end_s:g} s; what is measured ends there")
+    if len(kept) < len(came):
+        notes.append(f"not measured: {', '.join(_left_out(came, kept))}")
+    return _Measured(scenario=scenario, history=history, windows=kept, notes=tuple(notes))
+
+
+def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
+    """Return what is measured of a run in wall-clock time: windows whose end it reached, those that people made too."""
+    history, events = record.physics(), record.events()
+    end = float(history.t[-1])
+    departures = compare(scenario, feeder, events, end)
+    of = departures.windows
+    left_out = (*of.not_reached, *of.too_short)
+    notes = [f"the record ends at {end:.2f} s"] if end < scenario.time.end_s - 1e-9 else []
+    notes += [f"not measured: {', '.join(window.label for window in left_out)}"] if left_out else []
+    notes += [departures.note] if departures.note else []
+    return _Measured(
+        scenario=departures.happened,
+        history=taken_part(scenario, feeder, history),
+        windows=of.measured,
+        notes=tuple(notes),
+    )
+
+
+def _left_out(came: Sequence[Window], kept: Sequence[Window]) -> Iterator[str]:
+    labels = {window.label for window in kept}
+    return (window.label for window in came if window.label not in labels)
+
+
+def _about(record: RunRecord) -> Iterator[str]:
+    """Yield notes on the record itself."""
+    if record.outcome:
+        yield f"the run broke: {record.outcome}"
+    yield from record.damage

@@ -1,0 +1,34 @@
+"""The commands that read a record, on one that a killed process, or a full disk, has left behind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from gridpeers.cli.own_commands import OWN_COMMANDS
+from scenarios.record.record_reader import RunRecord
+from tests.command_line import invoke
+
+
+def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
+    """`metrics`, `why`, `trace` in both formats, and `replay` where there is one, do their work, and tell the cut."""
+    file, folder, t = str(record.path), record.path.parent, f"{record.t_end:.3f}"
+    commands = {
+        "metrics": (file,),
+        "why": (file, agent, t, "--follow"),
+        "trace": (file, "--out", str(folder / "trace.pftrace")),
+        "trace --svg": (file, "--svg", str(folder / "trace.svg"), "--from", f"{max(0.0, record.t_end - 0.1):.3f}"),
+        "replay": (file,),
+    }
+    for name, arguments in commands.items():
+        if (command := name.split()[0]) not in OWN_COMMANDS:
+            continue
+        code, printed = invoke(command, *arguments)
+        assert code == 0, f"gridpeers {command} {' '.join(arguments)}: {code}: {printed}"
+        assert "Traceback" not in printed
+        assert record.complete or command == "replay" or "cut off" in printed, f"{name}: {printed}"
+    for made in (folder / "trace.pftrace", folder / "trace.svg"):
+        assert _size(made) > 500
+
+
+def _size(file: Path) -> int:
+    return file.stat().st_size if file.exists() else 0
