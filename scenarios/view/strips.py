@@ -75,9 +75,9 @@ class Strips:
         return found[::-1]
 
 
-def next_due(t: float, inverters: int) -> float:
-    """Return the run time (s) of the next point after one at t (s), of so many inverters."""
-    step = STEP if inverters <= MANY else WIDE_STEP
+def next_due(t: float, inverters: int, length: float = LENGTH) -> float:
+    """Return the run time (s) of the next point after one at t (s): of so many inverters, on strips of a length (s)."""
+    step = (STEP if inverters <= MANY else WIDE_STEP) * length / LENGTH
     return (int(t / step + 1e-6) + 1) * step
 
 

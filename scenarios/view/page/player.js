@@ -26,7 +26,7 @@ export class Player {
     const first = !this.news || this.news.case !== news.case, grown = first || news.t_end > this.news.t_end || news.growth !== this.news.growth;
     this.news = news; this.list(news.events || []);
     const cases = ["", ...news.cases], select = this.$("case");
-    if (select.options.length !== cases.length) { select.replaceChildren(...cases.map(name => new Option(name || "the latest", name, false, name === this.case))); }
+    if (select.options.length !== cases.length) select.replaceChildren(...cases.map(name => new Option(name || `${news.cases.at(-1)}, the latest`, name, false, name === this.case)));
     select.parentElement.hidden = news.cases.length < 2;
     const notes = [...(news.notes || [])], holder = this.$("notes");
     if (holder.textContent !== notes.join("")) holder.replaceChildren(...notes.map(text => { const line = document.createElement("li"); line.textContent = text; return line; }));

@@ -11,7 +11,7 @@ const QUANTITIES = [
 
 export class Strips {
   constructor(holder) {
-    this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null;
+    this.points = []; this.names = []; this.lit = ""; this.ranges = {}; this.end = null; this.length = LENGTH;
     this.charts = QUANTITIES.map((quantity, i) => {
       const figure = document.createElement("figure"), caption = document.createElement("figcaption");
       const canvas = document.createElement("canvas"), now = document.createElement("span");
@@ -23,7 +23,6 @@ export class Strips {
     });
   }
   clear() { this.points = []; this.ranges = {}; }
-  // end: right end of the window (s), if that is not the last point
   add(points) {
     this.points.push(...points);
     const end = this.latest - LENGTH;
@@ -37,14 +36,14 @@ export class Strips {
   draw(silent, events, colours) {
     const style = getComputedStyle(document.body), ink = style.getPropertyValue("--ink"), soft = style.getPropertyValue("--soft");
     const grid = style.getPropertyValue("--grid"), shade = style.getPropertyValue("--shade");
-    const end = this.end ?? Math.max(this.latest + silent, 0), start = end - LENGTH, n = this.names.length;
+    const end = this.end ?? Math.max(this.latest + silent, 0), start = end - this.length, n = this.names.length, second = nice(this.length / 6);
     this.charts.forEach(({ quantity, canvas, now, axis }, q) => {
       const ratio = devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
       if (canvas.width !== Math.round(w * ratio) || canvas.height !== Math.round(h * ratio)) { canvas.width = Math.round(w * ratio); canvas.height = Math.round(h * ratio); }
       const g = canvas.getContext("2d"); g.setTransform(ratio, 0, 0, ratio, 0, 0); g.clearRect(0, 0, w, h);
       const columns = q < 4 ? [...Array(n).keys()].map(i => q * n + i) : [4 * n + q - 4];
       const [low, high] = this.range(quantity, columns);
-      const top = 20, bottom = h - (axis ? AXIS : 4), x = t => LEFT + (w - LEFT - RIGHT) * (t - start) / LENGTH;
+      const top = 20, bottom = h - (axis ? AXIS : 4), x = t => LEFT + (w - LEFT - RIGHT) * (t - start) / this.length;
       const y = v => bottom - (bottom - top) * (v - low) / (high - low);
       g.font = "10.5px system-ui, 'DejaVu Sans', sans-serif"; g.lineWidth = 1; g.textBaseline = "middle"; g.textAlign = "right";
       const step = nice((high - low) / 3);
@@ -54,7 +53,7 @@ export class Strips {
       }
       if (axis) {
         g.textAlign = "center"; g.textBaseline = "alphabetic";
-        for (let t = Math.max(0, Math.ceil(start / 5) * 5); t <= end; t += 5) { g.fillStyle = soft; g.fillText(`${t} s`, Math.min(x(t), w - 14), h - 4); }
+        for (let t = Math.max(0, Math.ceil(start / second) * second); t <= end + 1e-9; t += second) { g.fillStyle = soft; g.fillText(`${Math.round(t * 100) / 100} s`, Math.min(x(t), w - 14), h - 4); }
       }
       g.save(); g.beginPath(); g.rect(LEFT, 0, w - LEFT - RIGHT, bottom + 2); g.clip();
       for (const [t, kind] of events) {

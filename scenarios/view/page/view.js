@@ -53,7 +53,7 @@ function connect() {
 function take(message) {
   if (message.hello) {
     S.hello = message.hello; $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
-    $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; put($("strips-title"), S.hello.record ? "30 s until then" : "Last 30 s");
+    $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; strips.end = null; strips.length = 30; put($("strips-title"), "Last 30 s");
     $("rights").textContent = S.hello.record ? `${S.hello.where}: a record, which only looks` : S.hello.control ? "" : "looks only; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
     diagram.keys.setRoles(kind => S.hello.control || S.hello.record && kind === "agent" ? "button" : "img");
@@ -85,7 +85,7 @@ function takeFrame(frame) {
     line.append(time, text); $("event-list").prepend(line);
   }
   while (!S.hello.record && S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
-  if (S.hello.record) { strips.end = frame.t; player.answered(frame); }
+  if (S.hello.record) { strips.end = frame.t; strips.length = Math.min(30, Math.max(1, player.end)); put($("strips-title"), `${Math.round(strips.length * 10) / 10} s up to then`); player.answered(frame); }
   render();
 }
 

@@ -9,8 +9,11 @@ from typing import NamedTuple
 
 from agents.agent_config import AgentConfig
 from scenarios.record.record_reader import RunRecord
-from scenarios.view.strips import Point, next_due, point_of
+from scenarios.view.strips import LENGTH, Point, next_due, point_of
 from wire.messages import Telemetry
+
+LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)
+"""Lengths of strips (s): a record that is shorter than the last has more points a second."""
 
 KEPT = 400
 """Parts whose points are kept: two strips of a run in real time."""
@@ -34,7 +37,7 @@ class PlantRows:
     """
 
     def __init__(self, record: RunRecord, configs: Mapping[str, AgentConfig]) -> None:
-        self._index, self._configs = record.index, configs
+        self._record, self._index, self._configs = record, record.index, configs
         self._rows_in = lru_cache(maxsize=8)(self._read_rows)
         self._points_in = lru_cache(maxsize=KEPT)(self._read_points)
 
@@ -50,10 +53,11 @@ class PlantRows:
 
     def points(self, since: float, until: float) -> list[Point]:
         """Return the points of the strips after a run time (s) up to another one, the last one exactly there."""
+        length = next((length for length in LENGTHS if self._record.t_end <= length), LENGTHS[-1])
         points = [
             point
             for part in self._index.near(since, until)
-            for point in self._points_in(part)
+            for point in self._points_in(part, length)
             if since + 1e-9 < point[0] <= until + 1e-9
         ]
         points.sort(key=lambda point: point[0])
@@ -72,12 +76,12 @@ class PlantRows:
         rows.sort(key=lambda row: row[0])
         return _Rows(inverters, [row[0] for row in rows], rows)
 
-    def _read_points(self, part: int) -> list[Point]:
+    def _read_points(self, part: int, length: float) -> list[Point]:
         inverters, _, rows = self._rows_in(part)
         points: list[Point] = []
         due = 0.0
         for row in rows:
             if row[0] + 1e-9 >= due:
                 points.append(point_of(inverters, row, self._configs))
-                due = next_due(row[0], len(inverters))
+                due = next_due(row[0], len(inverters), length)
         return points
