@@ -183,6 +183,29 @@ class Agent:
         if self._detector is not None:
             self._detector.forget(name)
 
+    def taken_over(self, config: AgentConfig, law: Law | None = None) -> Agent:
+        """Return an agent under another rule of control that goes on from here, for a replay that asks what would be.
+
+        It knows the same nameplates and states, and its law begins anew from the same set-points.
+        """
+        agent = Agent(config, law)
+        agent._go_on(self._known, self.heard, self.set_points, self._islands, self._sent_at)
+        return agent
+
+    def _go_on(
+        self,
+        known: Mapping[str, Nameplate],
+        heard: Mapping[str, State],
+        set_points: tuple[float, float] | None,
+        islands: tuple[str, str],
+        sent_at: float,
+    ) -> None:
+        """Go on from what another agent of this inverter knew."""
+        self._known = {**known, self.config.name: self.nameplate}
+        self.heard.update(heard)
+        self._P_set, self._V_set = set_points or (None, None)
+        self._islands, self._sent_at = islands, sent_at
+
     @property
     def set_points(self) -> tuple[float, float] | None:
         """Own set-points (W, V); None before the first tick and after a pause, when those of the measurement count."""

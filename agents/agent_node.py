@@ -81,6 +81,10 @@ class AgentNode(PlantFollower):
         """Whether the driver should close."""
         return bool(self.stopped or self.failed)
 
+    def use_links(self, links: Links) -> None:
+        """Use other emulated links from now on."""
+        self._links = links
+
     def note_siblings(self, names: frozenset[str]) -> None:
         """Note the agents of the same process, whose messages do not come from outside."""
 

@@ -152,7 +152,7 @@ def _take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: S
     except (StoppedError, KeyboardInterrupt) as stop:
         leaving = [node for node in nodes if isinstance(node, RealtimeAgent)]
         for node in leaving:
-            node.leave(f"asked to leave: {stop}")
+            node.asked_to_leave(f"asked to leave: {stop}")
         if leaving:
             serve(core, session, log)  # until the plant has acknowledged
         raise

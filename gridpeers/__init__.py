@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gridpeers.scenario import Scenario, load
     from gridpeers.studies.comparison import Comparison, compare
     from gridpeers.studies.prediction import Prediction, predict
+    from gridpeers.studies.replaying import Counterfactual, counterfactual, replay
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
     from scenarios.results.evaluation.benchmark_registry import CLAIMS
@@ -50,6 +51,7 @@ _HOME = {
     "BrokenRunError": "scenarios.run",
     "Claim": "scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
+    "Counterfactual": "gridpeers.studies.replaying",
     "Feeder": "gridpeers.feeder",
     "FolderError": "scenarios.results.run_files",
     "Law": "agents.laws.law",
@@ -71,6 +73,7 @@ _HOME = {
     "catalogue": "scenarios.schema.loading",
     "claim": "scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
+    "counterfactual": "gridpeers.studies.replaying",
     "graph": "agents.graphs:GRAPHS.register",
     "law": "agents.carriers.law_registry:LAWS.register",
     "link_fault": "netem.models.own_fault:FAULTS.register",
@@ -78,6 +81,7 @@ _HOME = {
     "metric": "scenarios.results.evaluation.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
     "read": "gridpeers.runs.running",
+    "replay": "gridpeers.studies.replaying",
     "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
@@ -86,6 +90,7 @@ __all__ = [
     "BrokenRunError",
     "Claim",
     "Comparison",
+    "Counterfactual",
     "Feeder",
     "FolderError",
     "Law",
@@ -107,6 +112,7 @@ __all__ = [
     "catalogue",
     "claim",
     "compare",
+    "counterfactual",
     "graph",
     "law",
     "link_fault",
@@ -114,6 +120,7 @@ __all__ = [
     "metric",
     "predict",
     "read",
+    "replay",
     "sweep",
 ]
 

@@ -78,6 +78,10 @@ class PlantNode(Node):
         """Key of the plant's liveliness token."""
         return self.keys.alive_plant(self.config.epoch)
 
+    def use_links(self, links: Links) -> None:
+        """Use other emulated links from now on."""
+        self._links = links
+
     @property
     def t(self) -> float:
         """Present run time of the plant (s)."""

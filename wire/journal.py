@@ -110,12 +110,13 @@ class Woken(Entry, frozen=True, array_like=True, tag="woken"):
 
 
 class Process(Entry, frozen=True, array_like=True, tag="process"):
-    """An event of the process: its start, a hold, a new session, the end."""
+    """An event of the process: its start, a new session, a request from outside to leave, a line of its log."""
 
     at: float | None
     """Time on the own clock (s, monotonic); None in simulated time."""
     kind: str
-    """"start", "line" (of its log), "session", "lost" (entries, as the journal was full) or "end"."""
+    """"start" and "session" (a new one), each with the instance of the process last in its text; "leave" (asked for
+    from outside); "line" (of its log); "lost" (entries, as the journal was full)."""
     text: str
     """One sentence."""
 

@@ -217,6 +217,19 @@ class RealtimeAgent(AgentNode):
         else:
             self.stopped = reason
 
+    def asked_to_leave(self, reason: str) -> None:
+        """Leave, as somebody outside of the run asks for it, and note that: a replay must do the same."""
+        if self._timed is not None and not (self.finished or self._leaving):
+            self._timed.process("leave", reason, self._timed.now)
+        self.leave(reason)
+
+    def change(self, config: AgentConfig, law: Law | None = None) -> None:
+        """Go on under another rule of control, with the set-points of now; see `Agent.taken_over`."""
+        self._config, self._agent = config, self._agent.taken_over(config, law)
+        if self.journal is not None:
+            self._decisions = DecisionJournal(self._agent, self.journal)
+        self._listen()
+
     # ---------------------------------------------------------------- liveliness
 
     def _plant_came(self, now: float) -> None:

@@ -143,17 +143,20 @@ class MessageIndex:
         for index in self.near(since, until):
             yield from (entry for journal, entry in self.part(index).entries if journal.sender == node)
 
-    def state(self, sender: str, number: int, t: float) -> State | None:
-        """Return a state of about run time t (s); None if the record does not have it."""
-        return _nearest(
-            (each for i in self.near(t - 1.0, t) for each in self.part(i).states.get((sender, number), ())), t
-        )
+    def state(self, sender: str, number: int, t: float, epoch: int | None = None, reach: float = 0.0) -> State | None:
+        """Return a state of about run time t (s), give or take `reach` (s); None if the record does not have it.
 
-    def measurement(self, to: str, number: int, t: float) -> Measurement | None:
-        """Return a measurement of about run time t (s); None if the record does not have it."""
-        return _nearest(
-            (each for i in self.near(t - 1.0, t) for each in self.part(i).measurements.get((to, number), ())), t
-        )
+        Of several that restarted processes numbered alike, it is the one of this epoch, or the nearest in time.
+        """
+        parts = (self.part(i).states for i in self.near(t - 1.0 - reach, t + reach))
+        return _nearest((each for part in parts for each in part.get((sender, number), ())), t, epoch)
+
+    def measurement(
+        self, to: str, number: int, t: float, epoch: int | None = None, reach: float = 0.0
+    ) -> Measurement | None:
+        """Return a measurement of about run time t (s), as `state` does."""
+        parts = (self.part(i).measurements for i in self.near(t - 1.0 - reach, t + reach))
+        return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
 
     def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:
         """Yield messages as they were sent; see `RunRecord.messages`."""
@@ -217,9 +220,10 @@ class MessageIndex:
             self.note_damage("a message in a journal cannot be read")
 
 
-def _nearest(found: Iterable[M], t: float) -> M | None:
-    """Return the message that is nearest in time: numbers begin anew with a process."""
-    return min(found, key=lambda message: abs(message.t - t), default=None)
+def _nearest(found: Iterable[M], t: float, epoch: int | None) -> M | None:
+    """Return the message of an epoch, or of any, that is nearest in time: numbers begin anew with a process."""
+    own = (message for message in found if epoch is None or message.epoch == epoch)
+    return min(own, key=lambda message: abs(message.t - t), default=None)
 
 
 def on_wire(

@@ -24,7 +24,7 @@ from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
 
-def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> RunReport:
+def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
     """Measure the record of a live run; write metrics.json, report.txt and figures into its folder.
 
     It judges no claim of the paper: a live run has one case, and people may have changed it.
@@ -37,6 +37,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None)
         The whole record.
     pacing : Pacing or None
         How the plant kept pace.
+    figures : bool, optional
+        Whether its figures are drawn.
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
@@ -58,6 +60,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None)
     )
     write_whole(metrics.folder / "report.txt", plain(report))
 
+    if not figures:
+        return report
     from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else
 
     draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")

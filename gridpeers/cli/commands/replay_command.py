@@ -1,0 +1,147 @@
+"""The command `gridpeers replay`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, CLAIM_FAILED, fail, require
+
+if TYPE_CHECKING:
+    from scenarios.record.record_reader import RunRecord
+    from scenarios.replay.changes import Changes
+
+
+def replay(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
+    ],
+    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")] = "",
+    without: Annotated[
+        list[str] | None,
+        typer.Option(metavar="LINKS", help='Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.'),
+    ] = None,
+    without_loss: Annotated[bool, typer.Option("--without-loss", help="Lose no message by chance.")] = False,
+    law: Annotated[str, typer.Option(metavar="KEY", help="Another law: a name, or module:Class.")] = "",
+    values: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="A key of agents or links, e.g. gains.k_p=0.001; can be repeated."
+        ),
+    ] = None,
+    since: Annotated[
+        float, typer.Option("--from", metavar="T", help="Run time (s) from which on; up to it all is as it was.")
+    ] = 0.0,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="DIR", help="New folder for what would have been; in runs/ when left out."),
+    ] = None,
+) -> None:
+    """Replay a recorded run, or show what would have been.
+
+    The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
+    is closed on our plant from then on. docs/replay.md explains both.
+
+    Exit code: 0 all is the same, or what would have been is written, 1 something differs from the record, 2 bad usage,
+    no record, or nothing in it to be replayed.
+
+    Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
+    """
+    require({"mcap": "the record of a run", "numba": "the plant"})
+
+    from scenarios.record.record_reader import RecordFileError, RunRecord
+    from scenarios.replay.changes import Changes
+    from scenarios.replay.replay_error import ReplayError
+    from scenarios.results.run_files import FolderError, refusal
+
+    try:
+        record = RunRecord.open(run / case if case else run)
+        changes = Changes(
+            without=tuple(without or ()),
+            without_loss=without_loss,
+            law=law,
+            keys=dict(map(_key_and_value, values or ())),
+            since=since,
+        )
+        if changes or out is not None:
+            differs = _counterfactual(record, changes, out)
+        else:
+            if since:
+                fail([f"--from {since:g}: nothing is changed from then on; give --without, --law or --set"], BAD_INPUT)
+            differs = _replay(record)
+    except ReplayError as error:
+        fail(list(error.problems), BAD_INPUT)
+    except (RecordFileError, FolderError) as error:
+        fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(out or Path("runs"), error)], BAD_INPUT)
+    for damage in record.damage:
+        typer.echo(f"NOTE  {damage}")
+    if differs:
+        raise SystemExit(CLAIM_FAILED)
+
+
+def _key_and_value(text: str) -> tuple[str, Any]:
+    """Read a key and its value, which is as in a scenario file; what is no value there is a text."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        fail([f"--set {text}: needs a key and its value, as gains.k_p=0.001"], BAD_INPUT)
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except ValueError:
+        return key.strip(), value.strip()
+
+
+def _replay(record: RunRecord) -> bool:
+    """Replay a record and print what came of it; return whether something differs."""
+    from scenarios.replay.replay import replay as replay_record
+
+    typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
+    done = replay_record(record)
+    for part in done.parts:
+        of = "rows" if part.name == "plant" else "states"
+        verdict = "the same" if part.difference is None else f"then {part.difference}"
+        typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
+    for note in done.notes:
+        typer.echo(f"NOTE  {note}")
+    if done.difference is not None:
+        typer.echo(f"The first difference: {done.difference}")
+        return True
+    typer.echo("The replay gives what was recorded, within 1e-9.")
+    return False
+
+
+def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
+    """Run a counterfactual, print its table and write its folder; return whether it differs before the change."""
+    require({"matplotlib": "the figure", "pandas": "the table"})
+
+    from datetime import datetime
+
+    from gridpeers.studies.replaying import counterfactual_in
+    from scenarios.replay.changes import changed_rule
+    from scenarios.results.plots.style import save
+    from scenarios.results.run_files import new_folder, shown, write_whole
+
+    changed_rule(record, changes)  # whatever is wrong is told before a folder is made
+
+    typer.echo(f"{_about(record)}: {changes}")
+    folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
+    done = counterfactual_in(record, changes, folder)
+    typer.echo(str(done))
+    write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
+    (figure,) = save(done.plot(), folder / "plots", "counterfactual")
+    for note in done.notes:
+        typer.echo(f"NOTE  {note}")
+    typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
+    if done.difference is not None:
+        typer.echo(f"It is not to be trusted: before the change, {done.difference}")
+    return done.difference is not None
+
+
+def _about(record: RunRecord) -> str:
+    info = record.info
+    kind = "wall-clock" if info.clock == "wall" else "simulated"
+    return f"{info.scenario}{f', case {info.case}' if info.case else ''}, in {kind} time"

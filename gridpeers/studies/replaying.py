@@ -1,0 +1,173 @@
+"""Replay a recorded run, and ask what would have been."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+from gridpeers.runs.result import Result
+from gridpeers.runs.run_folder import RunFolder, new_home
+from gridpeers.runs.running import read
+from gridpeers.runs.showing import shown_in_notebooks
+from gridpeers.studies.comparison import Comparison
+from gridpeers.values import plain
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changes import Changes
+from scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
+from scenarios.replay.replay import Replay
+from scenarios.replay.replay import replay as replay_record
+from scenarios.replay.replay_error import ReplayError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+RecordSource = Result | RunRecord | str | Path
+"""A result, its record, or the folder of a case or its run.mcap."""
+
+
+def replay(run: RecordSource) -> Replay:
+    """Give the cores of a recorded run again what they got, and compare what they decide.
+
+    Parameters
+    ----------
+    run : Result, RunRecord, str or Path
+        The run, of any driver; its record may be cut off.
+
+    Returns
+    -------
+    Replay
+        `difference` is the first one, with agent, time, quantity, both values and unit; None if everything is the same
+        within 1e-9.
+
+    Raises
+    ------
+    RecordFileError
+        If there is no record, or it cannot be read.
+    ReplayError
+        If it does not have what the cores got, or its law, graph or feeder is not here.
+    """
+    return replay_record(_record(run))
+
+
+def counterfactual(
+    run: RecordSource,
+    *,
+    without: str | Iterable[str] = (),
+    without_loss: bool = False,
+    law: Any = "",
+    replace: Mapping[str, Any] | None = None,
+    since: float = 0.0,
+    folder: str | Path | None = None,
+) -> Counterfactual:
+    """Run a recorded run again, closed on our plant, with something changed.
+
+    Parameters
+    ----------
+    run : Result, RunRecord, str or Path
+        The run, of any driver.
+    without : str or Iterable[str], optional
+        Links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2".
+    without_loss : bool, optional
+        Whether no message is lost by chance.
+    law : optional
+        Another law: its name, `module:Class`, or a class.
+    replace : Mapping[str, Any], optional
+        Values of keys of agents and links, by their paths: `{"gains.k_p": 0.001}`.
+    since : float, optional
+        Run time (s) from which on; up to it everything is as it was.
+    folder : str or Path, optional
+        New or empty; takes the run folder. When left out, the files live as long as the result.
+
+    Raises
+    ------
+    RecordFileError, ReplayError
+        As `replay`; also if a link, a law, a key or a value is wrong, or the time is outside of the record.
+    FolderError
+        If there is something in the folder, or it cannot be written.
+    """
+    record = _record(run)
+    try:
+        keys = {key: plain(value) for key, value in (replace or {}).items()}
+        changes = Changes(
+            without=(without,) if isinstance(without, str) else tuple(without),
+            without_loss=without_loss,
+            law=law if isinstance(law, str) else plain(law),
+            keys=keys,
+            since=float(since),
+        )
+    except (ValueError, TypeError) as error:
+        raise ReplayError(f"a change cannot be read: {error}") from None
+    home = _temporary() if folder is None else new_home(folder)
+    return counterfactual_in(record, changes, home, temporary=folder is None)
+
+
+def counterfactual_in(record: RunRecord, changes: Changes, folder: Path, *, temporary: bool = False) -> Counterfactual:
+    """Run a counterfactual into an empty folder, which goes with it if it is temporary; see `counterfactual`."""
+    would_be, was = RunFolder(folder, temporary=temporary), RunFolder(_temporary(), temporary=True)
+    done = run_counterfactual(record, changes, was.path, would_be.path)
+    return Counterfactual(was, would_be, changes, done)
+
+
+def _temporary() -> Path:
+    return Path(tempfile.mkdtemp(prefix="gridpeers-"))
+
+
+def _record(run: RecordSource) -> RunRecord:
+    if isinstance(run, RunRecord):
+        return run
+    return run.run_record if isinstance(run, Result) else RunRecord.open(run)
+
+
+class Counterfactual:
+    """What was beside what would have been; `gridpeers.counterfactual` makes it."""
+
+    def __init__(
+        self,
+        was: RunFolder,
+        would_be: RunFolder,
+        changes: Changes,
+        done: CounterfactualRun,
+    ) -> None:
+        self._folders = was, would_be  # they go with this
+        self.was, self.would_be = _result(was.path), _result(would_be.path)
+        self.changes = changes
+        """What is changed."""
+        self.difference, self.compared, self.notes = done.difference, done.compared, done.notes
+        """First difference from the record before the change, None if there is none; rows compared; what is left."""
+
+    @property
+    def folder(self) -> Path:
+        """Run folder of what would have been."""
+        return self._folders[1].path
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Metrics of both and their difference, a row per (window, metric)."""
+        return Comparison({"": (self.was, self.would_be)}, ("was", "would be")).table
+
+    def plot(self) -> Figure:
+        """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
+        from scenarios.results.plots.counterfactual_figure import counterfactual_figure
+
+        shown_in_notebooks()
+        since = self.changes.since if self.changes else 0.0
+        return counterfactual_figure(self.was.drawing(), self.would_be.drawing(), str(self.changes), since)
+
+    def __str__(self) -> str:
+        """Return the table as text."""
+        text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
+        return text
+
+    def __repr__(self) -> str:
+        return f"<Counterfactual of {self.was.spec.name} {self.was.case}: {self.changes}>"
+
+
+def _result(folder: Path) -> Result:
+    found = read(folder)
+    assert isinstance(found, Result)
+    return found

@@ -1,0 +1,142 @@
+"""The processes of a closed loop, made as they were, and changed when it is time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from msgspec.structs import replace
+
+from agents.carriers.make import close_laws, make_law
+from agents.laws.law import Law
+from netem.schema.change import Heal
+from netem.schema.fault import Fault
+from plant.plant_interface import LivePlant
+from scenarios.emulation.emulated_links import links_of
+from scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from scenarios.record.record_info import RecordInfo
+from scenarios.replay.changes import ChangedRule, lossless
+from scenarios.replay.loop_process import LoopProcess
+from scenarios.replay.recorded_process import RecordedStep
+from scenarios.replay.replay_error import ReplayError
+from scenarios.replay.replayed_process import Message, agent_again, instance_of, plant_again, recorded_links
+from wire.codec import decode, encode
+from wire.links import Links
+from wire.messages import PLANT, Command, LinkRequest
+
+COMMANDS = ("link_request/", "command")
+"""Beginnings of the keys of commands to links, among others."""
+
+
+class ChangedProcesses:
+    """Make processes, and change their rule and their links from a time on.
+
+    Parameters
+    ----------
+    info : RecordInfo
+        The run.
+    rule : ChangedRule or None
+        The changes; None changes nothing.
+    """
+
+    def __init__(self, info: RecordInfo, rule: ChangedRule | None) -> None:
+        self._info, self._rule = info, rule
+        self.changed = rule is not None and rule.changes.since <= 0.0
+        """Whether the change is made."""
+        self._laws: list[Law] = []
+
+    @property
+    def is_due(self) -> float | None:
+        """When the change is to be made (s of run time); None if there is none, or it is made."""
+        return None if self._rule is None or self.changed else self._rule.changes.since
+
+    def close(self) -> None:
+        """Release what laws have opened."""
+        close_laws(self._laws)
+
+    # ---------------------------------------------------------------- making
+
+    def make_plant(self, process: LoopProcess, plant: LivePlant) -> None:
+        """Make the plant's process, around a plant at t = 0."""
+        links = self._links(PLANT, self._info.plant.links)
+        process.again = plant_again(process.recorded, self._info, plant, links)
+
+    def make_agent(self, process: LoopProcess, step: RecordedStep) -> bool:
+        """Make an agent at its start; return False if that is not its start."""
+        config, instance = self._info.agent(process.name), instance_of(step)
+        if config is None or not instance:
+            return False
+        if self.changed and self._rule is not None and self._rule.control is not None:
+            config = replace(config, control=self._rule.control)
+        process.config = config
+        process.again = agent_again(
+            process.recorded, config, instance, self._laws, self._links(process.name, config.links)
+        )
+        return True
+
+    def _links(self, name: str, recorded: dict[str, Any]) -> Links | None:
+        """Return the links into a node: those of the change; but where the record has none, only once it is made."""
+        rule = self._rule
+        if rule is None or rule.links is None or not (recorded or self.changed):
+            return recorded_links(self._info, name)
+        return links_of(name, rule.links)
+
+    # ---------------------------------------------------------------- the change
+
+    def change(self, processes: list[LoopProcess]) -> None:
+        """Make the change."""
+        rule, self.changed = self._rule, True
+        assert rule is not None
+        for process in processes:
+            again = process.again
+            if again is None or again.node.finished:
+                continue
+            if rule.links is not None and again.links is None:
+                links = links_of(process.name, rule.links)
+                assert links is not None
+                again.use_links(links)
+            if rule.changes.without_loss and again.links is not None:  # what people have made by commands
+                heal = LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0, kinds=("loss",)))
+                again.links.command(heal.to_tree(), rule.changes.since)
+            self._reconfigure(process, rule)
+
+    def _reconfigure(self, process: LoopProcess, rule: ChangedRule) -> None:
+        node, config = process.agent, process.config
+        if rule.control is None or config is None or node is None:
+            return
+        config = replace(config, control=rule.control, epoch=process.recorded.epoch, record="physics", deadline=0.0)
+        try:
+            law = make_law(rule.control)
+        except ValueError as error:
+            raise ReplayError(f"{config.name}: its law cannot be made here: {error}") from None
+        self._laws.append(law)
+        node.change(config, law)
+
+    # ---------------------------------------------------------------- commands of people to links
+
+    def command(self, message: Message) -> Message | None:
+        """Return a command to links as it is under the change; None if nothing is left of it."""
+        if self._rule is None or not (self.changed and self._rule.changes.without_loss):
+            return message
+        decoded = decode(message.payload)
+        if not isinstance(decoded, LinkRequest | Command) or not decoded.link_command:
+            return message
+        try:
+            command = LinkCommand.of_tree(decoded.link_command)
+        except ValueError:  # the links refused it too
+            return message
+        if command.fault is None:
+            return message
+        fault = lossless(command.fault)
+        if fault is None:
+            return None
+        tree = replace(command, fault=fault).to_tree()
+        return Message(message.key, encode(replace(decoded, link_command=tree)))
+
+    def cut_again(self, process: LoopProcess, t: float) -> None:
+        """Cut the links at t (s of run time) that a command of the record may have healed."""
+        rule = self._rule
+        if rule is None or not self.changed or process.again is None or process.again.links is None:
+            return
+        for pattern in rule.changes.without:
+            cut = LinkCommand(fault=Fault(on=pattern, cut=True))
+            process.again.links.command(cut.to_tree(), max(t, rule.changes.since))

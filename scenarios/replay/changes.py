@@ -1,0 +1,260 @@
+"""What a counterfactual changes: links, losses, the law, and other keys of agents and links, from a time on."""
+
+from __future__ import annotations
+
+import copy
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+
+from agents.agent_config import Control
+from netem.schema.fault import KINDS, Fault
+from netem.schema.netem import Netem
+from netem.schema.partition import Partition
+from netem.schema.pattern import objections
+from plant.equipment import Feeder
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.replay_error import ReplayError
+from scenarios.schema.configs import configs
+from scenarios.schema.loading import check_tables
+from scenarios.schema.netem_tables import netem_of, setup_of
+from scenarios.schema.scenario_errors import Problems, ScenarioError
+from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
+from scenarios.sweep.file.paths import PathError, Tree, put, steps
+from wire.schema.suggestion import suggestion
+
+Entry = TypeVar("Entry", Fault, Partition)
+
+OF_CASE = ("secondary", "graph", "links", "without")
+"""Keys of a case that agents have."""
+
+OF_BOTH = ("law", "gains", "degraded_communication", "link", "partition")
+"""Keys of agents and links that a case may have, and the whole scenario."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Changes:
+    """Changes that somebody asks for."""
+
+    without: tuple[str, ...] = ()
+    """Links that are cut, as patterns: "inv4 -> inv7"."""
+    without_loss: bool = False
+    """Whether no message is lost by chance."""
+    law: str = ""
+    """Another law; "" keeps that of the record."""
+    keys: Mapping[str, Any] = field(default_factory=dict)
+    """Values of further keys of the scenario, by their paths."""
+    since: float = 0.0
+    """From when on (s of run time)."""
+
+    def __bool__(self) -> bool:
+        return bool(self.without or self.without_loss or self.law or self.keys)
+
+    def __str__(self) -> str:
+        """Return them in words.
+
+        Examples
+        --------
+        >>> print(Changes(without=("inv4 -> inv7",), keys={"gains.k_p": 0.001}, since=2.0))
+        without inv4 -> inv7, gains.k_p = 0.001, from 2 s on
+        """
+        parts = [f"without {pattern}" for pattern in self.without]
+        parts += ["without loss"] * self.without_loss + [f"law {self.law}"] * bool(self.law)
+        parts += [f"{key} = {value}" for key, value in self.keys.items()]
+        if not parts:
+            return "nothing changed"
+        return ", ".join([*parts, *([f"from {self.since:g} s on"] if self.since > 0.0 else [])])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ChangedRule:
+    """A record's run under changes: what its agents and links are from then on."""
+
+    recorded: ScenarioModel
+    """The scenario of the record, with its case alone."""
+    scenario: ScenarioModel
+    """The scenario as changed."""
+    feeder: Feeder
+    """Its feeder."""
+    case: str
+    """The case."""
+    control: Control | None
+    """Rule of control of every agent; None keeps that of the record."""
+    links: dict[str, Any] | None
+    """Configuration of the emulated links, of the whole run; None keeps that of the record."""
+    changes: Changes
+    """The changes."""
+
+
+def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
+    """Return a record's run under changes.
+
+    Raises
+    ------
+    ReplayError
+        If a link, a law, a key or a value is wrong, or the time is outside of the record.
+    """
+    before, feeder = _checked(record, _tables(record), frozenset())
+    case = record.info.case
+    wrong = _wrong(record, changes, feeder)
+    tables, changed = _tables(record), []
+    for path, value in {**({"law": changes.law} if changes.law else {}), **changes.keys}.items():
+        try:
+            changed.append(_put(tables, case, path, value, whole=path == "law" and bool(changes.law)))
+        except (PathError, ValueError) as error:
+            wrong.append(f"{path}: {error}")
+    if wrong:
+        raise ReplayError(*wrong)
+    after, _ = _checked(record, tables, frozenset(changed))
+    netem_before, netem_after = (_resolved(scenario, feeder, case) for scenario in (before, after))
+    if changes.without_loss:
+        netem_after = _lossless(netem_after)
+    netem = _merged(netem_before, netem_after, changes.since)
+    if changes.without:
+        cuts = (Fault(on=pattern, cut=True, from_s=changes.since) for pattern in changes.without)
+        netem = msgspec.structs.replace(netem, links=(*netem.links, *cuts))
+    control, as_it_was = (configs(scenario, feeder, case)[1][0].control for scenario in (after, before))
+    if control != as_it_was and changes.since > 0.0 and record.info.clock == "simulated":
+        raise ReplayError(
+            "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
+            "out, or take a record of a run in wall-clock time; links can change at any time"
+        )
+    return ChangedRule(
+        recorded=before,
+        scenario=after,
+        feeder=feeder,
+        case=case,
+        control=None if control == as_it_was else control,
+        links=None if netem == netem_before else _setup(record, after, feeder, netem),
+        changes=changes,
+    )
+
+
+# -------------------------------------------------------------------- the scenario
+
+
+def _tables(record: RunRecord) -> Tree:
+    """Return the tables of the record's scenario, with its case alone; no paper judges what would have been."""
+    info = record.info
+    if not info.toml:
+        raise ReplayError(f"{record.path}: it has no scenario, so that nothing in it can be changed")
+    try:
+        tables = copy.deepcopy(tomllib.loads(info.toml))
+        tables["case"] = {info.case: tables["case"][info.case]}
+    except (ValueError, KeyError, RecursionError) as error:
+        raise ReplayError(f"{record.path}: its scenario cannot be read: {error}") from None
+    return {key: value for key, value in tables.items() if key not in (AS_RUN, "paper", "claims")}
+
+
+def _checked(record: RunRecord, tables: Tree, changed: frozenset[str]) -> tuple[ScenarioModel, Feeder]:
+    problems = Problems(f"scenario of {record.path}", "", changed=changed)
+    try:
+        scenario, feeder = check_tables(tables, Path("scenario.toml").absolute(), problems)
+        problems.raise_if_any()
+    except ScenarioError as error:
+        raise ReplayError(*(text.removeprefix("replace: ") for text in error.problems)) from None
+    assert feeder is not None
+    return scenario, feeder
+
+
+def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:
+    """Return what is wrong with links and time."""
+    rows = (*feeder.inverters, *feeder.spares)
+    microgrids = {row.name: row.microgrid for row in rows}
+    wrong = [text for pattern in changes.without for text in objections(pattern, tuple(microgrids), microgrids)]
+    if not isfinite(changes.since) or not 0.0 <= changes.since < record.t_end:
+        wrong.append(f"from {changes.since:g} s: is outside of the record, which has 0 to {record.t_end:.2f} s")
+    return wrong
+
+
+def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
+    """Set a key of agents or links; return its path from the top.
+
+    Raises
+    ------
+    ValueError
+        If it is a key of something else, or leads nowhere.
+    """
+    way = [str(step) for step in steps(path)]
+    own = tables["case"][case]
+    prefix = f"case.{case}."
+    if way[:1] == ["case"]:
+        if way[1:2] != [case]:
+            raise ValueError(f"the record is of case {case}")
+        path, way = path.removeprefix(prefix), way[2:]
+    first = way[0] if way else ""
+    if first not in (*OF_CASE, *OF_BOTH):
+        known = (*OF_BOTH, *OF_CASE)
+        raise ValueError(f"is no key of agents or links; {suggestion(first, known, 'keys')}")
+    if first in OF_CASE or own.get(first) or whole:
+        put(own, path, value)
+        return prefix + path
+    put(tables, path, value)
+    return path
+
+
+# -------------------------------------------------------------------- links
+
+
+def _resolved(scenario: ScenarioModel, feeder: Feeder, case: str) -> Netem:
+    return setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).netem
+
+
+def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Netem) -> dict[str, Any]:
+    """Return the configuration of the links, with the faults of nodes as they were."""
+    was = record.info.plant.links
+    setup = EmulationConfig.of_tree(was) if was else setup_of(netem, scenario, feeder, real_nodes=True)
+    nodes = setup.netem.nodes if was else ()
+    return msgspec.structs.replace(setup, netem=msgspec.structs.replace(netem, nodes=nodes)).to_tree()
+
+
+def lossless(fault: Fault) -> Fault | None:
+    """Return a fault without its loss; None if nothing is left of it.
+
+    Examples
+    --------
+    >>> lossless(Fault(on="* -> inv1", loss=0.2)) is None, lossless(Fault(on="* -> inv1", loss=0.2, delay=0.1)).delay
+    (True, Constant(fifo=False, delay_s=0.1))
+    """
+    models = fault.models()
+    if "loss" not in models:
+        return fault
+    left = {kind: model for kind, model in models.items() if kind in KINDS and kind != "loss"}
+    if not (left or fault.own):
+        return None
+    return Fault(on=fault.on, from_s=fault.from_s, to_s=fault.to_s, own=fault.own, **left)
+
+
+def _lossless(netem: Netem) -> Netem:
+    links = (lossless(fault) for fault in netem.links)
+    return msgspec.structs.replace(netem, links=tuple(fault for fault in links if fault is not None))
+
+
+def _merged(before: Netem, after: Netem, since: float) -> Netem:
+    """Return faults that are those of one configuration up to a time (s), and those of another one from then on."""
+    if before == after or since <= 0.0:
+        return after
+    return msgspec.structs.replace(
+        before,
+        links=_spliced(before.links, after.links, since),
+        partitions=_spliced(before.partitions, after.partitions, since),
+    )
+
+
+def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) -> tuple[Entry, ...]:
+    """Return entries of both, those that both have once and whole."""
+    found = [entry for entry in before if entry in after]
+    for entry in before:
+        if entry not in after and entry.from_s < since:
+            until = since if entry.to_s is None else min(entry.to_s, since)
+            found.append(msgspec.structs.replace(entry, to_s=until))
+    for entry in after:
+        if entry not in before and (entry.to_s is None or entry.to_s > since):
+            found.append(msgspec.structs.replace(entry, from_s=max(entry.from_s, since)))
+    return tuple(found)

@@ -1,0 +1,285 @@
+"""A run in wall-clock time again, as a closed loop: what each process hears is what the others send in the replay.
+
+Calls and arrivals come when they came in the record. So without a change every process does what it did. Under a change
+a message takes as long as that of its number took in the record, and one that was lost stays lost. A message that the
+record does not have takes a delay of its link (`link_delays`). Processes start, stop, freeze and die as they did, and
+what people asked of the plant happens again.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from heapq import heappop, heappush
+from itertools import count
+from math import inf
+
+from agents.graphs import GraphError
+from agents.own_nameplate import nameplate_of
+from agents.topology import in_neighbours, rule_of
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changed_processes import COMMANDS, ChangedProcesses
+from scenarios.replay.changes import ChangedRule
+from scenarios.replay.link_delays import LinkDelays
+from scenarios.replay.loop_process import LoopProcess, is_arrival, sender, stream
+from scenarios.replay.recorded_process import EACH_TICK, RecordedStep, processes_of
+from scenarios.replay.replay_error import ReplayError
+from scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
+from wire.codec import decode
+from wire.journal import Heard, Process, Received, Sent, Woken
+from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
+
+MOST_SENT = 100_000
+"""Messages that are kept for those that are yet to hear them: minutes of nine agents."""
+
+CUT_OFF = 1.0
+"""Time (s of wall time) before the end of a record that is cut off within which a process belongs to its end."""
+
+_CALL, _ARRIVAL = 0, 1
+"""Order of what is due at the same time: processes that share a session send before they hear."""
+
+_NOT_YET = Message("", b"not yet")
+"""In place of a message that its sender is yet to send."""
+
+
+class ClosedLoop:
+    """A run again, from its start, under changes from a time on.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The run, in wall-clock time.
+    rule : ChangedRule or None
+        The changes; None changes nothing.
+    take : Callable[[Telemetry | LinkReport], None]
+        Takes the rows, events and link reports of the replay.
+    make_plant : MakePlant
+        Starts the plant.
+    """
+
+    def __init__(
+        self,
+        record: RunRecord,
+        rule: ChangedRule | None,
+        take: Callable[[Telemetry | LinkReport], None],
+        make_plant: MakePlant,
+    ) -> None:
+        self._record, self._take, self._make_plant = record, take, make_plant
+        self._making = ChangedProcesses(record.info, rule)
+        self._processes: dict[tuple[str, int], LoopProcess] = {}
+        self._due: list[tuple[float, int, int, LoopProcess, Message | None]] = []
+        """What comes next: when (s, monotonic), calls first; of whom; the message, if the record has none of it."""
+        self._order = count()
+        self._sent: OrderedDict[tuple[str, int, int], tuple[float, Message]] = OrderedDict()
+        """Messages that were sent in the replay, by stream, epoch and number, and when."""
+        self._delays = LinkDelays()
+        self._listens = _listeners(record)
+        self._lost = frozenset(_lost(record)) if rule is not None and rule.changes.without_loss else frozenset()
+        self._number = -1
+        """Number of the last telemetry."""
+        self._t = 0.0
+        """Run time of the plant (s)."""
+        self.notes: list[str] = []
+        """Sentences on what the replay leaves out."""
+
+    def run(self) -> None:
+        """Run until the record ends.
+
+        Raises
+        ------
+        ReplayError
+            If the record has no arrivals, or what it needs is not here.
+        """
+        found = [LoopProcess(process) for process in processes_of(self._record)]
+        first = found[0]
+        if first.name != PLANT:
+            raise ReplayError(f"{self._record.path}: the plant kept no journal, so that nothing can follow from it")
+        until, plant = self._until(found), start_plant_of(self._record.info, self._make_plant)
+        try:
+            self._making.make_plant(first, plant)
+            for process in found:
+                self._processes[process.name, process.recorded.epoch] = process
+                self._push(process)
+            self._loop(first, until)
+            for process in found:
+                if process.again is not None:
+                    self._publish(process, (), process.again.end(), inf)
+        finally:
+            self._making.close()
+            plant.close()
+
+    def _until(self, found: list[LoopProcess]) -> float:
+        """Return the run time (s) up to which all journals of a record reach; infinite for a complete one."""
+        record = self._record
+        if record.complete:
+            return inf
+        end = record.t_end - CUT_OFF * max(1.0, record.info.plant.speed)
+        return min((each.recorded.last_t for each in found if each.recorded.last_t >= end), default=inf)
+
+    # ---------------------------------------------------------------- the loop
+
+    def _loop(self, plant: LoopProcess, until: float) -> None:
+        waits = 0
+        while self._due:
+            due, _, _, process, message = heappop(self._due)
+            if message is not None:
+                if process.again is not None and process.again.hears(message.key):
+                    self._publish(process, (), process.again.hear(message, due), due)
+                continue
+            step = process.head
+            assert step is not None
+            self._change_if_due(process, step)
+            self._t = plant.plant.t if plant.plant is not None else 0.0
+            if self._t > until + 1e-9:
+                return
+            heard = self._heard(process, step)
+            if heard is _NOT_YET and self._due and waits <= len(self._due):
+                waits += 1  # clocks of two hosts differ
+                heappush(self._due, (self._due[0][0], _ARRIVAL, next(self._order), process, None))
+                continue
+            waits = 0
+            if process.again is None and not self._making.make_agent(process, step):
+                self._note(f"the record lacks the start of {process.name}, so that its states are as recorded")
+            if process.again is not None and (heard not in (None, _NOT_YET) or not is_arrival(step)):
+                sent = process.again.take(step, heard)
+                self._publish(process, step.sent, sent, step.due)
+            process.next()
+            self._settle(process, step)
+            self._push(process)
+
+    def _push(self, process: LoopProcess) -> None:
+        if process.head is not None:
+            rank = _ARRIVAL if is_arrival(process.head) else _CALL
+            heappush(self._due, (process.head.due, rank, next(self._order), process, None))
+
+    def _change_if_due(self, process: LoopProcess, step: RecordedStep) -> None:
+        """Make the change before the plant measures at its time."""
+        node, since = process.plant, self._making.is_due
+        if since is None or node is None or not isinstance(step.entry, Woken) or step.entry.work:
+            return
+        if node.phase == "running" and node.t >= since - 1e-9:
+            self._making.change(list(self._processes.values()))
+
+    def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
+        """Undo what a step must not do to a process under the changes."""
+        if isinstance(step.entry, Received) and step.entry.key.startswith(COMMANDS):
+            self._making.cut_again(process, self._t)
+        node, head = process.agent, process.head
+        if node is None or head is None or not node.session_broken:
+            return
+        if not (isinstance(head.entry, Process) and head.entry.kind == "session"):
+            node.session_broken = False
+            self._note(f"{process.name} would have opened a new session; what that would have brought is not known")
+
+    # ---------------------------------------------------------------- messages
+
+    def _heard(self, process: LoopProcess, step: RecordedStep) -> Message | None:
+        """Return what a process hears in a step: as the replay sent it, or as recorded where nobody sends it there."""
+        entry = step.entry
+        if not isinstance(entry, Heard | Received):
+            return None
+        if not entry.key.startswith(EACH_TICK):
+            recorded = message_of(process.recorded, step)
+            is_command = entry.key.startswith(COMMANDS) and not entry.rejected
+            return self._making.command(recorded) if is_command and recorded is not None else recorded
+        if isinstance(entry, Heard):
+            epoch, number = entry.epoch, entry.seq
+        else:
+            known = tick_message(Message(entry.key, entry.payload))
+            if known is None:  # no sound message
+                return Message(entry.key, entry.payload)
+            epoch, number = known.epoch, known.seq
+        of, src = stream(entry.key), sender(entry.key)
+        found, by = self._sent.get((of, epoch, number)), self._processes.get((src, epoch))
+        if found is not None:
+            at, message = found
+            self._delays.note(src, process.name, max(0.0, step.due - at))
+            stays = process.name == PLANT or message.key == entry.key
+            return message if stays else None  # a state that its law does not tell the neighbours
+        if by is None or by.again is None:
+            return message_of(process.recorded, step)
+        if by.has_sent(of, number):
+            return None  # the record has it, and the replay does not
+        return message_of(process.recorded, step) if by.head is None else _NOT_YET
+
+    def _publish(self, process: LoopProcess, recorded: tuple[Sent, ...], sent: list[Message], due: float) -> None:
+        """Bring what a process sent in a step to those who hear it, beside those of whom the record has it."""
+        theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
+        for message in sent:
+            if message.key.startswith(("telemetry", "report/")):
+                self._record_message(decode(message.payload))
+            elif (decoded := tick_message(message)) is not None:
+                self._sent[stream(message.key), decoded.epoch, decoded.seq] = due, message
+                if len(self._sent) > MOST_SENT:
+                    self._sent.popitem(last=False)
+                self._send_new(process, message, decoded, theirs, due)
+
+    def _send_new(
+        self,
+        process: LoopProcess,
+        message: Message,
+        decoded: State | Measurement,
+        theirs: set[tuple[str, int]],
+        due: float,
+    ) -> None:
+        """Send a message to those for whom the record has none of its number, by delays of the link."""
+        kind, _, name = message.key.partition("/")
+        existed = (message.key, decoded.seq) in theirs
+        any_state = any((f"{key}/{name}", decoded.seq) in theirs for key in ("state", "set_points"))
+        for other in self._processes.values():
+            if other is process or other.again is None or not other.again.hears(message.key):
+                continue
+            link = process.name, other.name
+            if (*link, decoded.epoch, decoded.seq) in self._lost and self._making.changed:
+                self._deliver(other, message, due + self._delays.typical(*link))
+                continue
+            listened = kind == "measurement" or name in self._listens.get(other.name, frozenset())
+            if not (any_state if other.name == PLANT else existed and listened):
+                self._deliver(other, message, due + self._delays.draw(*link))
+
+    def _deliver(self, to: LoopProcess, message: Message, due: float) -> None:
+        heappush(self._due, (due, _ARRIVAL, next(self._order), to, message))
+
+    def _record_message(self, message: AnyMessage) -> None:
+        if isinstance(message, LinkReport):
+            self._take(message)
+        elif isinstance(message, Telemetry) and message.seq > self._number:  # not again for a late recorder
+            self._number = message.seq
+            self._take(message)
+
+    def _note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
+    """Return the in-neighbours of each agent in the record, if all agents were there."""
+    nameplates = {config.name: nameplate_of(config) for config in record.info.agents}
+    found = {}
+    for config in record.info.agents:
+        try:
+            names = in_neighbours(config.control, config.name, nameplates, rule_of(config.control))
+        except (GraphError, ValueError) as error:
+            raise ReplayError(f"{config.name}: its graph cannot be made here: {error}") from None
+        found[config.name] = frozenset(names)
+    return found
+
+
+def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
+    """Yield sender, receiver, epoch and number of messages that a receiver missed on the wire between two others."""
+    for process in processes_of(record):
+        last: dict[tuple[str, int], int] = {}
+        for step in process.steps():
+            entry = step.entry
+            if not isinstance(entry, Heard | Received) or not entry.key.startswith(EACH_TICK):
+                continue
+            if isinstance(entry, Heard):
+                epoch, number = entry.epoch, entry.seq
+            elif (message := tick_message(Message(entry.key, entry.payload))) is not None:
+                epoch, number = message.epoch, message.seq
+            else:
+                continue
+            of = stream(entry.key), epoch
+            before = last.get(of, number)
+            yield from ((sender(entry.key), process.name, epoch, missed) for missed in range(before + 1, number))
+            last[of] = max(before, number)

@@ -1,0 +1,156 @@
+"""What would have been: a recorded run again under changes, as a run folder beside one of what was."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from plant.build import start_plant
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.live.live_folders import LIVE
+from scenarios.live.numbers.live_report import write_report
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changes import ChangedRule, Changes, changed_rule
+from scenarios.replay.closed_loop import ClosedLoop
+from scenarios.replay.difference import Difference
+from scenarios.replay.recorded_process import require_arrivals
+from scenarios.replay.replay import ComparedRows
+from scenarios.replay.replay_error import ReplayError
+from scenarios.replay.replayed_process import MakePlant, start_plant_of
+from scenarios.results.metrics_file import RunMetrics
+from scenarios.results.record import Recorded, Recorder, RecordError
+from scenarios.results.run_files import set_broken, set_status, write_whole
+from scenarios.run import versions
+from scenarios.schema.scenario_model import ScenarioModel
+from scenarios.schema.scenario_writing import to_toml
+from wire.messages import LinkReport, Telemetry
+
+
+@dataclass(frozen=True, kw_only=True)
+class CounterfactualRun:
+    """What became of a counterfactual."""
+
+    difference: Difference | None
+    """First row of the plant before the change that is not as in the record; None if all are. It should be None."""
+    compared: int
+    """Number of rows that were compared."""
+    t_end: float
+    """Run time of its last row (s)."""
+    notes: tuple[str, ...]
+    """Sentences on what it leaves out."""
+
+
+def run_counterfactual(
+    record: RunRecord, changes: Changes, was: Path, would_be: Path, make_plant: MakePlant = start_plant
+) -> CounterfactualRun:
+    """Run a counterfactual, and write two run folders.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The run, of any driver.
+    changes : Changes
+        What is changed, and from when on.
+    was, would_be : Path
+        Empty folders: for what was, without figures, and for what would have been.
+    make_plant : MakePlant, optional
+        Starts the plant.
+
+    Raises
+    ------
+    ReplayError
+        If the record cannot be replayed, or a change is wrong.
+    RecordFileError
+        If the record cannot be read.
+    """
+    require_arrivals(record)
+    simulator = record.info.plant.settings.simulator
+    if simulator != "gridpeers" or record.info.plant.bridged:
+        raise ReplayError(
+            f"{record.path}: its plant was {'a federate' if record.info.plant.bridged else f'that of {simulator}'}, "
+            "which cannot be closed into a loop again; what would have been needs our own plant"
+        )
+    rule = changed_rule(record, changes)
+    rows = ComparedRows(record, changes.since if changes else inf)
+    run = _in_ticks if record.info.clock == "simulated" else _live
+    try:
+        with Recorder(would_be / rule.case, gaps=True) as recorder:
+
+            def take(message: Telemetry | LinkReport) -> None:
+                rows.take(message)
+                recorder(message)
+
+            notes = run(record, rule, take, make_plant)
+            recorded = recorder.finish(recorder.ended, recorder.record_step)
+        _write(record, rule, rule.scenario, would_be, recorded, figures=True)
+        _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), figures=False)
+    except RecordError as error:
+        set_broken(would_be, str(error))
+        raise ReplayError(f"{record.path}: {error}") from None
+    except ReplayError as error:
+        set_broken(would_be, str(error))
+        raise
+    return CounterfactualRun(difference=rows.difference, compared=rows.count, t_end=recorded.ended, notes=tuple(notes))
+
+
+Take = Callable[[Telemetry | LinkReport], None]
+
+
+def _live(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
+    loop = ClosedLoop(record, rule if rule.changes else None, take, make_plant)
+    loop.run()
+    return loop.notes
+
+
+def _in_ticks(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
+    """Run a scenario in simulated time again: messages are late and lost by their numbers, so as they were."""
+    info = record.info
+    links = {} if rule.links is None else {"links": rule.links}
+    control = {} if rule.control is None else {"control": rule.control}
+    plant = start_plant_of(info, make_plant)
+    try:
+        outcome = run_inprocess(
+            replace(info.plant, record="physics", **links),
+            [replace(agent, record="physics", **links, **control) for agent in info.agents],
+            take,
+            on_links=take,
+            plant=plant,
+        )
+    except ValueError as error:
+        raise ReplayError(f"the run cannot be made again here: {error}") from None
+    finally:
+        plant.close()
+    return [f"the run would have broken: {outcome.broke}"] if outcome.broke else []
+
+
+def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
+    """Write the rows of a record up to a time (s) as the driver did."""
+    with Recorder(folder, gaps=True) as recorder:
+        for message in record.telemetry():
+            rows = tuple(row for row in message.rows if row[0] <= until + 1e-9)
+            events = tuple(event for event in message.events if event.t <= until + 1e-9)
+            recorder(replace(message, rows=rows, events=events))
+        return recorder.finish(recorder.ended, recorder.record_step)
+
+
+def _write(
+    record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, folder: Path, recorded: Recorded, *, figures: bool
+) -> None:
+    """Write what a run folder has beside the files of its case."""
+    info = record.info
+    as_run = {"driver": LIVE, "replayed": str(record.path), "changes": str(rule.changes) if figures else ""}
+    write_whole(folder / "scenario.toml", to_toml(scenario, as_run | versions()))
+    metrics = RunMetrics(
+        scenario=scenario,
+        feeder=rule.feeder,
+        driver=LIVE,
+        folder=folder,
+        clock=info.clock,
+        speed=info.plant.speed,
+    )
+    write_report(metrics, recorded, None, figures=figures)
+    set_status(folder, "complete")

@@ -1,0 +1,174 @@
+"""The processes of a run in wall-clock time as their journals have them: what each was given, and what it sent."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from math import inf
+from typing import NamedTuple
+
+from scenarios.record.journal_reader import sound
+from scenarios.record.message_index import MessageIndex
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.replay_error import ReplayError
+from wire.journal import Decision, Entry, Exchange, Heard, Process, Received, Sent, Token, Woken
+from wire.messages import AnyMessage, Journal
+
+EACH_TICK = ("measurement/", "state/", "set_points/")
+"""Beginnings of the keys of measurements and states."""
+
+CALLS = ("start", "session", "leave")
+"""Kinds of process events that are calls of the node; the others say what it did."""
+
+Input = Token | Heard | Received | Woken | Process
+"""An entry that is a call of the node."""
+
+
+class RecordedStep(NamedTuple):
+    """One call of a node."""
+
+    due: float
+    """When it was called (s, monotonic): a message waits from its arrival until the calls before are done."""
+    entry: Input
+    """The call."""
+    sent: tuple[Sent, ...]
+    """Measurements and states that it sent in this call."""
+    t: float
+    """Run time at which its journal was sent (s); 0 before the run begins."""
+    last: bool = False
+    """Whether the journal ends with it, so that some of what it sent may be missing."""
+
+
+class RecordedProcess:
+    """One process of a run.
+
+    Parameters
+    ----------
+    parts : JournalParts
+        Journals of the record.
+    name : str
+        Its agent, or "plant".
+    epoch : int
+        Its epoch.
+    first : int
+        The part of the file in which its journal begins.
+    last_t : float
+        Run time of the last part of its journal (s).
+    """
+
+    def __init__(self, parts: JournalParts, name: str, epoch: int, first: int, last_t: float) -> None:
+        self._parts, self.name, self.epoch, self._first, self.last_t = parts, name, epoch, first, last_t
+        self.ends = ""
+        """Why its steps end before the process did; "" as far as that is not known."""
+
+    def steps(self) -> Iterator[RecordedStep]:
+        """Yield its calls, in their order."""
+        held: tuple[float, Input, float] | None = None
+        sent: list[Sent] = []
+        due = -inf
+        for journal, entry in self._entries():
+            if isinstance(entry, Sent):
+                if entry.key.startswith(EACH_TICK):
+                    sent.append(entry)
+                continue
+            if isinstance(entry, Decision | Exchange) or (isinstance(entry, Process) and entry.kind not in CALLS):
+                continue
+            assert isinstance(entry, Token | Heard | Received | Woken | Process)
+            if held is not None:
+                yield RecordedStep(held[0], held[1], tuple(sent), held[2])
+            due = max(due, -inf if entry.at is None else entry.at)
+            held, sent = (due, entry, journal.t), []
+        if held is not None:
+            yield RecordedStep(held[0], held[1], tuple(sent), held[2], last=True)
+
+    def _entries(self) -> Iterator[tuple[Journal, Entry]]:
+        number = 0
+        for index in range(self._first, self._parts.count):
+            for journal, entries in self._parts.of(index).get((self.name, self.epoch), ()):
+                if journal.seq < number:
+                    continue
+                if journal.seq > number:
+                    missing = "begins" if number == 0 else f"lacks {journal.seq - number} of its parts"
+                    self.ends = f"the journal of {self.name} {missing} at t = {journal.t:.2f} s"
+                    return
+                number = journal.seq + 1
+                for entry in entries:
+                    if isinstance(entry, Process) and entry.kind == "lost":
+                        self.ends = f"the journal of {self.name} was full at t = {journal.t:.2f} s: {entry.text}"
+                        return
+                    yield journal, entry
+
+    def message(self, entry: Heard, t: float) -> AnyMessage | None:
+        """Return a message that it heard by its number, about run time t (s); None if the record does not have it."""
+        index, reach = self._parts.index, self._parts.reach
+        kind, _, name = entry.key.partition("/")
+        if kind == "measurement":
+            return index.measurement(name, entry.seq, t, entry.epoch, reach)
+        return index.state(name, entry.seq, t, entry.epoch, reach)
+
+
+class JournalParts:
+    """The journals of a record by process, a part of the file at a time.
+
+    Parameters
+    ----------
+    index : MessageIndex
+        Of the record.
+    speed : float
+        Run time per wall time (s/s): a journal comes up to a second of wall time after what it is about.
+    """
+
+    def __init__(self, index: MessageIndex, speed: float) -> None:
+        self.index, self.count = index, len(index.file.spans)
+        self.reach = max(0.0, 2.0 * speed - 1.0)
+        """How much further than its own time a message is looked for (s of run time)."""
+        self.of = lru_cache(maxsize=16)(self._of)
+
+    def _of(self, number: int) -> dict[tuple[str, int], list[tuple[Journal, list[Entry]]]]:
+        """Return the journals in one part of the file, by name and epoch of their process."""
+        found: dict[tuple[str, int], list[tuple[Journal, list[Entry]]]] = {}
+        for journal, entry in self.index.part(number).entries:
+            parts = found.setdefault((journal.sender, journal.epoch), [])
+            if not parts or parts[-1][0] is not journal:
+                parts.append((journal, []))
+            parts[-1][1].append(entry)
+        return found
+
+    def processes(self) -> Iterator[RecordedProcess]:
+        """Yield all processes, in the order in which their journals begin."""
+        first: dict[tuple[str, int], tuple[int, float]] = {}
+        for number in range(self.count):
+            for record in self.index.file.part(number):
+                journal = sound(record.data) if record.topic == "journal" else None
+                if isinstance(journal, Journal):
+                    key = journal.sender, journal.epoch
+                    first[key] = first.get(key, (number, 0.0))[0], journal.t
+        for (name, epoch), (number, last_t) in first.items():
+            yield RecordedProcess(self, name, epoch, number, last_t)
+
+
+def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
+    """Return the processes of a run in wall-clock time, the plant first.
+
+    Raises
+    ------
+    ReplayError
+        If the record has no arrivals, or nothing at all.
+    """
+    info = record.info
+    require_arrivals(record)
+    found = sorted(JournalParts(record.index, info.plant.speed).processes(), key=lambda each: each.name != "plant")
+    if not found:
+        raise ReplayError(f"{record.path}: it ends before any process has noted what it was given")
+    return tuple(found)
+
+
+def require_arrivals(record: RunRecord) -> None:
+    """Raise ReplayError unless everything that the cores were given was recorded."""
+    level = record.info.level
+    if level != "all":
+        has = "the physics alone" if level == "physics" else "decisions, but not what else arrived and when"
+        raise ReplayError(
+            f'{record.path}: cannot be replayed: it was recorded with record = "{level}", so it has {has}; '
+            'run it again with record = "all"'
+        )

@@ -1,0 +1,309 @@
+"""Replay of a record: every core gets again what it got, and decides the same, or the first difference is named.
+
+In wall-clock time each process is made again and called as its journal says: start, tokens, messages at the times of
+their arrival, and its clock. Nothing of the replay goes to another process, so a difference stays where it arises.
+
+In simulated time nothing but the scenario decides what arrives. So the run is made again in one process, and the
+decisions of each agent from what the record says it heard.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from heapq import merge
+from math import inf
+
+from msgspec.structs import replace
+
+from agents.carriers.make import close_laws
+from agents.laws.law import Law
+from plant.build import start_plant
+from scenarios.drivers.inprocess import run_inprocess
+from scenarios.record.recomputation import recomputed
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.difference import Difference, message_difference, row_difference
+from scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
+from scenarios.replay.replay_error import ReplayError
+from scenarios.replay.replayed_process import (
+    MakePlant,
+    Message,
+    ReplayedProcess,
+    agent_again,
+    instance_of,
+    message_of,
+    plant_again,
+    recorded_links,
+    start_plant_of,
+    tick_message,
+)
+from scenarios.short_names import in_order
+from wire.codec import decode
+from wire.journal import Heard, Received
+from wire.messages import PLANT, AnyMessage, Telemetry
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReplayedPart:
+    """The replay of one process, or of the plant's physics."""
+
+    name: str
+    """The agent, or "plant"."""
+    count: int
+    """Number of states of an agent, or of rows of the plant, that were compared."""
+    t_end: float
+    """Run time of the last of them (s)."""
+    difference: Difference | None
+    """The first difference; None if there is none."""
+    note: str = ""
+    """Why not everything was compared; "" if it was."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Replay:
+    """A record beside its replay."""
+
+    parts: tuple[ReplayedPart, ...]
+    """The plant, then each process of an agent."""
+
+    @property
+    def difference(self) -> Difference | None:
+        """The first difference of all in run time; None if the replay gives what was recorded."""
+        found = [part.difference for part in self.parts if part.difference is not None]
+        return min(found, key=lambda difference: difference.t, default=None)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Sentences on what was not compared."""
+        return tuple(dict.fromkeys(part.note for part in self.parts if part.note))
+
+
+def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Replay:
+    """Replay a record.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The record, of any driver.
+    make_plant : MakePlant, optional
+        Starts the plant; None leaves the physics out.
+
+    Raises
+    ------
+    ReplayError
+        If it has no arrivals, or its law, graph or feeder is not here.
+    RecordFileError
+        If it cannot be read.
+    """
+    require_arrivals(record)
+    settings, notes = record.info.plant.settings, []
+    if settings.simulator != "gridpeers" or record.info.plant.bridged:
+        make_plant = None
+        note = "the physics was not replayed: it was not that of our plant alone"
+        notes.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
+    parts = _ticks(record, make_plant) if record.info.clock == "simulated" else _live(record, make_plant)
+    found = [*notes, *parts]
+    names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
+    return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
+
+
+# -------------------------------------------------------------------- wall-clock time
+
+
+def _live(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
+    """Replay all processes side by side, so that the file is read once."""
+    replays = [
+        _PlantReplay(record, process, make_plant) if process.name == PLANT else _AgentReplay(record, process)
+        for process in processes_of(record)
+        if process.name != PLANT or make_plant is not None
+    ]
+    try:
+        for _, number, step in merge(*(_by_time(number, each) for number, each in enumerate(replays))):
+            replays[number].take(step)
+        yield from (each.result() for each in replays)
+    finally:
+        for each in replays:
+            each.close()
+
+
+def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple[float, int, RecordedStep]]:
+    for step in replay.process.steps():
+        if replay.is_over:
+            return
+        yield step.due, number, step
+
+
+class _AgentReplay:
+    """The replay of one process of an agent."""
+
+    def __init__(self, record: RunRecord, process: RecordedProcess) -> None:
+        self.process, self._info = process, record.info
+        self._again: ReplayedProcess | None = None
+        self._laws: list[Law] = []
+        self._count, self._t, self._note = 0, 0.0, ""
+        self._difference: Difference | None = None
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no further step is of use."""
+        return bool(self._note) or self._difference is not None
+
+    def take(self, step: RecordedStep) -> None:
+        """Call the node as in a step, and compare what it sends."""
+        if self.is_over:
+            return
+        name = self.process.name
+        if self._again is None:
+            config, instance = self._info.agent(name), instance_of(step)
+            if config is None or not instance:
+                self._note = f"the record lacks the start of {name}, or its configuration: it was not replayed"
+                return
+            self._again = agent_again(self.process, config, instance, self._laws, recorded_links(self._info, name))
+        message = message_of(self.process, step)
+        if message is None and isinstance(step.entry, Heard | Received):
+            self._note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
+            return
+        ours = [decoded for sent in self._again.take(step, message) if (decoded := tick_message(sent)) is not None]
+        theirs = [decoded for sent in step.sent if (decoded := tick_message(sent)) is not None]
+        for i in range(len(theirs) if step.last else max(len(ours), len(theirs))):
+            a, b = (each[i] if i < len(each) else None for each in (theirs, ours))
+            self._difference = message_difference(a, b)
+            if self._difference is not None or b is None:
+                return
+            self._count, self._t = self._count + 1, b.t
+
+    def result(self) -> ReplayedPart:
+        """Return what came of it."""
+        return ReplayedPart(
+            name=self.process.name,
+            count=self._count,
+            t_end=self._t,
+            difference=self._difference,
+            note=self._note or self.process.ends,
+        )
+
+    def close(self) -> None:
+        """Release what its law has opened."""
+        close_laws(self._laws)
+
+
+class _PlantReplay:
+    """The replay of the plant: its physics, given the states that it heard when it heard them."""
+
+    def __init__(self, record: RunRecord, process: RecordedProcess, make_plant: MakePlant | None) -> None:
+        assert make_plant is not None
+        self.process = process
+        self._plant = start_plant_of(record.info, make_plant)
+        self._rows = ComparedRows(record)
+        self._again = plant_again(process, record.info, self._plant, recorded_links(record.info, PLANT))
+
+    @property
+    def is_over(self) -> bool:
+        """Whether no further step is of use."""
+        return self._rows.difference is not None
+
+    def take(self, step: RecordedStep) -> None:
+        """Call the node as in a step, and compare the rows that it reports."""
+        self._compare(self._again.take(step, message_of(self.process, step)))
+
+    def result(self) -> ReplayedPart:
+        """Return what came of it."""
+        self._compare(self._again.end())
+        rows = self._rows
+        return ReplayedPart(
+            name=PLANT, count=rows.count, t_end=rows.t, difference=rows.difference, note=self.process.ends
+        )
+
+    def _compare(self, sent: list[Message]) -> None:
+        for message in sent:
+            if message.key == "telemetry":
+                self._rows.take(decode(message.payload))
+
+    def close(self) -> None:
+        """End the plant."""
+        self._plant.close()
+
+
+# -------------------------------------------------------------------- both
+
+
+class ComparedRows:
+    """The rows of the plant beside those of the record, as they come.
+
+    Parameters
+    ----------
+    record : RunRecord
+        The record.
+    until : float, optional
+        Run time (s) up to which they are compared.
+    """
+
+    def __init__(self, record: RunRecord, until: float = inf) -> None:
+        self._until = until
+        self._rows = ((message.inverters, row) for message in record.telemetry() for row in message.rows)
+        self._next: tuple[tuple[str, ...], tuple[float, ...]] | None = next(self._rows, None)
+        self._numbers = -1
+        self.count, self.t = 0, 0.0
+        self.difference: Difference | None = None
+        """The first difference; None so far."""
+
+    def take(self, message: AnyMessage) -> None:
+        """Compare the rows of telemetry that come again; some may be missing in the record."""
+        if not isinstance(message, Telemetry) or message.seq <= self._numbers:
+            return
+        self._numbers = message.seq
+        for row in message.rows:
+            while self._next is not None and self._next[1][0] < row[0] - 1e-9:
+                self._next = next(self._rows, None)
+            if self._next is None or self.difference is not None or row[0] > self._until + 1e-9:
+                return
+            inverters, recorded = self._next
+            if recorded[0] <= row[0] + 1e-9:
+                self.difference = row_difference(inverters, recorded, row)
+                self.count, self.t = self.count + 1, row[0]
+
+
+# -------------------------------------------------------------------- simulated time
+
+
+def _ticks(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
+    if make_plant is not None:
+        yield _physics(record, make_plant)
+    for agent in record.agents:
+        yield _decisions(record, agent)
+
+
+def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
+    """Make the run again in this process; only the scenario decides what happens in it."""
+    info, rows, plant = record.info, ComparedRows(record), start_plant_of(record.info, make_plant)
+    try:
+        outcome = run_inprocess(
+            replace(info.plant, record="physics"),
+            [replace(agent, record="physics") for agent in info.agents],
+            rows.take,
+            plant=plant,
+        )
+    except ValueError as error:
+        raise ReplayError(f"the run cannot be made again here: {error}") from None
+    finally:
+        plant.close()
+    note = ""
+    if not all(message.reproducible for message in record.telemetry()):
+        note = "something happened in this run that its scenario does not tell, so that it cannot be made again"
+    elif outcome.broke and record.outcome == "":
+        note = f"the run breaks when it is made again: {outcome.broke}"
+    return ReplayedPart(name=PLANT, count=rows.count, t_end=rows.t, difference=rows.difference, note=note)
+
+
+def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
+    """Make the decisions of an agent again, each from what the record says that it had heard."""
+    count, t = 0, 0.0
+    try:
+        for each in recomputed(record, agent):
+            difference = message_difference(each.decision.state, each.state)
+            if difference is not None:
+                return ReplayedPart(name=agent, count=count, t_end=t, difference=difference)
+            count, t = count + 1, each.decision.t
+    except ValueError as error:
+        raise ReplayError(f"{agent}: its law cannot be made here: {error}") from None
+    return ReplayedPart(name=agent, count=count, t_end=t, difference=None)

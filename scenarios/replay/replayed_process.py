@@ -1,0 +1,237 @@
+"""A process of a recorded run, made again: the same node, called as it was, in no time of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import NamedTuple
+
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from agents.carriers.make import make_law
+from agents.laws.law import Law
+from agents.realtime.realtime_agent import RealtimeAgent
+from plant.plant_config import PlantConfig
+from plant.plant_interface import LivePlant
+from plant.realtime.realtime_plant import RealtimePlant
+from scenarios.drivers.telemetry_client import RECORDER
+from scenarios.emulation.emulated_links import links_of
+from scenarios.live.live_processes import RECORDER_WAIT
+from scenarios.record.record_info import RecordInfo
+from scenarios.replay.recorded_process import EACH_TICK, RecordedProcess, RecordedStep
+from scenarios.replay.replay_error import ReplayError
+from wire.codec import RejectedError, decode, encode
+from wire.journal import Heard, Process, Received, Sent, Token, Woken
+from wire.links import Links
+from wire.messages import PLANT, Measurement, State
+
+MakePlant = Callable[[PlantConfig], LivePlant]
+"""Starts the plant of a configuration."""
+
+
+class Message(NamedTuple):
+    """A message that a node has sent."""
+
+    key: str
+    """Key, without `gridpeers/<run>/`."""
+    payload: bytes
+    """Its bytes."""
+
+
+class _Sent:
+    """Takes what a node sends (`wire.traffic.Traffic`)."""
+
+    def __init__(self, cut: int) -> None:
+        self._cut = cut
+        self.messages: list[Message] = []
+
+    def sent(self, key: str, payload: bytes) -> None:
+        """Take a message that the node sends."""
+        self.messages.append(Message(key[self._cut :], payload))
+
+    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
+        """Take no note: the record has it."""
+
+    def token(self, key: str, at: float, *, appeared: bool) -> None:
+        """Take no note: the record has it."""
+
+    def line(self, text: str) -> None:
+        """Take no note: the record has it."""
+
+
+class ReplayedProcess:
+    """One process, made again.
+
+    Parameters
+    ----------
+    recorded : RecordedProcess
+        The process.
+    node : RealtimeAgent or RealtimePlant
+        Its node, which has not started.
+    links : Links or None
+        The emulated links into it.
+    """
+
+    def __init__(self, recorded: RecordedProcess, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
+        self.recorded, self.node, self.links = recorded, node, links
+        self._root = node.keys.telemetry.removesuffix("telemetry")
+        self._sent = _Sent(len(self._root))
+        node.traffic = self._sent
+
+    @property
+    def name(self) -> str:
+        """Its agent, or "plant"."""
+        return self.recorded.name
+
+    def use_links(self, links: Links) -> None:
+        """Put emulated links before a node that has none."""
+        self.links = links
+        self.node.use_links(links)
+
+    def hears(self, key: str) -> bool:
+        """Return whether it listens on a key."""
+        return self._root + key in self.node.routes and not self.node.finished
+
+    def take(self, step: RecordedStep, message: Message | None = None) -> list[Message]:
+        """Call the node as in a recorded step; return what it sent.
+
+        Parameters
+        ----------
+        step : RecordedStep
+            The call.
+        message : Message, optional
+            The message that it hears in this step, if it hears one.
+        """
+        node, entry = self.node, step.entry
+        if isinstance(entry, Heard | Received):
+            assert message is not None
+            return self.hear(message, entry.at or 0.0)
+        if isinstance(entry, Token):
+            (node.appeared if entry.appeared else node.vanished)(self._root + entry.key, entry.at or 0.0)
+        elif isinstance(entry, Woken):
+            (node.work if entry.work else node.expire)(entry.at)
+        elif isinstance(entry, Process):
+            self._control(entry)
+        return self._take()
+
+    def hear(self, message: Message, at: float) -> list[Message]:
+        """Give the node a message that arrived at this time (s, monotonic); return what it sent."""
+        self.node.received(self._root + message.key, message.payload, at)
+        return self._take()
+
+    def end(self) -> list[Message]:
+        """Have a node whose journal ends before it does report the rest of its rows, or on its links; return that."""
+        node = self.node
+        if isinstance(node, RealtimeAgent):
+            node.leave("its record ends")
+        elif node.phase == "closing":
+            node.expire(inf)
+        else:
+            node.interrupt("its record ends", 0.0)
+        return self._take()
+
+    def _control(self, entry: Process) -> None:
+        node = self.node
+        if entry.kind != "leave":
+            if entry.kind == "session" and isinstance(node, RealtimeAgent):
+                node.session_broken = True  # also of an agent whose session was sound, but not that of its process
+            node.start(entry.at or 0.0)
+        elif isinstance(node, RealtimeAgent):
+            node.asked_to_leave(entry.text)
+
+    def _take(self) -> list[Message]:
+        self.node.take_actions()
+        sent, self._sent.messages = self._sent.messages, []
+        return sent
+
+
+def agent_again(
+    recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
+) -> ReplayedProcess:
+    """Make the process of an agent again; its law is added to a list, to be closed.
+
+    Raises
+    ------
+    ReplayError
+        If its law is not here.
+    """
+    try:
+        law = make_law(config.control)
+    except ValueError as error:
+        raise ReplayError(f"{config.name}: its law cannot be made here: {error}") from None
+    laws.append(law)
+    # the deadline is that of a process, which has found its plant in this run
+    config = replace(config, epoch=recorded.epoch, record="physics", deadline=0.0)
+    return ReplayedProcess(recorded, RealtimeAgent(config, instance, links, law), links)
+
+
+def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, links: Links | None) -> ReplayedProcess:
+    """Make the process of the plant again, around a plant at t = 0."""
+    config = as_run(info, recorded.epoch)
+    return ReplayedProcess(recorded, RealtimePlant(config, plant, links), links)
+
+
+def as_run(info: RecordInfo, epoch: int) -> PlantConfig:
+    """Return the configuration of the plant as its driver has completed it: it waits for its recorder too."""
+    wait = info.plant.wait_for_agents
+    wait = max(RECORDER_WAIT, wait) if info.driver == "live" else wait
+    return replace(info.plant, epoch=epoch, record="physics", recorders=(RECORDER,), wait_for_agents=wait)
+
+
+def recorded_links(info: RecordInfo, name: str) -> Links | None:
+    """Return the emulated links into an agent or the plant, as they were at its start.
+
+    Raises
+    ------
+    ReplayError
+        If they have a fault that is not here.
+    """
+    config = info.agent(name)
+    tree = info.plant.links if name == PLANT else {} if config is None else config.links
+    try:
+        return links_of(name, tree)
+    except ValueError as error:
+        raise ReplayError(f"{name}: its emulated links cannot be made here: {error}") from None
+
+
+def instance_of(step: RecordedStep) -> str:
+    """Return the instance of a process from its first step, which is its start."""
+    entry = step.entry
+    return entry.text.rpartition(" ")[2] if isinstance(entry, Process) and entry.kind == "start" else ""
+
+
+def message_of(process: RecordedProcess, step: RecordedStep) -> Message | None:
+    """Return the message that a process heard in a step; None if it heard none, or the record does not have it."""
+    entry = step.entry
+    if isinstance(entry, Received):
+        return Message(entry.key, entry.payload)
+    if isinstance(entry, Heard):
+        found = process.message(entry, step.t)
+        return None if found is None else Message(entry.key, encode(found))
+    return None
+
+
+def tick_message(message: Message | Sent) -> State | Measurement | None:
+    """Return a state, or a measurement; None of anything else."""
+    if not message.key.startswith(EACH_TICK):
+        return None
+    try:
+        decoded = decode(message.payload)
+    except RejectedError:
+        return None
+    return decoded if isinstance(decoded, State | Measurement) else None
+
+
+def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
+    """Start the plant of a run.
+
+    Raises
+    ------
+    ReplayError
+        If its feeder is not here, or it cannot start.
+    """
+    try:
+        return make_plant(info.plant)
+    except (ValueError, RuntimeError, OSError) as error:
+        raise ReplayError(f"the plant of the record cannot be started here: {error}") from None

@@ -1,0 +1,93 @@
+"""What was, in faint lines, and what would have been, in strong ones: f, P of every inverter, and MPSI."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from scenarios.results.history import Floats
+from scenarios.results.island_membership import worst
+from scenarios.results.plots.case_figures import MEASURES
+from scenarios.results.plots.drawing import Drawing
+from scenarios.results.plots.marks import mark_events, note_above
+from scenarios.results.plots.style import (
+    OTHER_STYLES,
+    PAGE,
+    from_zero,
+    legend_below,
+    name_panel,
+    nominal_line,
+    time_axis,
+)
+
+FAINT: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.6, "linestyle": "-"}
+STRONG: dict[str, Any] = {"alpha": 1.0, "linewidth": 1.1, "linestyle": "-"}
+"""Lines of what was, below, and of what would have been, on top: where they coincide, both are seen."""
+
+BLUE, GREEN = OTHER_STYLES[0][0], OTHER_STYLES[2][0]
+
+KINDS = {True: BLUE, False: GREEN}
+"""Colours of inverters: grid-forming, or not."""
+
+
+def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: float) -> Figure:
+    """Draw two runs, each with one history of the same inverters.
+
+    Parameters
+    ----------
+    was, would_be : Drawing
+        As recorded, and as replayed under changes.
+    words : str
+        The changes, in words.
+    since : float
+        When they begin (s).
+    """
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(7.4, 6.4), layout="constrained")
+        top, middle, bottom = figure.subplots(3, 1, sharex=True)
+        both = ((was, FAINT, "what was"), (would_be, STRONG, f"what would have been: {words}"))
+        for drawing, line, label in both:
+            top.plot(*_measured(drawing, "frequency"), color=BLUE, label=label, **line)
+            _powers(middle, drawing, line)
+        indices = []
+        for drawing, line, _ in both:
+            t, index = _measured(drawing, "MPSI")
+            bottom.plot(t, index, color=BLUE, **line)
+            indices.append(index)
+        from_zero(bottom, indices, MEASURES["MPSI"].bounds)  # type: ignore[arg-type]  # this one has bounds
+        nominal_line(top, was.f_nom)
+        name_panel(top, "Frequency", "mean of the GFM, f (Hz)")
+        name_panel(
+            middle, "Real power of each inverter: grid-forming ones blue, grid-following ones green", "P (pu of rating)"
+        )
+        name_panel(bottom, "Mean power sharing index", "MPSI")
+        for panel in (top, middle, bottom):
+            time_axis(panel, was)
+            mark_events(panel, would_be, labelled=panel is top)
+            if since > 0.0:
+                panel.axvline(since, color="#d55e00", linewidth=1.0, zorder=1)
+            if panel is not bottom:
+                panel.set_xlabel("")
+        if since > 0.0:
+            note_above(middle, "changed from here on", since, "data", "left", colour="#d55e00")
+        legend_below(figure, top)
+    return figure
+
+
+def _measured(drawing: Drawing, name: str) -> tuple[Floats, Floats]:
+    """Return the time and one of `MEASURES` of the drawing's history."""
+    ((case, history),) = drawing.histories.items()
+    measure = MEASURES[name]
+    nominal = drawing.f_nom if measure.nominal is None else measure.nominal
+    of_row = worst(measure.of_row, nominal, drawing.island_intervals)
+    return history.t, of_row(history, drawing.nameplates_in(case))
+
+
+def _powers(axes: Axes, drawing: Drawing, line: dict[str, Any]) -> None:
+    ((_, history),) = drawing.histories.items()
+    for i in range(len(history.inverters)):
+        colour = KINDS[bool(drawing.nameplates.GFM[i])]
+        axes.plot(history.t, history.P[:, i] / drawing.nameplates.s[i], color=colour, **line)

@@ -1,0 +1,171 @@
+"""Runs in simulated time, replayed; and what cannot be replayed is told in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import gridpeers as gp
+from gridpeers.runs.result import Result
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.replay_error import ReplayError
+from tests.command_line import invoke
+from tests.record.recorded_runs import recorded_run
+from wire.journal import RecordLevel
+
+SHORT = """
+seed = 7
+[time]
+end_s = 1.0
+[[event]]
+label = "islanding"
+t_s = 0.2
+open = ["13-152"]
+[case.IV]
+secondary = "all"
+graph = "full"
+[[link]]
+on = "* <-> *"
+loss = 0.2
+"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
+    """Nine agents for a second, a fifth of their messages lost."""
+    folder = tmp_path_factory.mktemp("short")
+    (folder / "short.toml").write_text(SHORT, encoding="utf-8")
+    return gp.load(folder / "short.toml").run("IV", folder=folder / "out")
+
+
+def test_a_replay_gives_the_run(run: Result) -> None:
+    """Rows of the plant and states of every agent are the same within 1e-9."""
+    done = gp.replay(run)
+
+    assert done.difference is None
+    assert [part.name for part in done.parts] == ["plant", *(f"inv{k}" for k in range(1, 10))]
+    assert done.parts[0].count == len(run.history)
+    assert {part.count for part in done.parts[1:]} == {50}
+
+
+def test_messages_without_loss_and_without_a_link(run: Result) -> None:
+    """Nothing is lost by chance; a cut link lets nothing pass from its time on, and all before is as it was."""
+    done = gp.counterfactual(run, without_loss=True, without="inv4 <-> inv7", since=0.5)
+
+    assert done.difference is None
+    assert done.compared == (run.record.t <= 0.5).sum()
+    links = done.would_be.links
+    late = links[links["t"] >= 0.5]
+    cut = late[late["fate"] == "cut"]
+    assert set(zip(cut["src"], cut["dst"], strict=True)) == {("inv4", "inv7"), ("inv7", "inv4")}
+    assert not late["fate"].eq("loss").any()
+    assert links[links["t"] < 0.5]["fate"].eq("loss").sum() == run.links[run.links["t"] < 0.5]["fate"].eq("loss").sum()
+    assert done.would_be.sha256 != run.sha256
+
+
+def test_other_gains_from_the_start(run: Result) -> None:
+    """What would have been under other gains is the run of the scenario with these gains."""
+    done = gp.counterfactual(run, replace={"gains.k_p": 0.002})
+
+    other = gp.load(run.folder.parent / "short.toml").replace({"gains.k_p": 0.002}).run("IV")
+    assert done.would_be.sha256 == other.sha256
+
+
+def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhere: Path) -> None:
+    """The command prints what was beside what would have been, and the folder is one of a run."""
+    code, text = invoke("replay", str(run.folder), "--set", "gains.k_p=0.002", "--out", "would")
+
+    assert code == 0, text
+    assert "short, case IV, in simulated time: gains.k_p = 0.002" in text
+    assert "would be" in text
+    assert isinstance(gp.read("would"), Result)
+    for name in ("IV/history.csv", "metrics.json", "plots/counterfactual.png", "comparison.txt"):
+        assert (elsewhere / "would" / name).stat().st_size > 100
+    code, text = invoke("replay", str(run.folder))
+    assert code == 0, text
+    assert "The replay gives what was recorded, within 1e-9." in text
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--without", "inv4 -> inv77"), 'nobody is called "inv77"'),
+        (("--without", "inv4"), '"inv4" names no links'),
+        (("--law", "dappi"), 'did you mean "dapi"'),
+        (("--set", "gains.kp=1"), 'did you mean "k_p"'),
+        (("--set", "time.end_s=3"), "time.end_s: is no key of agents or links"),
+        (("--set", "gains.k_p"), "needs a key and its value, as gains.k_p=0.001"),
+        (("--set", "gains.k_p=much"), "gains.k_p: must be a number"),
+        (("--without", "inv4 -> inv7", "--from", "7"), "from 7 s: is outside of the record, which has 0 to 1.00 s"),
+        (("--from", "0.5"), "nothing is changed from then on"),
+        (("--law", "dapi", "--from", "0.5"), "in simulated time"),
+    ],
+)
+def test_a_change_that_cannot_be_made_is_told(words: tuple[str, ...], told: str, run: Result, elsewhere: Path) -> None:
+    """In one line each, with exit code 2, and no folder is left that looks like a result."""
+    code, text = invoke("replay", str(run.folder), *words)
+
+    assert code == 2
+    assert told in text
+    assert "Traceback" not in text
+    assert not list(elsewhere.glob("runs/*/*/metrics.json"))
+
+
+def test_what_is_no_record_is_told(tmp_path: Path) -> None:
+    """A folder without one, another file, and one of which only the beginning is there."""
+    (tmp_path / "empty").mkdir()
+    other = tmp_path / "other.mcap"
+    other.write_bytes(b"none of ours" * 20)
+    for path, told in ((tmp_path / "empty", "there is no run.mcap"), (other, "other.mcap")):
+        code, text = invoke("replay", str(path))
+        assert code == 2
+        assert told in text
+        assert len(text.splitlines()) == 1
+
+
+@pytest.mark.parametrize("level", ["decisions", "physics"])
+def test_a_record_without_arrivals_is_told(level: RecordLevel, tmp_path: Path) -> None:
+    """Only what was given to the cores can be given to them again."""
+    (tmp_path / "short.toml").write_text(SHORT, encoding="utf-8")
+    record = recorded_run(tmp_path / "short.toml", "IV", tmp_path / "out", level=level)
+
+    with pytest.raises(ReplayError, match=f'cannot be replayed: it was recorded with record = "{level}"'):
+        gp.replay(record)
+    with pytest.raises(ReplayError, match="cannot be replayed"):
+        gp.counterfactual(record)
+
+
+def test_a_record_that_is_cut_off_is_replayed_up_to_there(run: Result, tmp_path: Path) -> None:
+    """Half of the file has half of the run, and that is the same."""
+    whole = (run.folder / "IV" / "run.mcap").read_bytes()
+    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    record = RunRecord.open(tmp_path)
+
+    done = gp.replay(record)
+
+    assert done.difference is None
+    assert 5 < done.parts[0].count < len(run.history)
+    code, text = invoke("replay", str(tmp_path))
+    assert code == 0, text
+    assert "cut off" in text
+
+
+def test_a_difference_is_named(run: Result, tmp_path: Path) -> None:
+    """With another seed other messages are lost: the first row that differs is told."""
+    from msgspec.structs import replace
+
+    record = RunRecord.open(run.folder / "IV")
+    agents = tuple(
+        replace(agent, control=replace(agent.control, gains=replace(agent.control.gains, k_p=0.001)))
+        for agent in record.info.agents
+    )
+    record.info = replace(record.info, agents=agents)
+
+    found = gp.replay(record).difference
+
+    assert found is not None
+    assert found.quantity == "P_set"
+    assert not np.isclose(found.recorded, found.replayed, rtol=0.0, atol=1e-9)
+    assert str(found).endswith(" W in the replay")
