@@ -191,8 +191,9 @@ def report(
     if peak:
         print(f"{'peak of the command at its end: numbers, figures':51}{peak:9.1f}")
     progress = np.array([sample.written for sample in samples], float)
-    share = (progress - progress[0]) / (progress[-1] - progress[0])
-    busy = np.array([sample.busy for sample in samples])
+    grown = np.flatnonzero(np.diff(progress, prepend=-1.0) > 0.0)  # what ends a run, files to be closed, is no tick
+    share = (progress[grown] - progress[0]) / (progress[-1] - progress[0])
+    busy = np.array([samples[look].busy for look in grown])
     quarters = np.interp([0.0, 0.25, 0.75, 1.0], share, busy)
     ratio = float((quarters[3] - quarters[2]) / (quarters[1] - quarters[0]))
     print(f"processor time per tick, last quarter : first: {ratio:.2f}   {'' if ratio <= 1.0 + STEADY else 'GROWS'}")
@@ -216,7 +217,7 @@ def main() -> int:
     parser.add_argument(
         "--skip", type=float, default=20.0, help="percent of the run that count as warm-up (default 20)"
     )
-    parser.add_argument("--every", type=float, default=0.5, help="seconds between two looks (default 0.5)")
+    parser.add_argument("--every", type=float, default=0.2, help="seconds between two looks (default 0.2)")
     parser.add_argument(
         "--write",
         type=Path,
