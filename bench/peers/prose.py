@@ -56,11 +56,12 @@ LIMITS = """## Where the limit is
   controllers; the build is limited by one sparse factorisation. GridLAB-D solves the whole network by Newton's method
   in every step; it is measured as it is installed. As the plant of our runs it keeps its solver's memory, which saves
   a quarter of its time ([plant.md](plant.md#gridlab-d-as-the-plant)).
-- **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link. A
-  relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save the
-  rest. With three agents a process, 0.4 ms of a tick are those of bare Zenoh and 0.4 ms what one process takes for the
-  same tick; what is left is codec and waiting for one another. On a virtual machine the same tick takes from 1.0 to
-  1.7 ms within an hour: the table's value is the median of an idle one. ZeroMQ over Unix sockets shows what a transport without discovery, routing and TCP costs.
+- **Tick.** Bare Zenoh is the limit of any lock-step over Zenoh: its system calls and wakes, once a message and link.
+  A relay writes what has come for an agent in one go, so that it saves most of them; agents that share a process save
+  the rest. With three agents a process, 0.4 ms of a tick are those of bare Zenoh and 0.4 ms what one process takes
+  for the same tick; what is left is codec and waiting for one another. On a virtual machine the same tick takes from
+  1.0 to 1.7 ms within an hour: the table's value is the median of an idle one. ZeroMQ over Unix sockets shows what a
+  transport without discovery, routing and TCP costs.
 - **One process.** Where a link is emulated, or an agent joins, leaves or dies, each message costs its way through the
   same nodes that processes have (decode, checks, the law's sum). In all other runs no message decides anything, and
   there is none ([architecture.md](architecture.md#design-decisions-and-why)): a third of that cost remains. Either way
