@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import signal
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +12,7 @@ import pytest
 from scenarios.explanation.explanation import explain
 from scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
-from tests.processes.terminals import Desk
+from tests.processes.terminals import Desk, Terminal
 from tests.record.recorded_runs import recorded_run
 
 if TYPE_CHECKING:
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
 
-WAIT = 40_000
+WAIT = 60_000
 """Longest wait (ms) for anything on the page."""
 
 ISLANDED = """
@@ -131,31 +130,54 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Pa
     page.wait_for_selector('body[data-live="lost"]')
 
 
-def test_a_run_is_followed_and_then_offered_as_a_record(desk: Desk, browser: Browser, tmp_path: Path) -> None:
-    """The page moves on with the run, says that it has ended, and has its slider at any time; Ctrl-C ends the page."""
-    (tmp_path / "it.toml").write_text(ISLANDED.format(end=3.0), encoding="utf-8")
-    words = ("it.toml", "--clock", "wall", "--speed", "0.5", "--view", "--port", "0", "--out", "out")
-    run = desk.open_bare("run", *words)
+def run_with_page(desk: Desk, browser: Browser, end: float, *words: str) -> tuple[Terminal, Page]:
+    """A run with its page, which is opened at once."""
+    (desk.folder / "it.toml").write_text(ISLANDED.format(end=end), encoding="utf-8")
+    run = desk.open_bare("run", "it.toml", *words, "--view", "--port", "0", "--out", "out")
     url = run.expect(r"open (http://\S+) in a browser; the page follows the run")[1]
     page = browser.new_page(viewport={"width": 1500, "height": 1200})
     page.set_default_timeout(WAIT)
     page.goto(url)
+    return run, page
+
+
+def test_a_run_is_followed(desk: Desk, browser: Browser) -> None:
+    """The page moves on with the run, and stays at a time that was chosen; Ctrl-C ends both."""
+    run, page = run_with_page(desk, browser, 3000.0, "--driver", "inprocess")
     page.wait_for_selector('body[data-live="recording"]')
-    page.wait_for_function("() => gridpeersView.frame?.t > 0.3")
-    assert "The run goes on" in page.locator("#live").inner_text()
-    page.wait_for_selector('body[data-live="record"]')
+    page.locator("#live", has_text="The run goes on").wait_for()
+    page.wait_for_function("() => gridpeersView.frame?.t > 1.0")
+
+    page.locator("#slider").focus()
+    page.keyboard.press("Home")
+    shows(page, 0.0)
+    end = page.evaluate("() => gridpeersPlayer.end")
+    page.wait_for_function("end => gridpeersPlayer.end > end + 0.5", arg=end)
+    shows(page, 0.0)
+    page.keyboard.press("End")
+    page.wait_for_function("end => gridpeersView.frame.t > end + 0.5", arg=end)
+    run.signal(signal.SIGINT)
+    assert run.end() == 130
+    page.wait_for_selector('body[data-live="lost"]')
+
+
+def test_a_run_that_has_ended_is_offered_as_a_record(desk: Desk, browser: Browser) -> None:
+    """Its page, opened before its begin, has its slider after its end; Ctrl-C ends the page, and the run ended well."""
+    run, page = run_with_page(desk, browser, 1.0, "--clock", "wall")
     run.expect(r"the run has ended; http://\S+ shows its record until Ctrl-C")
-    shows(page, 3.0)
+    page.wait_for_selector('body[data-live="record"]')
+    shows(page, 1.0)
+    assert page.locator("#run").inner_text() == "islanded, case one"
 
     page.locator("#slider").focus()
     page.keyboard.press("Home")
     shows(page, 0.0)
     page.get_by_label("Show how inv4 decided").click()
-    page.locator("#decision-text", has_text=re.compile(r"inv4")).wait_for()
+    page.locator("#decision-text", has_text="inv4").wait_for()
     run.signal(signal.SIGINT)
     assert run.end() == 0
     page.wait_for_selector('body[data-live="lost"]')
-    assert RunRecord.open(tmp_path / "out" / "one").complete
+    assert RunRecord.open(desk.folder / "out" / "one").complete
 
 
 def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
