@@ -11,6 +11,7 @@ from wire.plugins.plugin import Plugin
 from wire.schema.plausible import Plausible, Range, Unit
 from wire.schema.relations import Below
 from wire.schema.table_schema import NO_KEY, Example, Label
+from wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
@@ -204,6 +205,10 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""
     record: RecordLevel = "physics"
     """How much this process notes in its journal, which a recorder gets."""
+    credentials: Credentials | None = None
+    """Certificate of this process and members of its site; None: links are open."""
+    inverters: tuple[str, ...] = ()
+    """With certificates: names of all inverters of the feeder, whose agents may come later; else empty."""
 
     def by_own_clock(self) -> AgentConfig:
         """Return the configuration in simulated time, where a clock that is off makes the period seem longer."""

@@ -92,6 +92,8 @@ def _check(configs: Sequence[AgentConfig]) -> None:
                     f"{config.name}: {key} {getattr(config, key)!r} differs from that of {first.name}; "
                     "agents of one process share it"
                 )
+    if len(configs) > 1 and first.credentials is not None:
+        raise ConfigurationError(f"agents of one process have one certificate; start that of {configs[1].name} alone")
     names = [config.name for config in configs]
     if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
         raise ConfigurationError(f"agents {', '.join(twice)} stand twice in the configuration")
@@ -102,6 +104,7 @@ def _one_session_after_the_other(
 ) -> tuple[AnyAgent, ...]:
     """Take part with one session, and open a new one whenever the last was broken."""
     first = configs[0]
+    credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
     made: list[Law] = []
     for config in configs:
         try:
@@ -113,7 +116,14 @@ def _one_session_after_the_other(
     nodes: tuple[AnyAgent, ...] = ()
     core: AnyAgent | NodeGroup | None = None
     while core is None or core.session_broken:
-        session = Session(first.name, listen=first.listen, connect=first.connect, clock=first.clock, star=first.star)
+        session = Session(
+            first.name,
+            listen=first.listen,
+            connect=first.connect,
+            clock=first.clock,
+            star=first.star,
+            credentials=credentials,
+        )
         try:
             if core is None:
                 nodes = tuple(
@@ -121,6 +131,9 @@ def _one_session_after_the_other(
                     for config, law in zip(configs, made, strict=True)
                 )
                 core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
+            if credentials is not None:
+                for node in nodes:
+                    node.vouches = session.vouches
             _take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
             session.close()

@@ -16,6 +16,7 @@ import msgspec
 
 from scenarios.drivers.children import Child, Children
 from wire.driver.session import Session
+from wire.trust.credentials import Credentials
 
 STAMP = 8
 """Bytes of a time (s)."""
@@ -44,6 +45,8 @@ class Role(msgspec.Struct, frozen=True):
     listen: tuple[str, ...]
     connect: tuple[str, ...]
     """Endpoints."""
+    credentials: Credentials | None = None
+    """Certificate of the process; None: links are open."""
 
 
 def sent_at(payload: bytes) -> float:
@@ -52,7 +55,15 @@ def sent_at(payload: bytes) -> float:
 
 
 def one_way(
-    size: int, count: int, *, key: str, receiver: tuple[str, ...], sender: tuple[str, ...], connect: tuple[str, ...]
+    size: int,
+    count: int,
+    *,
+    key: str,
+    receiver: tuple[str, ...],
+    sender: tuple[str, ...],
+    connect: tuple[str, ...],
+    receiver_credentials: Credentials | None = None,
+    sender_credentials: Credentials | None = None,
 ) -> list[float]:
     """Return the times (s) that so many messages of so many bytes took at the rate of ticks.
 
@@ -66,10 +77,12 @@ def one_way(
         Where the two listen.
     connect : tuple[str, ...]
         What both connect to, beside what the other listens on: the plant of a run, or nothing.
+    receiver_credentials, sender_credentials : Credentials or None, optional
+        Their certificates; None: links are open.
     """
     first = tuple(endpoint for endpoint in receiver if not endpoint.endswith(":0"))
-    receive = Role("receive", key, size, count, receiver, connect)
-    return _pair(receive, Role("send", key, size, count, sender, first + connect))
+    receive = Role("receive", key, size, count, receiver, connect, receiver_credentials)
+    return _pair(receive, Role("send", key, size, count, sender, first + connect, sender_credentials))
 
 
 def round_trip(size: int, count: int, *, key: str, endpoint: str) -> list[float]:
@@ -139,7 +152,9 @@ WARM_UP = 25
 
 def run(config: Role) -> None:
     """Be one of the two processes."""
-    session = Session(config.role, listen=config.listen, connect=config.connect, clock="wall")
+    session = Session(
+        config.role, listen=config.listen, connect=config.connect, clock="wall", credentials=config.credentials
+    )
     match config.role:
         case "send":
             send(session, config.key, config.size)

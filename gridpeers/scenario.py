@@ -190,6 +190,10 @@ class Scenario:
         driver : {"inprocess", "processes"}
             All in this process, or a plant process and processes of agents over Zenoh. In simulated time both give the
             same bytes.
+        keys : str or Path, optional
+            With the driver "processes": folder with the certificates of plant and agents (`gridpeers keys init`). Links
+            are then mutual TLS, and each process may send only what is its own. Without it links are open, on the
+            loopback.
         processes : int
             With the driver "processes": number of processes that the agents share; 0 gives each agent its own. An
             agent that the scenario starts, stops, kills or pauses has its own in any case.

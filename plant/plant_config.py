@@ -14,6 +14,7 @@ from plant.simulator import Simulator
 from wire.journal import RecordLevel
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
+from wire.trust.credentials import Credentials
 
 
 class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -195,5 +196,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""
     record: RecordLevel = "physics"
     """How much this process notes in its journal, which a recorder gets."""
+    credentials: Credentials | None = None
+    """Certificate of this process and members of its site; None: links are open."""
     feeder_map: dict[str, Any] = {}
     """Wall-clock: the one-line diagram (`scenarios.live.feeder_map`), as a tree, for clients that draw it."""

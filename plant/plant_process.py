@@ -75,7 +75,15 @@ def run_plant(
         schedule_as_batch()
     plant: LivePlant | None = None
     listen, connect = config.listen, config.connect
-    session = Session("plant", listen=listen, connect=connect, clock=config.clock, rendezvous=True, star=config.star)
+    session = Session(
+        "plant",
+        listen=listen,
+        connect=connect,
+        clock=config.clock,
+        rendezvous=True,
+        star=config.star,
+        credentials=config.credentials,
+    )
     try:
         on_word(LISTENING)
         try:
@@ -87,6 +95,8 @@ def run_plant(
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:
             return f"plant: cannot start: {error}"
+        if config.credentials is not None:
+            node.vouches = session.vouches
         for key in node.publications:
             session.prepare(key)
         for name, agent_config in config.agent_configs.items():

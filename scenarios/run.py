@@ -74,6 +74,8 @@ class Request(RunMetrics):
     """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""
 
     driver: Driver
+    keys: str | Path | None = None
+    """Folder with the certificates of plant and agents; None: links are open, on the loopback."""
     processes: int = 0
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
@@ -315,6 +317,13 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
             plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)
         )
         agents = tuple(agent for agent in agents if agent.name not in request.outside)
+    if request.keys is not None:
+        from scenarios.drivers.secured import secured
+
+        inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
+        started = {agent.name for agent in agents}
+        plant = msgspec.structs.replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
+        plant, agents, _ = secured(plant, agents, Path(request.keys), started=started, inverters=inverters)
     if request.clock == "simulated":
         return plant, agents
     if request.driver != "processes":

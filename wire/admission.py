@@ -11,7 +11,7 @@ when the link delivers it.
   it is believed again after a while.
 
 This is no protection against an attacker who listens and then sends under another's name, in its epoch and with its
-next number: that needs keys and certificates, which Zenoh has (docs/protocol.md).
+next number: that needs certificates (docs/security.md).
 """
 
 from __future__ import annotations

@@ -35,6 +35,7 @@ KINDS = {
     "not finite": "a number in it is NaN or infinite",
     "implausible": "a value in it is beyond its physical bounds, or contradicts another",
     "foreign": "on a key of another run, or from another sender than the key names",
+    "impostor": "from a process whose link has a certificate of another name",
     "ghost": "from another epoch than the sender's valid one",
     "stale": "about a past tick or roster",
     "unexpected": "well-formed, but not for this receiver at this time",

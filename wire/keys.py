@@ -8,10 +8,15 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
+from typing import Literal
 
 import msgspec
 
 from wire.bounds import MOST_COUNT, is_name
+from wire.trust.member import ROLES, Role
+
+READING = ("status", "links", "telemetry")
+"""Verbs of commands that change nothing: they have a key of their own, on which viewers may publish."""
 
 LATEST_ONLY = ("measurement", "state", "set_points", "status")
 """Kinds of keys of which only the newest message matters: in wall-clock time a sender drops it rather than wait."""
@@ -20,13 +25,16 @@ LATEST_ONLY = ("measurement", "state", "set_points", "status")
 ANY_ALIVE_PLANT = "gridpeers/*/alive/plant/*"
 """Tokens of the plants of all runs, for an error message that lists the running ones."""
 
+ANY_TOKEN = "gridpeers/*/alive/**"
+"""All tokens of all runs."""
+
 
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
-    """One kind of key, for the protocol's documentation."""
+    """One kind of key, for the protocol's documentation and for access rules (`wire.trust.access_rules`)."""
 
     expression: str
     """The key, with its parts in angle brackets."""
-    kind: str
+    kind: Literal["publication", "queryable", "token"]
     """publication, queryable or token (of liveliness)."""
     message: str
     """Type of the message, or "-" for a token."""
@@ -36,6 +44,19 @@ class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
     """The participants that subscribe, query or watch."""
     when: str
     """Time at which it is sent or held."""
+    writers: tuple[Role, ...]
+    """Roles of members of a site that may publish, answer or hold it; an agent only with its own name in the key."""
+    readers: tuple[Role, ...]
+    """Roles that may subscribe, query or watch."""
+
+    @property
+    def to_one_agent(self) -> bool:
+        """Whether an agent may read it only with its own name in the key."""
+        return self.kind == "publication" and "<inverter>" in self.expression and "agent" not in self.writers
+
+    def pattern(self, inverter: str = "*") -> str:
+        """Return Zenoh's key expression for these keys in all runs, of one inverter or of all."""
+        return re.sub("<[a-z]+>", "*", self.expression.replace("<inverter>", inverter))
 
 
 def check_name(what: str, name: str) -> None:
@@ -74,6 +95,7 @@ class Keys:
         self.control = f"{self._root}/control"
         self.telemetry = f"{self._root}/telemetry"
         self.command = f"{self._root}/command"
+        self.request = f"{self._root}/request"
         self.feeder_map = f"{self._root}/feeder_map"
         self.any_alive = f"{self._root}/alive/**"
 
@@ -145,6 +167,16 @@ class Keys:
         """Return the key of a recorder's token."""
         return f"{self._root}/alive/recorder/{recorder}"
 
+    def for_verb(self, verb: str) -> str:
+        """Return the key of a command, by its verb: that of requests if it changes nothing.
+
+        Examples
+        --------
+        >>> Keys("demo").for_verb("status"), Keys("demo").for_verb("open")
+        ('gridpeers/demo/request', 'gridpeers/demo/command')
+        """
+        return self.request if verb in READING else self.command
+
     def parts(self, key: str) -> tuple[str, ...]:
         """Split a key of this run into its parts after ``gridpeers/<run>/``; empty for any other key.
 
@@ -194,91 +226,142 @@ def describe() -> tuple[KeySpec, ...]:
     """Every kind of key with its message, its two ends and its time; `gridpeers doc keys` prints it."""
     keys = Keys("RUN")
 
-    def row(key: str, kind: str, message: str, sender: str, listener: str, when: str) -> KeySpec:
+    def row(
+        key: str,
+        kind: Literal["publication", "queryable", "token"],
+        message: str,
+        sender: str,
+        listener: str,
+        when: str,
+        writers: tuple[Role, ...],
+        readers: tuple[Role, ...],
+    ) -> KeySpec:
         expression = key.replace("RUN", "<run>").replace("INV", "<inverter>").replace("INSTANCE", "<instance>")
         expression = expression.replace("EPOCH", "<epoch>").replace("NAME", "<recorder>").replace("ASKER", "<id>")
-        return KeySpec(expression=expression, kind=kind, message=message, sender=sender, listener=listener, when=when)
+        return KeySpec(
+            expression=expression,
+            kind=kind,
+            message=message,
+            sender=sender,
+            listener=listener,
+            when=when,
+            writers=writers,
+            readers=readers,
+        )
 
     agent, instance = "INV", "INSTANCE"
+    by_plant: tuple[Role, ...] = ("plant",)
+    by_agent: tuple[Role, ...] = ("agent",)
+    people: tuple[Role, ...] = ("plant", "operator", "viewer")  # the recorder on the plant's host has its certificate
     return (
         row(
             keys.alive_plant("EPOCH"), "token", "-", "plant", "agents, recorders",
             "as long as the plant's session lives; declared after its subscribers; says the epoch of its messages",
+            by_plant, ROLES,
         ),
         row(
             keys.alive_agent(agent, instance), "token", "-", "agent", "plant, other agents",
             "while the agent's session lives; declared after its subscribers and its queryable",
+            by_agent, ROLES,
         ),
         row(
             keys.alive_recorder("NAME"), "token", "-", "recorder", "plant",
             "until the final telemetry is in; declared after its subscriber",
+            ("plant", "operator"), ROLES,
         ),
         row(
             keys.nameplate(agent, instance), "queryable", "Nameplate", "agent", "plant, other agents",
             "asked when a token appears; by a neighbour once more, as proof that its subscription has arrived",
+            by_agent, ("plant", "agent"),
         ),
-        row(keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end"),
+        row(
+            keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end",
+            by_plant, by_agent,
+        ),
         row(
             keys.stop_request(agent, instance), "publication", "Stop", "plant", "the one instance",
             "when its name is taken or is no inverter of the feeder; wall-clock: on `gridpeers stop`",
+            by_plant, by_agent,
         ),
         row(
             keys.ready(agent), "publication", "Ready", "agent", "plant",
             "when it has proof to hear every in-neighbour on the roster",
+            by_agent, by_plant,
         ),
-        row(keys.measurement(agent), "publication", "Measurement", "plant", "agent", "at every tick: it is the grant"),
+        row(
+            keys.measurement(agent), "publication", "Measurement", "plant", "agent", "at every tick: it is the grant",
+            by_plant, by_agent,
+        ),
         row(
             keys.state(agent), "publication", "State", "agent", "plant, neighbours",
             "at every tick, once its measurement and the neighbours' states of the tick before are in",
+            by_agent, ("plant", "agent"),
         ),
         row(
             keys.set_points(agent), "publication", "State", "agent", "plant",
             "wall-clock: instead of state, at a tick at which the law sends nothing to the neighbours",
+            by_agent, by_plant,
         ),
         row(
             keys.telemetry, "publication", "Telemetry, LinkReport, Journal, LinkRequest", "plant", "recorders",
             "at tick 0, every tenth tick (wall-clock: every 0.2 s), and at the end",
+            by_plant, people,
         ),
         row(
             keys.report(agent), "publication", "LinkReport", "agent", "plant, which publishes it on telemetry",
             "in a run with emulated links: every 100 ticks, and when it ends",
+            by_agent, by_plant,
         ),
         row(
             keys.journal(agent), "publication", "Journal", "agent", "plant, which publishes it on telemetry",
             "in a recorded run: when the way in which the agent decides changes; wall-clock: every 0.2 s",
+            by_agent, by_plant,
         ),
         row(
             keys.link_request(agent), "publication", "LinkRequest", "plant", "agent",
             "wall-clock: at each link command, and all of them to an agent that joins; again "
             "every second, until it is acknowledged",
+            by_plant, by_agent,
         ),
         row(
             keys.link_acknowledgement(agent), "publication", "LinkAcknowledgement", "agent",
             "plant, which publishes it on the client's key",
             "wall-clock: one for every LinkRequest, in their order",
+            by_agent, by_plant,
         ),
         row(
             keys.leave(agent), "publication", "Leave", "agent", "plant",
             "wall-clock: when it leaves properly; the plant then takes its inverter off the network",
+            by_agent, by_plant,
         ),
         row(
             keys.status(agent), "publication", "AgentStatus", "agent", "plant, watchers",
             "wall-clock: every 0.5 s of wall time, and when its phase or its neighbours in use change",
+            by_agent, people,
         ),
         row(
             keys.config(agent), "queryable", "-", "plant", "an agent of a live run",
             "wall-clock: asked once the plant's token is there; its AgentConfig as JSON",
+            by_plant, ROLES,
         ),
         row(
             keys.feeder_map, "queryable", "-", "plant", "a client that draws the feeder",
             "wall-clock: asked once the plant's token is there; buses, branches, switches, inverters as JSON",
+            by_plant, people,
         ),
         row(
             keys.command, "publication", "Command", "command line", "plant",
-            "wall-clock: once the plant's token is there",
+            "wall-clock: once the plant's token is there, to change something",
+            ("operator",), by_plant,
+        ),
+        row(
+            keys.request, "publication", "Command", "command line, recorder", "plant",
+            "wall-clock: once the plant's token is there, to learn something (status, links, telemetry)",
+            ROLES, by_plant,
         ),
         row(
             keys.answer("ASKER"), "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
             "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too",
+            by_plant, ROLES,
         ),
     )  # fmt: skip

@@ -75,6 +75,8 @@ class Node:
         self.members = Membership(self.admission)
         self._name = name
         self.routes: dict[str, Route] = {}
+        self.vouches: Callable[[str], bool] | None = None
+        """Says whether a link of this process has the certificate of a sender; None if links have no certificates."""
         self.journal: JournalBuffer | None = None
         """Entries for the record since the last part; None if this node keeps no journal."""
         self.traffic: Traffic | None = None
@@ -151,6 +153,7 @@ class Node:
         self._actions.append(Fetch(key))
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
+        self._check_certificate(nameplate.sender)
         if self.members.meet(instance, nameplate):
             self._met(nameplate, now)
 
@@ -173,6 +176,14 @@ class Node:
             raise RejectedError("foreign", f"sender {message.sender}, {route.sender} was expected")
         if not route.early:
             self.admission.check(message)
+
+    def _check_certificate(self, name: str) -> None:
+        """Raise RejectedError if no link has the certificate of a name whose epoch is to be learnt.
+
+        Access rules keep others off that name's keys; this check does not depend on them.
+        """
+        if self.vouches is not None and not self.vouches(name):
+            raise RejectedError("impostor", f"{name} says who it is, but no link has the certificate of {name}")
 
     def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
         """Note a message under another sender's key."""

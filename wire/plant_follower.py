@@ -48,6 +48,7 @@ class PlantFollower(Node):
         """Check a message; first follow its plant if this node follows none."""
         epoch = message.epoch
         if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
+            self._check_certificate(PLANT)
             self.admission.bind(PLANT, epoch)
             self._follow(epoch)
         super()._admit(route, message, now)

@@ -52,6 +52,7 @@ OWN_COMMANDS = {
         ("event", "live_commands:event", "Open or close a switch of a running plant."),
         ("load", "load_command:load", "Set a load of a running plant."),
         ("link", "link:link", "Hurt and heal links while a run goes on."),
+        ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
         ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
         ("bridge", "bridge_command:app", "Offer our plant to simulators of others."),
     )

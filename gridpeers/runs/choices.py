@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TypedDict, get_args
 
 import msgspec
@@ -51,6 +52,7 @@ class Pace(TypedDict, total=False):
     speed: float
     strict: bool
     processes: int
+    keys: str | Path | None
 
 
 def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str = "") -> None:
@@ -74,6 +76,17 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
         )
     if processes and driver == "inprocess":
         raise ScenarioError([f"{dash}processes: needs {dash}driver processes; in one process all agents share it"])
+    keys = pace.get("keys")
+    if keys is not None and not isinstance(keys, str | Path):
+        raise ScenarioError([f"{dash}keys: must be the path of a folder with certificates, got {keys!r:.60}"])
+    if keys is not None and driver == "inprocess":
+        raise ScenarioError([f"{dash}keys: needs {dash}driver processes; in one process there is no link to secure"])
+    if keys is not None and processes:
+        raise ScenarioError(
+            [f"{dash}processes: agents of one process have one certificate; leave it out with {dash}keys"]
+        )
+    if keys is None and driver == "processes" and spec.security == "mtls":
+        raise ScenarioError([model.NEEDS_KEYS])
     if clock == "simulated":
         if speed != 1.0 or strict:
             name = "strict" if strict else "speed"

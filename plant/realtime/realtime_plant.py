@@ -20,7 +20,8 @@ from plant.realtime.live_plant_node import AGAIN, LivePlantNode
 from plant.realtime.pacer import RealTimePacer
 from plant.realtime.run_commands import RunCommands
 from plant.telemetry_reporter import measurement_of
-from wire.codec import encode
+from wire.codec import RejectedError, encode
+from wire.keys import READING
 from wire.links import REPORT_TICKS, Links
 from wire.messages import PLANT, Command, PlantEvent, Waiting
 from wire.node import ANYBODY, CLOCK_ALONE, Route
@@ -64,6 +65,7 @@ class RealtimePlant(LivePlantNode):
         self._stays = False
         """Whether the end is kept back only for recorders."""
         self.routes[self.keys.command] = Route(ANYBODY, (Command,), self._on_command)
+        self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
 
@@ -162,6 +164,11 @@ class RealtimePlant(LivePlantNode):
             self.phase = "over"
 
     # ---------------------------------------------------------------- messages
+
+    def _on_request(self, command: Command, payload: bytes, now: float) -> None:
+        if command.verb not in READING:
+            raise RejectedError("unexpected", f'"{command.verb}" on the key of those who only read')
+        self._on_command(command, payload, now)
 
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:
         answer = self._commands.answer(command, now)

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 from msgspec.structs import replace
 
@@ -101,7 +102,9 @@ def run_processes(
     endpoint = free_endpoint(*plant_config.listen[:1])
     deadline = "deadline" if wall else "plant_wait"  # an agent that waits for the plant waits for its compiler too
     star = star and not wall
-    own = {deadline: BUILD_DEADLINE, "connect": (endpoint,), "star": star}
+    own: dict[str, Any] = {deadline: BUILD_DEADLINE, "connect": (endpoint,), "star": star}
+    if plant_config.credentials is not None:
+        own["listen"] = ("tls/127.0.0.1:0",)
     configs = [replace(config, **own) for config in agents.values()]
     plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,), star=star)
     first = [name for name in agents if name in plant_config.agents]
@@ -137,7 +140,9 @@ class _ProcessDriver:
         on_journal: Callable[[Journal | LinkRequest], None],
         on_status: Callable[[str], None] | None,
     ) -> None:
-        self.client = TelemetryClient(RECORDER, config.run, config.listen[0], config.clock, self._take)
+        self.client = TelemetryClient(
+            RECORDER, config.run, config.listen[0], config.clock, self._take, config.credentials
+        )
         self.broke = ""
         """Why the run broke; "" after a good end."""
         self._T_c, self._wall = config.T_c, config.clock == "wall"

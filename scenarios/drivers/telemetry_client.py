@@ -10,6 +10,7 @@ from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
 from wire.driver.session import Clock, Session
 from wire.messages import Pacing, Telemetry
+from wire.trust.credentials import Credentials
 
 RECORDER = "history"
 """Name of a driver's recorder in its run."""
@@ -36,11 +37,20 @@ class TelemetryClient:
         The run's kind of time.
     on_message : Callable[[Recordable], None]
         Called with each message, in the order in which the plant published them.
+    credentials : Credentials or None, optional
+        Own certificate and members of the site; None if links are open.
     """
 
     def __init__(
-        self, name: str, run: str, endpoint: str, clock: Clock, on_message: Callable[[Recordable], None]
+        self,
+        name: str,
+        run: str,
+        endpoint: str,
+        clock: Clock,
+        on_message: Callable[[Recordable], None],
+        credentials: Credentials | None = None,
     ) -> None:
+        self._credentials = credentials
         self._name, self._endpoint, self._clock, self._on_message = name, endpoint, clock, on_message
         self.latest: Telemetry | None = None
         """The latest telemetry; None before the first."""
@@ -112,7 +122,16 @@ class TelemetryClient:
 
     def _open(self) -> Session:
         keys = self._core.keys
-        session = Session(self._name, connect=(self._endpoint,), gossip=False, clock=self._clock, inbox=self.inbox)
+        session = Session(
+            self._name,
+            connect=(self._endpoint,),
+            gossip=False,
+            clock=self._clock,
+            inbox=self.inbox,
+            credentials=self._credentials,
+        )
+        if self._credentials is not None:
+            self._core.vouches = session.vouches
         session.watch(keys.alive_plant("*"))  # before it subscribes: so it knows the plant when the plant speaks
         for key in self._core.subscriptions:
             session.subscribe(key)
@@ -126,4 +145,4 @@ class TelemetryClient:
             self._session = self._open()
         question = self._core.question(now)
         if question is not None:
-            self._session.publish(self._core.keys.command, question)
+            self._session.publish(self._core.keys.request, question)

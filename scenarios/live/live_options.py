@@ -15,6 +15,7 @@ from scenarios.live.run_speed import SPEEDS
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
 from scenarios.schema.netem_tables import netem_of, setup_of
+from scenarios.schema.scenario_model import NEEDS_KEYS
 from wire.driver.command_line import command_line
 from wire.journal import RecordLevel
 from wire.schema.suggestion import suggestion
@@ -35,6 +36,8 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     """Run time (s) after which the run ends; None for no end."""
     recorded: bool = False
     """Whether the run is recorded, as its scenario says."""
+    secured: bool = False
+    """Whether the processes have certificates."""
     strict: bool = False
     """Whether the run breaks when the plant cannot keep pace."""
 
@@ -88,6 +91,8 @@ def configure(
             f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
             'or "gridpeers"'
         )
+    if scenario.security == "mtls" and not options.secured:
+        raise UsageError(NEEDS_KEYS)
     case = chosen_case(scenario, options.case)
     plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
     # links are emulated even without a fault: gridpeers link may set one during the run

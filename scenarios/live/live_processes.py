@@ -111,7 +111,14 @@ def plant_here(
             raise
 
     recorder = LiveRecorder(
-        config.run, loopback_of(config.listen[0]), say, folder, silent=LOGGED, link_log=link_log, record=record
+        config.run,
+        loopback_of(config.listen[0]),
+        say,
+        folder,
+        silent=LOGGED,
+        link_log=link_log,
+        record=record,
+        credentials=config.credentials,
     )
     return _follow(recorder, run)
 
@@ -174,7 +181,9 @@ def all_here(
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
-    recorder = LiveRecorder(config.run, endpoint, say, folder, link_log=link_log, record=record)
+    recorder = LiveRecorder(
+        config.run, endpoint, say, folder, link_log=link_log, record=record, credentials=config.credentials
+    )
     return _follow(recorder, run)
 
 
@@ -220,7 +229,9 @@ def agent_here(
                 "the plant; if you trust it, say --own-code"
             )
         listen = listen or return_path((*where.connect, *configs[0].connect))
-        process = tuple(replace(config, connect=where.connect, listen=listen) for config in configs)
+        process = tuple(
+            replace(config, connect=where.connect, listen=listen, credentials=where.credentials) for config in configs
+        )
         return ProcessOutcome(broke=run_agents(process, links_of))
     except (StoppedError, KeyboardInterrupt) as stop:
         return ProcessOutcome(interrupted=_signal_of(stop))

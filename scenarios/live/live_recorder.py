@@ -16,6 +16,7 @@ from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.messages import LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
+from wire.trust.credentials import Credentials
 
 _STOP = "stop"
 
@@ -43,6 +44,8 @@ class LiveRecorder:
         Takes the plant's messages on commands to links.
     record : RecordInfo, optional
         The run, for its record run.mcap in the folder; None writes none.
+    credentials : Credentials or None, optional
+        Own certificate and members of the site; None if links are open.
     """
 
     def __init__(
@@ -55,7 +58,9 @@ class LiveRecorder:
         silent: Collection[str] = (),
         link_log: LinkLog | None = None,
         record: RecordInfo | None = None,
+        credentials: Credentials | None = None,
     ) -> None:
+        self._credentials = credentials
         self._say, self._silent, self._link_log = say, silent, link_log
         self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
         self.recorded: Recorded | None = None
@@ -69,7 +74,7 @@ class LiveRecorder:
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
     def __enter__(self) -> LiveRecorder:
-        self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take)
+        self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take, self._credentials)
         self._thread.start()
         return self
 

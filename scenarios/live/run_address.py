@@ -6,10 +6,12 @@ import re
 import socket
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from scenarios.drivers.free_endpoint import parse_endpoint
+from scenarios.live.access import Access
 from wire.keys import check_name as check_key_part
+from wire.trust.credentials import Credentials
 
 RUN = "gridpeers"
 """Default name of a run."""
@@ -39,6 +41,10 @@ class RunAddress:
     """Name of the run, part of every key."""
     connect: tuple[str, ...]
     """Endpoints to connect to; one that answers is enough."""
+    credentials: Credentials | None = None
+    """Own certificate and members of the site; None if links are open."""
+    access: Access = field(default_factory=Access)
+    """The options that gave them, for commands that start others."""
 
     def __str__(self) -> str:
         """Return it as messages name it.
@@ -182,10 +188,11 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
     >>> return_path(("tcp/127.0.0.1:7447",)), return_path(("tcp/192.168.1.10:7447",))
     (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
     """
+    protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
     far = [host for host in _hosts(connect) if not host.startswith(_LOOPBACKS)]
     if not far:
-        return ("tcp/127.0.0.1:0",)
-    return ("tcp/[::]:0",) if far[0].startswith("[") else ("tcp/0.0.0.0:0",)
+        return (f"{protocol}/127.0.0.1:0",)
+    return (f"{protocol}/[::]:0",) if far[0].startswith("[") else (f"{protocol}/0.0.0.0:0",)
 
 
 def is_loopback(connect: tuple[str, ...]) -> bool:

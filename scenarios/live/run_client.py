@@ -22,6 +22,7 @@ from wire.driver.command_line import command_line
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
 from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
+from wire.trust.credentials import Credentials
 
 VISITOR = "visitor"
 
@@ -67,7 +68,12 @@ class RunClient:
         """Tokens of agents: inverter -> its instances."""
         self._runs.clear()
         self._session = Session(
-            VISITOR, listen=self._listen, connect=self.where.connect, clock="wall", meets_all=self._meet_agents
+            VISITOR,
+            listen=self._listen,
+            connect=self.where.connect,
+            clock="wall",
+            meets_all=self._meet_agents,
+            credentials=self.where.credentials,
         )
         for key in (self.keys.answer(self._session.id), *self._heard):
             self._session.subscribe(key)
@@ -224,7 +230,13 @@ class RunClient:
 
     def _nobody(self, wait: float) -> str:
         if not self._session.peers():
-            if mute := accepting(self.where.connect):
+            mute = accepting(self.where.connect)
+            if mute and self.where.credentials is not None:
+                return (
+                    f"something listens at {', '.join(mute)} and has made no link within {wait:g} s: it has keys of "
+                    f"another site, or none, or it is no plant; or it refuses {self.where.credentials.own.name}"
+                )
+            if mute:
                 return (
                     f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
                     "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
@@ -242,8 +254,15 @@ class RunClient:
         )
 
 
-def endpoint_for_run(listen: str) -> str:
+def endpoint_for_run(listen: str, credentials: Credentials | None = None) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
+
+    Parameters
+    ----------
+    listen : str
+        The endpoint.
+    credentials : Credentials or None, optional
+        The plant's, to ask another run that is there for its name.
 
     Raises
     ------
@@ -256,7 +275,7 @@ def endpoint_for_run(listen: str) -> str:
         return free_endpoint(check_endpoint("--listen", listen), option="--listen")
     except ListenError as error:
         where = loopback_of(listen)
-        there = runs_at(where) if error.in_use and accepting((where,)) else []
+        there = runs_at(where, credentials) if error.in_use and accepting((where,)) else []
         if not there:
             raise
         first = () if (there[0], where) == (RUN, ENDPOINT) else ("--run", there[0], "--connect", where)
@@ -270,14 +289,14 @@ def endpoint_for_run(listen: str) -> str:
         ) from None
 
 
-def runs_at(endpoint: str) -> list[str]:
+def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
     """Return the names of the runs whose plants are at an endpoint, as far as they show within `LOOKING` seconds."""
-    with RunClient(RunAddress(run=RUN, connect=(endpoint,))) as client:
+    with RunClient(RunAddress(run=RUN, connect=(endpoint,), credentials=credentials)) as client:
         client.until(lambda: bool(client.runs), LOOKING)
         return sorted(client.runs)
 
 
-def check_alone(run: str, beyond: tuple[str, ...]) -> None:
+def check_alone(run: str, beyond: tuple[str, ...], credentials: Credentials | None = None) -> None:
     """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
 
     Parameters
@@ -286,10 +305,12 @@ def check_alone(run: str, beyond: tuple[str, ...]) -> None:
         Name of the run.
     beyond : tuple[str, ...]
         Endpoints that the plant will connect to; without any, it cannot meet another plant.
+    credentials : Credentials or None, optional
+        The plant's.
     """
     if not beyond:
         return
-    with RunClient(RunAddress(run=run, connect=beyond)) as client:
+    with RunClient(RunAddress(run=run, connect=beyond, credentials=credentials)) as client:
         if client.until(lambda: client.plant, LOOKING):
             raise UsageError(
                 f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "

@@ -55,11 +55,11 @@ def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | N
 
 
 def request(
-    client: RunClient, receivers: Callable[[Answer], set[str]], **command_fields: Any
+    client: RunClient, receivers: Callable[[Answer], set[str]], *, verb: Verb, **command_fields: Any
 ) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
     """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it."""
-    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, reply_to=client.id, **command_fields)
-    client.publish(client.keys.command, encode(command))
+    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, reply_to=client.id, verb=verb, **command_fields)
+    client.publish(client.keys.for_verb(verb), encode(command))
     answer: Answer | None = None
     answers: dict[str, LinkAcknowledgement] = {}
     end = monotonic() + ANSWER

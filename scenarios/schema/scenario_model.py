@@ -6,7 +6,7 @@ prints this file's sentences.
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import msgspec
 
@@ -187,6 +187,10 @@ class Processes(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
     """TCP port of the plant on the loopback, the rendezvous of the run; 0 takes a free one."""
 
 
+NEEDS_KEYS = 'security = "mtls": say --keys DIR, the folder with the certificates (gridpeers keys init makes one)'
+"""Error of a scenario that asks for certificates, where none were given."""
+
+
 class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The keys outside any table come first in the file."""
 
@@ -199,6 +203,9 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     "switching", "plug-n-play", "wind-up", those of the paper, or your own as "module:Name"; "" judges nothing."""
     seed: Annotated[int, Plausible("a seed", 0, 2**63 - 1)] = 1
     """Seed of everything drawn at random: the fates of messages on links with faults."""
+    security: Literal["none", "mtls"] = "none"
+    """"mtls": links between processes are mutual TLS, and a run needs --keys DIR, a folder with certificates
+    (docs/security.md); "none": links are open, unless --keys is said. In one process there are no links to secure."""
     record: RecordLevel = "all"
     """What the record run.mcap of each case has: "all", decisions of agents with their inputs but no arrivals
     ("decisions"), or rows and events alone ("physics")."""

@@ -103,7 +103,7 @@ def address_options(where: RunAddress) -> list[str]:
     """Return the options that say which run is meant; those that say the defaults are left out."""
     run = [] if where.run == RUN else ["--run", where.run]
     endpoints = [] if where.connect == (ENDPOINT,) else [word for text in where.connect for word in ("--connect", text)]
-    return run + endpoints
+    return run + endpoints + where.access.words
 
 
 class ActionClient:

@@ -105,7 +105,7 @@ class RunFollower:
     def _ask(self, verb: str) -> None:
         tree = {"sender": "visitor", "epoch": 0, "seq": 0, "t": 0.0, "verb": verb, "reply_to": self._client.id}
         command = Command(**tree)  # type: ignore[arg-type]  # the fields above
-        self._client.publish(self._client.keys.command, encode(command))
+        self._client.publish(self._client.keys.for_verb(verb), encode(command))
 
     def _take_other(self, key: str, payload: bytes) -> None:
         """Take answers of the plant and of receivers of links, and the one-line diagram."""

@@ -14,6 +14,7 @@ from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.children import Child
 from scenarios.drivers.free_endpoint import free_endpoint
+from scenarios.drivers.secured import secured
 from scenarios.drivers.supervisor import Supervisor
 from scenarios.results.link_record import LinkRecord
 from tests.toy.toy_configs import toy_configs
@@ -58,6 +59,8 @@ class Town:
         Configurations of the plant and of all agents, if they are not the toy's.
     plant_command : Sequence[str], optional
         How the interpreter is told to run the plant; the toy plant unless said otherwise.
+    keys_folder : Path or None, optional
+        Folder with certificates: links are TLS. The observer has the plant's.
     changes : Any
         Fields of the plant's configuration.
     """
@@ -73,11 +76,12 @@ class Town:
         links: dict[str, Any] | None = None,
         configs: tuple[PlantConfig, tuple[AgentConfig, ...]] | None = None,
         plant_command: Sequence[str] = TOY,
+        keys_folder: Path | None = None,
         **changes: Any,
     ) -> None:
         plant, agents = toy_configs(n, run=run) if configs is None else configs
         run, links = plant.run, links or plant.links
-        self.endpoint = free_endpoint()
+        self.endpoint = free_endpoint() if keys_folder is None else free_endpoint("tls/127.0.0.1:0")
         self.plant_config = replace(
             plant,
             clock="wall",
@@ -93,6 +97,18 @@ class Town:
             config.name: replace(config, clock="wall", connect=connect, deadline=PATIENCE, links=links)
             for config in agents
         }
+        beside = "tcp/127.0.0.1:0"
+        if keys_folder is not None:
+            beside = "tls/127.0.0.1:0"
+            names = tuple(self.agent_configs)
+            self.plant_config, secured_agents, _ = secured(
+                self.plant_config,
+                [replace(config, listen=(beside,)) for config in self.agent_configs.values()],
+                keys_folder,
+                started=[name for name in names if (keys_folder / f"{name}.key").is_file()],
+                inverters=names,
+            )
+            self.agent_configs = {config.name: config for config in secured_agents}
         self.keys = Keys(run)
         self.folder = folder
         self.supervisor = Supervisor(
@@ -109,7 +125,9 @@ class Town:
         self.orders: list[LinkRequest] = []
         self.link_record = LinkRecord()
         self.tokens: set[str] = set()
-        self.session = Session("observer", listen=("tcp/127.0.0.1:0",), connect=connect, clock="wall")
+        self.session = Session(
+            "observer", listen=(beside,), connect=connect, clock="wall", credentials=self.plant_config.credentials
+        )
         for name in self.agent_configs:
             self.session.subscribe(self.keys.status(name))
             self.session.subscribe(self.keys.state(name))
@@ -152,6 +170,10 @@ class Town:
             lambda: all(name in self.status and set(self.status[name].used) == {*names} - {name} for name in names),
             f"{', '.join(names)} use each other",
         )
+
+    def log(self, name: str) -> str:
+        """Return what the process of a name has logged so far."""
+        return (self.folder / f"{name}.log").read_text()
 
     def signal(self, name: str, number: int) -> None:
         """Send a signal to the process of a name."""

@@ -165,6 +165,8 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
+        for line in session.take_lines():
+            log.warning("%s", line)
         deadline = core.deadline  # a message may have postponed it
         if deadline is not None and now >= deadline:  # also when the inbox never runs empty
             core.expire(now)

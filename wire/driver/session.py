@@ -17,6 +17,8 @@ from wire.driver.foreign import keep_thread_state
 from wire.driver.inbox import Inbox, Kind, Stamped
 from wire.driver.lingering import do_not_linger
 from wire.keys import LATEST_ONLY
+from wire.messages import PLANT
+from wire.trust.credentials import Credentials
 
 if TYPE_CHECKING:
     import zenoh
@@ -111,6 +113,9 @@ class Session:
         listen.
     star : bool, optional
         Whether the rendezvous relays all messages, as a router: then every other session is its client, with one link.
+    credentials : Credentials or None, optional
+        Own certificate and the members of the site: links are then mutual TLS, and Zenoh lets each member send and
+        receive what its role may, and nothing else. Without them anybody who reaches an endpoint takes part.
 
     Raises
     ------
@@ -130,6 +135,7 @@ class Session:
         inbox: Inbox | None = None,
         meets_all: bool = False,
         star: bool = False,
+        credentials: Credentials | None = None,
     ) -> None:
         try:
             load_zenoh(one_thread=star and not rendezvous)
@@ -147,12 +153,19 @@ class Session:
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        self._credentials, self._relayed = credentials, star and not rendezvous
+        self._certificates: set[str] = set()
+        """Common names of the certificates of all links so far."""
         config = _config(listen, connect, gossip, meets_all, profile)
         if star and rendezvous:
             config["mode"] = "router"
             config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
         elif star:
             config = _config((), connect, False, meets_all, profile)
+        if credentials is not None:
+            link, rules = credentials.zenoh_settings(star=star)
+            config["transport"]["link"] |= link
+            config["access_control"] = rules
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
         if star and not rendezvous:
@@ -161,7 +174,10 @@ class Session:
         elif self._changeable and self._meets_router():
             self._become_client(who, config)
         self._links: Any = None
-        if clock == "wall":  # no callback: one during the end of Python would abort the process
+        self._lines: list[str] = []
+        if (
+            clock == "wall" or credentials is not None
+        ):  # no callback: one during the end of Python would abort the process
             channel: Any = zenoh.handlers.RingChannel(1)
             self._links = self._session.info.declare_link_events_listener(channel, history=True)
         self.id = str(self._session.zid())
@@ -213,7 +229,10 @@ class Session:
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take the events out of the inbox, as `Inbox.take` does, and set up new links."""
         if self._links is not None and self._links.try_recv() is not None:
-            do_not_linger()
+            if self._profile.may_drop:
+                do_not_linger()
+            if self._credentials is not None:
+                self._note_links(self._credentials)
         return self.inbox.take(needed, timeout)
 
     def subscribe(self, key: str) -> None:
@@ -299,6 +318,32 @@ class Session:
         """Number of peers and routers connected now."""
         info = self._session.info
         return len(info.peers_zid()) + len(info.routers_zid())
+
+    def take_lines(self) -> tuple[str, ...]:
+        """Take out lines on links whose other end has a certificate and no access."""
+        lines, self._lines = tuple(self._lines), []
+        return lines
+
+    def _note_links(self, credentials: Credentials) -> None:
+        for link in self._session.info.links():
+            name = link.auth_identifier or ""
+            if name not in self._certificates:
+                self._certificates.add(name)
+                if why := credentials.stranger(name):
+                    self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
+
+    def vouches(self, name: str) -> bool:
+        """Return whether a link of this session has had the certificate of a sender, the plant or an agent.
+
+        With links through a relay only the plant's certificate can be seen, and everybody else counts as vouched for:
+        the relay lets each of them use its own keys alone. Without certificates everybody does.
+        """
+        if self._credentials is None or (self._relayed and name != PLANT):
+            return True
+        names = self._credentials.common_names(name)
+        if self._certificates.isdisjoint(names):
+            self._note_links(self._credentials)
+        return not self._certificates.isdisjoint(names)
 
     def close(self) -> None:
         """Undeclare the tokens and close."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-LONGEST_LIST = 24
-"""Names that are listed at the most: all keys of any table of a scenario, but not all buses of a feeder."""
+LONGEST_LIST = 30
+"""Names that are listed at the most: all commands, all keys of any table of a scenario, but not all buses of a feeder."""
 
 SHORTEST_START = 3
 """Letters from which on the start of a name is taken for the name; "in" may be anything."""
@@ -37,7 +37,7 @@ def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] 
     >>> suggestion("47x", map(str, range(1, 135)), "buses")
     'did you mean "47"?'
     >>> suggestion("zebra", map(str, range(1, 135)), "buses")  # doctest: +ELLIPSIS
-    'the buses are 1, 2, 3, ..., 24 and 110 more'
+    'the buses are 1, 2, 3, ..., 30 and 104 more'
     """
     names = list(known)
     near = _nearest(str(wrong), [*names, *also])

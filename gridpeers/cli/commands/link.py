@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
+from scenarios.live.access import Access
 
 if TYPE_CHECKING:
     from agents.agent_config import AgentConfig
@@ -49,6 +50,9 @@ def set_(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Give links faults. What is set takes the place of what the link had of the same kind.
 
@@ -64,7 +68,7 @@ def set_(
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
-        _give(links, "->", fault | {"profile": profile}, duration, run, connect, wait)
+        _give(links, "->", fault | {"profile": profile}, duration, run, connect, wait, Access(keys, name, insecure))
 
 
 @link.command()
@@ -78,6 +82,9 @@ def cut(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Cut links, between two names both ways.
 
@@ -88,7 +95,16 @@ def cut(
     with usage_errors():
         from netem.models.gates import Cut
 
-        _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, run, connect, wait)
+        _give(
+            links,
+            "->" if one_way else "<->",
+            {"cut": Cut(hold=hold)},
+            duration,
+            run,
+            connect,
+            wait,
+            Access(keys, name, insecure),
+        )
 
 
 @link.command()
@@ -100,6 +116,9 @@ def heal(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """End what holds on links.
 
@@ -110,18 +129,25 @@ def heal(
     Example:  gridpeers link heal inv4 inv7
     """
     with usage_errors():
-        _give(links or [], "<->", None, None, run, connect, wait)
+        _give(links or [], "<->", None, None, run, connect, wait, Access(keys, name, insecure))
 
 
 @link.command()
-def show(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+def show(
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
+) -> None:
     """Show every impaired link, and how its messages have fared.
 
     Exit code: 0 all have answered, 2 nobody there, 3 somebody has not answered.
 
     Example:  gridpeers link show
     """
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
         from scenarios.live.link_requests import link_states
         from scenarios.live.show.link_table import links_text
 
@@ -175,6 +201,7 @@ def _give(
     run: str,
     connect: list[str] | None,
     wait: float,
+    access: Access,
 ) -> None:
     """Check a link command, give it, and print the receivers' answers."""
     from netem.schema.change import Heal
@@ -195,7 +222,7 @@ def _give(
         for_s=duration,
     )
     check_link_command(command, None)
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, access, acts=True) as client:
         setup, agent = links_of_run(client)
         check_link_command(command, setup)
         result = command_links(client, command)

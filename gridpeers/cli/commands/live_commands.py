@@ -9,8 +9,22 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
-from gridpeers.cli.commands.options import ENDPOINT, RUN, Connect, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import (
+    ENDPOINT,
+    RUN,
+    As,
+    Connect,
+    Insecure,
+    Keys,
+    Run,
+    Wait,
+    address,
+    opened,
+    run_client,
+    usage_errors,
+)
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
+from scenarios.live.access import Access
 from wire.driver.command_line import command_line
 from wire.driver.output import watch_readers
 
@@ -53,20 +67,28 @@ def _start(
     strict: _Strict = False,
     out: _Out = None,
     record: _Record = None,
+    keys: Keys = None,
+    insecure: Insecure = False,
     *,
     agents: bool,
 ) -> None:
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
-        from scenarios.live.run_address import check_endpoint, check_name
+        from scenarios.live.access import objection, with_protocol
+        from scenarios.live.run_address import UsageError, check_endpoint, check_name
         from scenarios.live.run_client import check_alone, endpoint_for_run
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_name("--run", run)
+        credentials = opened(access := Access(keys=keys, insecure=insecure), ("plant",))
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
-        endpoint = endpoint_for_run(listen)
-        check_alone(run, beyond)
+        listen = with_protocol(check_endpoint("--listen", listen), keys=keys is not None, default=ENDPOINT)
+        for option, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
+            if wrong := objection(option, text, keys=keys is not None, insecure=insecure):
+                raise UsageError(wrong)
+        endpoint = endpoint_for_run(listen, credentials)
+        check_alone(run, beyond, credentials)
     spec, feeder = load(scenario)
     with usage_errors():
         from scenarios.live.link_log import LinkLog, check_new
@@ -80,9 +102,24 @@ def _start(
         check_new("--record", record)
         spec = chosen(spec, chosen_case(spec, case), None)
         options = LiveOptions(
-            run=run, case=case, speed=speed, wait=wait, duration=duration, strict=strict, recorded=out is not None
+            run=run,
+            case=case,
+            speed=speed,
+            wait=wait,
+            duration=duration,
+            strict=strict,
+            recorded=out is not None,
+            secured=keys is not None,
         )
         config, everyone = configure(spec, feeder, options, endpoint, beyond)
+        if keys is not None:
+            from scenarios.drivers.secured import secured
+
+            inverters = tuple(row.name for row in (*feeder.inverters, *feeder.spares))
+            started = config.agents if agents else ()
+            config, everyone, notes = secured(config, everyone, keys, started=started, inverters=inverters)
+            for note in notes:
+                say(f"NOTE  {note}")
         watch_readers(quits=False)
         sizes = file_sizes(spec, feeder, HOUR if duration is None else duration, "wall")
         if out is not None and duration is not None:
@@ -95,7 +132,7 @@ def _start(
             link_log = LinkLog(spec, feeder, record, replay)
             info = live_record(spec, config, everyone, tuple(row.name for row in (*feeder.inverters, *feeder.spares)))
             if agents:
-                watch, down = command_line("watch"), command_line("down")
+                watch, down = command_line("watch", *access.words), command_line("down", *access.words)
                 say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log, info)
             else:
@@ -154,6 +191,8 @@ def agent(
         typer.Option("--listen", metavar="ENDPOINT", help="Where other agents connect; any free port if left out."),
     ] = None,
     wait: Wait = 60.0,
+    keys: Keys = None,
+    insecure: Insecure = False,
     own_code: Annotated[
         bool,
         typer.Option("--own-code", help="Run a law, graph or link fault that only the plant, on another host, names."),
@@ -168,23 +207,38 @@ def agent(
     require({"zenoh": "an agent"})
     with usage_errors():
         from scenarios.drivers.free_endpoint import free_endpoint
+        from scenarios.live.access import objection
         from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import address_of, check_endpoint, check_inverters, check_wait
+        from scenarios.live.run_address import UsageError, check_endpoint, check_inverters, check_wait
 
-        where = address_of(run, connect)
         check_inverters(inverters)
+        if keys is not None and len(inverters) > 1:
+            raise UsageError(f"--keys: agents of one process have one certificate; start that of {inverters[1]} alone")
+        where = address(run, connect, Access(keys=keys, insecure=insecure), ("agent",), inverters[0])
+        for text in listen or ():
+            if wrong := objection(
+                "--listen", check_endpoint("--listen", text), keys=keys is not None, insecure=insecure
+            ):
+                raise UsageError(wrong)
         check_wait(wait)
         watch_readers(quits=False)
         listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())
         _finish(agent_here(where, tuple(inverters), listening or None, wait, trusts=own_code))
 
 
-def status(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+def status(
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
+) -> None:
     """Look once at a run: time, pacing, agents, latest events.
 
     Example:  gridpeers status
     """
-    with run_client(run, connect, wait, meet_agents=True) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
         from scenarios.live.show.render import plain
         from scenarios.live.show.watching import look
 
@@ -198,6 +252,9 @@ def watch(
     duration: Annotated[
         float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
     ] = None,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
 
@@ -207,7 +264,7 @@ def watch(
         from scenarios.live.run_address import check_duration
 
         check_duration(duration)
-    with run_client(run, connect, wait, meet_agents=True) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
         from rich.console import Console
 
         from scenarios.live.show.watching import watch as watch_run
@@ -220,6 +277,9 @@ def stop(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Have an agent leave properly: its inverter is switched off.
 
@@ -229,7 +289,7 @@ def stop(
 
     Example:  gridpeers stop inv2
     """
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
         from scenarios.live.run_requests import LEAVING, ask, has_left
 
         typer.echo(ask(client, "stop", inverter))
@@ -246,6 +306,9 @@ def event(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Open or close a switch of a running plant.
 
@@ -257,21 +320,28 @@ def event(
         fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
         from scenarios.live.run_requests import ask
 
         closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
         typer.echo(ask(client, "open" if action == "open" else closing, switch))
 
 
-def down(run: Run = RUN, connect: Connect = None, wait: Wait = 5.0) -> None:
+def down(
+    run: Run = RUN,
+    connect: Connect = None,
+    wait: Wait = 5.0,
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
+) -> None:
     """End a run: its agents leave, its plant ends.
 
     Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
 
     Example:  gridpeers down --run lab
     """
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
         from scenarios.live.run_requests import LEAVING, ask, has_ended
 
         typer.echo(ask(client, "down"))

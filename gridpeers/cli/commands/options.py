@@ -4,14 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, require
+from wire.trust.member import Role
 
 if TYPE_CHECKING:
+    from scenarios.live.access import Access
+    from scenarios.live.run_address import RunAddress
     from scenarios.live.run_client import RunClient
+    from wire.trust.credentials import Credentials
 
 RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
 """The same as in `scenarios.live.run_address`; a test compares them."""
@@ -22,20 +27,89 @@ Connect = Annotated[
     typer.Option("--connect", metavar="ENDPOINT", help=f"Where the plant listens, {ENDPOINT} if left out; repeatable."),
 ]
 Wait = Annotated[float, typer.Option("--wait", metavar="SECONDS", help="Longest wait for the plant.")]
+Keys = Annotated[
+    Path | None,
+    typer.Option("--keys", metavar="DIR", help="With certificates from here, links are TLS (docs/security.md)."),
+]
+As = Annotated[
+    str, typer.Option("--as", metavar="NAME", help="With --keys: whose certificate; the operator's if left out.")
+]
+Insecure = Annotated[
+    bool, typer.Option("--insecure", help="Let an endpoint be open to everybody who reaches it, beyond the loopback.")
+]
 
 
 @contextmanager
-def run_client(run: str, connect: list[str] | None, wait: float, *, meet_agents: bool = False) -> Iterator[RunClient]:
-    """Yield a client to a run whose plant is there; any error ends the command with one line."""
+def run_client(
+    run: str,
+    connect: list[str] | None,
+    wait: float,
+    access: Access,
+    *,
+    meet_agents: bool = False,
+    acts: bool = False,
+) -> Iterator[RunClient]:
+    """Yield a client to a run whose plant is there; any error ends the command with one line.
+
+    Parameters
+    ----------
+    run, connect, wait
+        The options of these names.
+    access : Access
+        The options on certificates.
+    meet_agents : bool, optional
+        Whether to connect to the agents too.
+    acts : bool, optional
+        Whether the command changes something, which a viewer may not.
+    """
     require({"zenoh": "the connection to a run"})
     with usage_errors():
-        from scenarios.live.run_address import address_of, check_wait
+        from scenarios.live.run_address import check_wait
         from scenarios.live.run_client import RunClient
 
         check_wait(wait)
-        with RunClient(address_of(run, connect), meet_agents=meet_agents) as client:
+        with RunClient(
+            address(run, connect, access, PEOPLE[:1] if acts else PEOPLE), meet_agents=meet_agents
+        ) as client:
             client.find_plant(wait)
             yield client
+
+
+PEOPLE: tuple[Role, ...] = ("operator", "viewer")
+"""Roles of commands."""
+
+
+def address(run: str, connect: list[str] | None, access: Access, roles: tuple[Role, ...], name: str = "") -> RunAddress:
+    """Return the address of a run, with the credentials for it; raise UsageError or KeysError if they do not fit."""
+    from dataclasses import replace
+
+    from scenarios.live.access import objection, with_protocol
+    from scenarios.live.run_address import UsageError, address_of
+
+    where = address_of(run, connect)
+    keys = access.keys is not None
+    endpoints = tuple(with_protocol(text, keys=keys, default=ENDPOINT) for text in where.connect)
+    for text in endpoints:
+        if wrong := objection("--connect", text, keys=keys, insecure=access.insecure):
+            raise UsageError(wrong)
+    return replace(where, connect=endpoints, credentials=opened(access, roles, name), access=access)
+
+
+def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentials | None:
+    """Return the credentials of a command; say so if the certificate ends soon."""
+    if access.keys is None:
+        if access.name:
+            from scenarios.live.run_address import UsageError
+
+            raise UsageError("--as: chooses a certificate; say --keys DIR, too")
+        return None
+    require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
+    from wire.trust.key_folder import open_credentials
+
+    credentials, note = open_credentials(access.keys, roles, name or access.name)
+    if note:
+        typer.echo(f"NOTE  {note}", err=True)
+    return credentials
 
 
 @contextmanager
@@ -48,6 +122,7 @@ def usage_errors() -> Iterator[None]:
     from scenarios.results.run_files import FolderError
     from wire.driver.process import ConfigurationError
     from wire.driver.session import SessionError
+    from wire.trust.key_folder import KeysError
 
     try:
         yield
@@ -55,6 +130,7 @@ def usage_errors() -> Iterator[None]:
         ConfigurationError,
         ListenError,
         FolderError,
+        KeysError,
         NobodyError,
         RefusedError,
         SessionError,

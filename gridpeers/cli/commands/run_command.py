@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
+from gridpeers.cli.commands.options import Keys
 from gridpeers.cli.page_beside import page_beside, page_socket
 from gridpeers.cli.usage import (
     BAD_INPUT,
@@ -55,6 +56,7 @@ def run(
     processes: Annotated[
         int, typer.Option(metavar="N", help="Processes that the agents share; one an agent when left out.")
     ] = 0,
+    keys: Keys = None,
     broker: Annotated[
         str | None, typer.Option(metavar="ADDRESS", help="With --plant helics: the broker, tcp://127.0.0.1:23404.")
     ] = None,
@@ -97,9 +99,30 @@ def run(
         fail(["--broker: goes with a plant in a HELICS federation; add --plant helics"], BAD_INPUT)
     if port is not None and not view:
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
-    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes)
+    pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
     page = page_socket(port) if view else None
     carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check, page=page)
+
+
+def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
+    """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
+    require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
+    from scenarios.drivers.secured import secured
+    from scenarios.schema.configs import configs
+    from scenarios.schema.participants import inverters_of
+    from wire.trust.key_folder import KeysError
+
+    inverters = tuple(row.name for row in inverters_of(spec, feeder))
+    notes: dict[str, None] = {}
+    try:
+        for case in spec.cases:
+            plant, agents = configs(spec, feeder, case)
+            started = {agent.name for agent in agents}
+            notes |= dict.fromkeys(secured(plant, agents, folder, started=started, inverters=inverters)[2])
+    except KeysError as error:
+        fail(str(error).split("\n"), BAD_INPUT)
+    for note in notes:
+        typer.echo(f"NOTE  {note}")
 
 
 def carry_out(
@@ -126,6 +149,8 @@ def carry_out(
         check_how(driver, pace, spec, dash="--")
     except ScenarioError as error:
         refuse(error)
+    if pace.get("keys") is not None:
+        _check_keys(Path(pace["keys"] or ""), spec, feeder)
     needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
     require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     if spec.plant.simulator == "gridlabd":

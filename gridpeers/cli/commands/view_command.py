@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
+from scenarios.live.access import Access
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
@@ -43,6 +44,9 @@ def view(
     token: Annotated[
         str, typer.Option("--token", metavar="TEXT", help="What a page must know; made up for other addresses.")
     ] = "",
+    keys: Keys = None,
+    name: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Show a run in the browser: feeder, links, strips and agents.
 
@@ -57,17 +61,19 @@ def view(
     if record is None:
         if case:
             fail(["--case: goes with a RECORD; a live run has one case"], BAD_INPUT)
-        _serve(lambda: _live(run, connect, wait, control=control), address, port, token)
-    if control or connect or run != RUN:
-        option = "--control" if control else "--connect" if connect else "--run"
+        _serve(lambda: _live(run, connect, wait, Access(keys, name, insecure), control=control), address, port, token)
+    if control or connect or keys or run != RUN:
+        option = "--control" if control else "--connect" if connect else "--keys" if keys else "--run"
         fail([f"{option}: goes with a live run; nothing can be done to a record"], BAD_INPUT)
     _serve(lambda: _recorded(record / case if case else record), address, port, token)
 
 
 @contextmanager
-def _live(run: str, connect: list[str] | None, wait: float, *, control: bool) -> Iterator[tuple[Pages, Line]]:
+def _live(
+    run: str, connect: list[str] | None, wait: float, access: Access, *, control: bool
+) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a live run, and the line that tells their address."""
-    with run_client(run, connect, wait, meet_agents=True) as client:
+    with run_client(run, connect, wait, access, meet_agents=True, acts=control) as client:
         from scenarios.view.live_pages import LivePages
         from scenarios.view.run_follower import RunFollower
 

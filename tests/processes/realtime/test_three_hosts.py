@@ -33,7 +33,7 @@ def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Pa
     """
     (tmp_path / "calm.toml").write_text(CALM)
     endpoint = f"tcp/{hosts.address(1)}:7447"
-    with Desk(tmp_path, "--run", "sites", "--connect", endpoint) as desk:
+    with Desk(tmp_path, "--run", "sites", "--connect", endpoint, "--insecure") as desk:
         agents = {
             f"inv{number}": desk.open("agent", f"inv{number}", prefix=hosts.at(1 + (number - 1) // 3))
             for number in range(4, 10)
@@ -43,7 +43,7 @@ def test_a_host_cut_off_is_left_out_and_welcome_again(hosts: Hosts, tmp_path: Pa
             for number in range(1, 4)
         }
         plant = desk.open_bare(
-            *("plant", "calm.toml", "--run", "sites", "--listen", "tcp/0.0.0.0:7447", "--wait", "20"),
+            *("plant", "calm.toml", "--run", "sites", "--listen", "tcp/0.0.0.0:7447", "--wait", "20", "--insecure"),
             prefix=hosts.at(1),
         )
         for agent in agents.values():

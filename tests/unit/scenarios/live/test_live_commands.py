@@ -45,7 +45,10 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         (["plant", "islanding", "--run", "a/b"], '--run: "a/b" cannot be part of a Zenoh key'),
         (["plant", "islanding", "--case", "V"], '--case: no case "V"; did you mean "IV"?'),
         (["plant", "islanding", "--listen", "7447"], '--listen: "7447" is no endpoint; write PROTOCOL/HOST:PORT'),
-        (["plant", "islanding", "--listen", "tcp/192.0.2.1:1"], "--listen: tcp/192.0.2.1:1 cannot be listened on"),
+        (
+            ["plant", "islanding", "--listen", "tcp/192.0.2.1:1", "--insecure"],
+            "--listen: tcp/192.0.2.1:1 cannot be listened on",
+        ),
         (["plant", "islanding", "--speed", "0"], "--speed: must be from 0.1 to 50 (1 is real time), got 0"),
         (["plant", "islanding", "--wait", "-1"], "--wait: must be a time of at least 0 s, got -1 s"),
         (["plant", "islanding", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),

@@ -1,0 +1,122 @@
+"""The commands `gridpeers keys ...`: a site's certificates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from gridpeers.cli.suggestions import Commands
+from gridpeers.cli.usage import BAD_INPUT, fail, require
+
+app = typer.Typer(
+    cls=Commands,
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    help="Make, issue and revoke the certificates of a site.\n\n"
+    "With them links are encrypted, every process proves who it is, and each may send only what is its own "
+    "(docs/security.md).\n\n"
+    "Example:  gridpeers keys init lab",
+)
+
+_Keys = Annotated[Path, typer.Option("--keys", metavar="DIR", help="Folder of the site; the present one if left out.")]
+_Days = Annotated[float, typer.Option("--days", metavar="N", help="Life of the certificates (days).")]
+_Name = Annotated[str, typer.Argument(metavar="NAME", help="Name; of an agent that of its inverter, e.g. inv4.")]
+
+
+@app.command()
+def init(
+    site: Annotated[
+        Path, typer.Argument(metavar="SITE", help="New folder for the certificates; its name is the site's.")
+    ],
+    days: _Days = 365.0,
+) -> None:
+    """Make a site: an authority, and certificates of a plant, an operator and a viewer.
+
+    Example:  gridpeers keys init lab
+    """
+    with _errors(days):
+        from wire.trust.site_authority import make_site
+
+        known = make_site(site, days=days)
+        names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
+        typer.echo(f"{site}: the site {known.site}, with certificates of {names}, until {known.members[0].expires}")
+        typer.echo(
+            f"{site}/ca.key stays here: whoever has it can be anybody. Next: gridpeers keys issue inv1 --keys {site}"
+        )
+
+
+@app.command()
+def issue(
+    names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Names; of agents those of their inverters.")],
+    role: Annotated[
+        Literal["agent", "plant", "operator", "viewer"], typer.Option("--role", help="What its holder may do.")
+    ] = "agent",
+    keys: _Keys = Path(),
+    days: _Days = 365.0,
+) -> None:
+    """Issue certificates, or renew them. An agent may join a run that has begun before.
+
+    Example:  gridpeers keys issue inv1 inv2 --keys lab
+    """
+    with _errors(days):
+        from wire.trust.site_authority import issue
+
+        for name in names:
+            member = issue(keys, name, role, days=days)
+            typer.echo(f"{keys / name}.pem: certificate of {name}, role {role}, until {member.expires}")
+
+
+@app.command()
+def revoke(name: _Name, keys: _Keys = Path()) -> None:
+    """Revoke a certificate: processes that start from now on with the new list keep its holder out.
+
+    Example:  gridpeers keys revoke inv4 --keys lab
+    """
+    with _errors():
+        from wire.trust.site_authority import revoke as revoke_name
+
+        revoke_name(keys, name)
+        typer.echo(
+            f"{name}: revoked. Copy {keys / 'members.json'} to every host, and start anew what runs: what has begun "
+            "before still lets it in"
+        )
+
+
+@app.command()
+def show(
+    site: Annotated[
+        Path, typer.Argument(metavar="[SITE]", help="Folder of the site; the present one if left out.")
+    ] = Path(),
+) -> None:
+    """Show the members of a site: role, end of the certificate, whether its key is here.
+
+    Example:  gridpeers keys show lab
+    """
+    with _errors():
+        from wire.trust.key_folder import read_list
+
+        known = read_list(site)
+        typer.echo(f"site {known.site}, list {known.version}")
+        width = max(len(member.name) for member in known.members)
+        for member in sorted(known.members, key=lambda member: (member.role, member.name)):
+            state = "revoked" if member.revoked else f"until {member.expires}"
+            here = "" if member.revoked or not (site / f"{member.name}.key").is_file() else ", key here"
+            typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
+
+
+@contextmanager
+def _errors(days: float = 1.0) -> Iterator[None]:
+    """End the command with one line if something about the keys is wrong."""
+    require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
+    if not 0.0 < days <= 3650.0:
+        fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
+    from wire.trust.key_folder import KeysError
+
+    try:
+        yield
+    except KeysError as error:
+        fail([str(error)], BAD_INPUT)

@@ -1,0 +1,64 @@
+"""Certificates for the processes of a run, all from one folder, before any of them starts."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from pathlib import Path
+
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
+from wire.trust.key_folder import KeysError, open_credentials
+
+
+def secured(
+    plant: PlantConfig,
+    agents: Sequence[AgentConfig],
+    folder: Path,
+    *,
+    started: Collection[str],
+    inverters: Sequence[str],
+) -> tuple[PlantConfig, tuple[AgentConfig, ...], tuple[str, ...]]:
+    """Return configurations with certificates, and a note on each that ends soon.
+
+    Parameters
+    ----------
+    plant : PlantConfig
+        The plant.
+    agents : Sequence[AgentConfig]
+        Agents it knows.
+    folder : Path
+        Folder of the site.
+    started : Collection[str]
+        Names of the agents that start from here: their keys must be in the folder.
+    inverters : Sequence[str]
+        All inverters of the feeder: access rules name their agents, which may get their certificates during the run.
+
+    Raises
+    ------
+    KeysError
+        If anything about a certificate is wrong: every problem, a line each.
+    """
+    every = tuple(inverters)
+    problems: list[str] = []
+    notes: list[str] = []
+    secured_agents = []
+    credentials, note = open_credentials(folder, ("plant",))
+    notes.append(note)
+    for agent in agents:
+        if agent.name not in started:
+            secured_agents.append(replace(agent, inverters=every))
+            continue
+        try:
+            own, note = open_credentials(folder, ("agent",), agent.name)
+        except KeysError as error:
+            problems.append(str(error))
+            continue
+        notes.append(note)
+        secured_agents.append(replace(agent, inverters=every, credentials=own))
+    if problems:
+        raise KeysError("\n".join(problems))
+    handed_out = {name: {**tree, "inverters": list(every)} for name, tree in plant.agent_configs.items()}
+    plant = replace(plant, credentials=credentials.knowing(every), agent_configs=handed_out)
+    return plant, tuple(secured_agents), tuple(filter(None, notes))

@@ -1,0 +1,112 @@
+"""An intruder: a process with a session, with a certificate or without, that says what it should not."""
+
+from __future__ import annotations
+
+import socket
+import ssl
+from collections.abc import Callable
+from pathlib import Path
+from time import monotonic
+from types import TracebackType
+
+from scenarios.drivers.free_endpoint import parse_endpoint
+from wire.codec import encode
+from wire.driver.session import Session
+from wire.messages import Message
+from wire.trust.credentials import Credentials
+from wire.trust.key_folder import open_credentials
+from wire.trust.member import ROLES
+
+PATIENCE = 20.0
+"""Longest wait (s) for anything."""
+
+
+class Intruder:
+    """A session that is ready to publish anything. Use it as a context.
+
+    Parameters
+    ----------
+    endpoint : str
+        Where the plant listens.
+    credentials : Credentials or None
+        What it shows.
+    """
+
+    def __init__(self, endpoint: str, credentials: Credentials | None) -> None:
+        listen = ("tcp/127.0.0.1:0",) if credentials is None else ("tls/127.0.0.1:0",)
+        self.session = Session("intruder", listen=listen, connect=(endpoint,), clock="wall", credentials=credentials)
+
+    def __enter__(self) -> Intruder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.session.close()
+
+    def linked(self, least: int = 2) -> Intruder:
+        """Wait until it has links: to the plant, and to others of whom gossip tells."""
+        end = monotonic() + PATIENCE
+        while self.session.peers() < least:
+            assert monotonic() < end, f"{self.session.peers()} links after {PATIENCE:g} s"
+            self.session.take(1, 0.02)
+        return self
+
+    def until(self, key: str, say: Callable[[], object]) -> None:
+        """Say something, again and again, until a message comes on a key."""
+        end = monotonic() + PATIENCE
+        while True:
+            say()
+            if any(event[:2] == ("message", key) for event in self.session.take(1, 0.2)):
+                return
+            assert monotonic() < end, f"nothing on {key} after {PATIENCE:g} s"
+
+    def says(self, *messages: tuple[str, Message]) -> None:
+        """Publish messages on keys, in this order."""
+        for key, message in messages:
+            self.session.publish(key, encode(message))
+
+
+def credentials(folder: Path, name: str) -> Credentials:
+    """Return what a member shows, whatever its role."""
+    return open_credentials(folder, ROLES, name)[0]
+
+
+def handshake(endpoint: str, certificate: Path | None, key: Path | None = None) -> str:
+    """Return the alert with which the other end refuses a TLS handshake; empty if it takes the certificate.
+
+    After a second without a word in Zenoh's own protocol it closes the connection without an alert.
+    """
+    parsed = parse_endpoint(endpoint)
+    assert parsed is not None
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
+    if certificate is not None:
+        context.load_cert_chain(certificate, key)
+    with socket.create_connection((parsed.host, parsed.port), PATIENCE) as raw, context.wrap_socket(raw) as secured:
+        try:
+            while secured.recv(1024):  # a client hears of its refusal with the first bytes that it reads
+                pass
+        except ssl.SSLEOFError:
+            return ""
+        except ssl.SSLError as error:
+            return error.reason or str(error)
+        except ConnectionResetError:
+            return ""
+    return ""
+
+
+def answered(endpoint: str, data: bytes) -> str:
+    """Return whether the other end closes a connection on which these bytes come: "closed", or "open" after seconds."""
+    parsed = parse_endpoint(endpoint)
+    assert parsed is not None
+    with socket.create_connection((parsed.host, parsed.port), PATIENCE) as raw:
+        try:
+            raw.sendall(data)
+            while raw.recv(65536):
+                pass
+        except TimeoutError:
+            return "open"
+        except OSError:
+            pass
+    return "closed"

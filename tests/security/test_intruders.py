@@ -1,0 +1,197 @@
+"""Intruders at a run with certificates: real processes around the toy plant, on the loopback."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from tests.security.intruder import Intruder, answered, credentials, handshake
+from tests.security.recording import Recording
+from tests.toy.town import Town
+from wire.messages import Command, Measurement, Message, State
+
+pytest.importorskip("cryptography", reason="certificates need the extra keys")
+
+LIE = 12345.0
+"""Set-point (W) that no honest agent of the toy has."""
+
+
+def state_of(town: Town, name: str, seq: int = 0, sender: str = "") -> State:
+    """Return a state in the epoch of an agent, as of now, with a lie in it."""
+    seen = town.t
+    town.until(lambda: town.t > seen, "a newer time of the run")
+    status = town.status[name]
+    return State(sender=sender or name, epoch=status.epoch, seq=seq, t=town.t, P_set=LIE, V_set=277.0, Q=0.0, island="")
+
+
+def test_members_of_a_site_take_part_in_its_run(town: Town) -> None:
+    """With certificates the agents find each other over TLS, and use each other's values."""
+    assert town.plant_config.listen[0].startswith("tls/")
+    assert {*town.status["inv1"].used} == {"inv2"}
+    assert {town.session.vouches(name) for name in ("plant", "inv1", "inv2")} == {True}
+    assert not town.session.vouches("inv3")
+
+
+def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
+    """TLS refuses at once."""
+    assert "CERTIFICATE_REQUIRED" in handshake(town.endpoint, None)
+
+
+def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_path: Path) -> None:
+    """Though it has the same names."""
+    from wire.trust.site_authority import issue, make_site
+
+    other = tmp_path / "lab"
+    make_site(other)
+    issue(other, "inv3")
+
+    assert handshake(town.endpoint, other / "inv3.pem", other / "inv3.key") in (
+        "TLSV1_ALERT_UNKNOWN_CA", "TLSV1_ALERT_DECRYPT_ERROR", "SSLV3_ALERT_BAD_CERTIFICATE",
+    )  # fmt: skip
+
+
+def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
+    """One of our own site, that ended a day ago."""
+    from wire.trust.site_authority import issue
+
+    site = tmp_path / "lab"
+    shutil.copytree(lab, site)
+    issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))
+
+    assert handshake(town.endpoint, site / "inv3.pem", site / "inv3.key") == "SSLV3_ALERT_CERTIFICATE_EXPIRED"
+    assert handshake(town.endpoint, lab / "inv3.pem", lab / "inv3.key") == ""
+
+
+def many(state: State) -> list[State]:
+    """Return a state with many rising numbers: one alone could be too far ahead to be believed."""
+    return [replace(state, seq=state.seq + k) for k in range(60)]
+
+
+def attack(town: Town, intruder: Intruder, key: str, *lies: Message) -> None:
+    """Publish lies, then ask the plant for its status: its answer proves that it has had the lies' bytes before.
+
+    Everything on a link keeps its order. When it is said first, publishers and links are new, so it is said twice.
+    """
+    answer = town.keys.answer(intruder.session.id)
+    intruder.session.subscribe(answer)
+    question = Command(sender="intruder", epoch=1, seq=7, t=0.0, verb="status", reply_to=intruder.session.id)
+    for _ in range(2):
+        intruder.until(answer, lambda: intruder.says(*((key, lie) for lie in lies), (town.keys.request, question)))
+    seen = town.t
+    town.until(lambda: town.t >= seen + 0.3, "rows after the attack")
+
+
+def lies_in(town: Town) -> list[tuple[float, ...]]:
+    """Return the rows of the plant with a set-point that the intruder has sent."""
+    return [row for row in town.rows if LIE in row]
+
+
+def test_an_agent_cannot_speak_as_another(town: Town, lab: Path) -> None:
+    """With the certificate of inv3 a state of inv1, in inv1's epoch and with its next numbers, reaches nobody."""
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+        attack(town, intruder, town.keys.state("inv1"), *many(state_of(town, "inv1", 10**6)))
+
+    assert lies_in(town) == []
+    assert town.states["inv1"].P_set != LIE
+
+
+def test_without_certificates_an_agent_can_speak_as_another(tmp_path: Path) -> None:
+    """The same attack on a run with open links: it is the certificates that keep the intruder out."""
+    with Town(2, tmp_path).all() as open_town, Intruder(open_town.endpoint, None) as intruder:
+        attack(open_town, intruder, open_town.keys.state("inv1"), *many(state_of(open_town, "inv1", 10**6)))
+
+        assert lies_in(open_town)
+
+
+def test_a_viewer_cannot_command(town: Town, lab: Path) -> None:
+    """Its command to stop an agent does not arrive, its question about the run does; an operator's command does."""
+    stop = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv1", reply_to="z1")
+    with Intruder(town.endpoint, credentials(lab, "viewer")) as intruder:
+        attack(town, intruder, town.keys.command, stop)
+        attack(town, intruder, town.keys.request, stop)
+    assert town.keys.alive_agent("inv1", "").rstrip("/") in "".join(town.tokens)
+    assert not [event for event in town.events if event.subject == "inv1" and "left" in event.text]
+
+
+def test_an_operator_commands(town: Town, lab: Path) -> None:
+    """The way is open that a viewer does not have: the plant answers a command that it cannot carry out."""
+    nothing = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv9", reply_to="observer")
+    before = len(town.answers)
+    with Intruder(town.endpoint, credentials(lab, "operator")) as operator:
+        attack(town, operator, town.keys.command, nothing)
+    town.until(lambda: len(town.answers) > before, "the plant's answer")
+
+    assert not town.answers[-1].ok
+
+
+def asks(intruder: Intruder, question: str, key: str, lies: Sequence[Message]) -> None:
+    """Publish lies, then query a key."""
+    intruder.says(*((key, lie) for lie in lies))
+    intruder.session.fetch(question)
+
+
+def test_an_agent_cannot_publish_a_measurement(town: Town, lab: Path) -> None:
+    """With the certificate of inv3 a measurement for inv2 does not arrive, whatever it says of its sender."""
+    assert town.telemetry is not None
+    lies = [
+        Measurement(
+            sender="plant", epoch=town.telemetry.epoch, seq=10**6 + k, t=town.t + 0.1, to="inv2", P=0.0, Q=LIE, V=277.0,
+            f=60.0, P_set=LIE, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1", "inv2"),
+        )
+        for k in range(60)
+    ]  # fmt: skip
+    key = town.keys.measurement("inv2")
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+        for token in [token for token in town.tokens if "/alive/agent/inv2/" in token]:
+            nameplate = town.keys.nameplate("inv2", token.rpartition("/")[2])
+            intruder.linked(4).until(nameplate, partial(asks, intruder, nameplate, key, lies))
+    seen = town.states["inv2"].seq
+    town.until(lambda: town.states["inv2"].seq >= seen + 20, "further states of inv2")
+
+    assert town.states["inv2"].Q != LIE
+    assert lies_in(town) == []
+
+
+def test_right_certificate_and_key_but_anothers_name_in_the_message(town: Town, lab: Path) -> None:
+    """The plant counts it as foreign, and says so once."""
+    lies = many(state_of(town, "inv1", 10**6))
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+        attack(town, intruder, town.keys.leave("inv3"), *lies)
+
+    assert lies_in(town) == []
+    assert f"dropped a message on {town.keys.leave('inv3')}: foreign" in town.log("plant")
+
+
+def test_a_revoked_member_gets_a_link_and_nothing_on_it(town: Town, lab: Path) -> None:
+    """Zenoh knows no revocation: TLS lets eve in. She hears nothing and commands nothing; the plant says so."""
+    stop = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv1", reply_to="observer")
+    before = len(town.answers)
+    with Intruder(town.endpoint, credentials(lab.parent / "before", "eve")) as eve:
+        eve.session.watch(town.keys.any_alive)
+        eve.linked(1).says((town.keys.command, stop))
+        seen = town.t
+        town.until(lambda: town.t >= seen + 1.0, "a second of the run")
+        assert eve.session.take(1, 0.0) == []
+
+    assert len(town.answers) == before
+    town.until(lambda: "operator:eve, whose certificate was revoked" in town.log("plant"), "the plant's line")
+
+
+def test_old_bytes_of_a_link_are_worth_nothing(town: Town, lab: Path) -> None:
+    """What an honest member sent over TLS, sent again by somebody who recorded it: the plant closes the connection."""
+    with Recording(town.endpoint) as between, Intruder(between.endpoint, credentials(lab, "operator")) as operator:
+        operator.linked(1)
+        stop = Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="stop", argument="inv1", reply_to="observer")
+        operator.says((town.keys.request, stop))
+        town.until(lambda: len(between.bytes) > 2000, "a handshake and more")
+        recorded = bytes(between.bytes)
+
+    assert answered(town.endpoint, recorded) == "closed"
+    assert stop.verb.encode() not in recorded
+    assert b"gridpeers/" not in recorded

@@ -1,0 +1,119 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.command_line import invoke
+
+pytest.importorskip("cryptography", reason="certificates need the extra keys")
+
+MTLS = 'security = "mtls"\n[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
+
+
+def refused(*words: str) -> str:
+    """Return the lines with which a command that ends with exit code 2 refuses its options."""
+    code, text = invoke(*words)
+    assert code == 2, text
+    assert "Traceback" not in text
+    return text
+
+
+def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
+    """init, issue, show and revoke say what they did and when certificates end."""
+    code, made = invoke("keys", "init", "lab")
+    assert code == 0, made
+    assert (
+        "lab: the site lab, with certificates of plant (plant), operator (operator), viewer (viewer), until 2" in made
+    )
+    assert "lab/ca.key stays here: whoever has it can be anybody" in made
+
+    code, issued = invoke("keys", "issue", "inv1", "inv2", "--keys", "lab")
+    assert code == 0, issued
+    assert "lab/inv1.pem: certificate of inv1, role agent, until 2" in issued
+
+    code, revoked = invoke("keys", "revoke", "inv2", "--keys", "lab")
+    assert code == 0, revoked
+    assert "inv2: revoked. Copy lab/members.json to every host, and start anew what runs" in revoked
+
+    code, shown = invoke("keys", "show", "lab")
+    assert code == 0, shown
+    rows = shown.splitlines()
+    assert rows[0] == "site lab, list 6"
+    assert [row.split()[:3] for row in rows[1:3]] == [["agent", "inv1", "until"], ["agent", "inv2", "revoked"]]
+    assert rows[1].endswith(", key here")
+
+
+def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
+    """A folder that is there, one that is none, a life of no days."""
+    assert invoke("keys", "init", "lab")[0] == 0
+    assert "lab: is there already; gridpeers keys show lab shows it" in refused("keys", "init", "lab")
+    assert "other: there is no such folder of keys; gridpeers keys init other makes one" in refused(
+        "keys", "show", "other"
+    )
+    assert "--days: must be more than 0 and at most 3650 days, got 0" in refused("keys", "init", "x", "--days", "0")
+    assert 'no certificate was issued to "inv7"' in refused("keys", "revoke", "inv7", "--keys", "lab")
+
+
+FAR, NEAR = "tcp/192.0.2.1:7447", "tcp/127.0.0.1:1"
+OPEN = (
+    "is not on this host's loopback, and without certificates whoever reaches it reads and commands the run: say "
+    "--keys DIR and tls/192.0.2.1:7447 (docs/security.md), or --insecure if you trust the network"
+)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["plant", "islanding", "--listen", FAR], f"--listen: {FAR} {OPEN}"),
+        (
+            ["up", "islanding", "--listen", "tcp/0.0.0.0:7447"],
+            "--listen: tcp/0.0.0.0:7447 is not on this host",
+        ),
+        (["agent", "inv1", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
+        (["agent", "inv1", "--listen", FAR], f"--listen: {FAR} {OPEN}"),
+        (["watch", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
+        (["link", "cut", "inv1", "inv2", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
+        (["down", "--connect", "tls/127.0.0.1:1"], "--connect: tls/127.0.0.1:1 needs certificates: say --keys DIR"),
+        (
+            ["status", "--connect", NEAR, "--keys", "lab"],
+            f"--connect: {NEAR} is open, and --keys asks for TLS",
+        ),
+        (
+            ["plant", "islanding", "--listen", NEAR, "--keys", "lab"],
+            f"--listen: {NEAR} is open, and --keys asks for TLS",
+        ),
+        (["status", "--as", "eve"], "--as: chooses a certificate; say --keys DIR, too"),
+        (["status", "--keys", "nowhere"], "nowhere: there is no such folder of keys"),
+        (["agent", "inv7", "--keys", "lab"], 'no certificate was issued to "inv7"; those of role agent: none'),
+        (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: agents of one process have one certificate"),
+        (
+            ["stop", "inv1", "--keys", "lab", "--as", "viewer"],
+            "viewer has the role viewer; this needs one with",
+        ),
+        (["run", "islanding", "--keys", "nowhere"], "nowhere: there is no such folder of keys"),
+        (["run", "islanding", "--keys", "lab"], 'lab: no certificate was issued to "inv9"'),
+        (["run", "islanding", "--keys", "lab", "--driver", "inprocess"], "--keys: needs --driver processes"),
+        (["run", "islanding", "--keys", "lab", "--processes", "3"], "--processes: agents of one process have one"),
+        (["run", "mtls.toml"], 'security = "mtls": say --keys DIR'),
+        (["plant", "mtls.toml", "--listen", "tcp/127.0.0.1:0"], 'security = "mtls": say --keys DIR'),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_options_that_do_not_fit_are_refused_before_anything_starts(
+    words: list[str], text: str, elsewhere: Path
+) -> None:
+    """One line each, and exit code 2."""
+    (elsewhere / "mtls.toml").write_text(MTLS)
+    assert invoke("keys", "init", "lab")[0] == 0
+
+    assert text in refused(*words)
+
+
+def test_in_one_process_there_is_no_link_to_secure(elsewhere: Path) -> None:
+    """A scenario that asks for certificates runs in one process without them."""
+    (elsewhere / "mtls.toml").write_text(MTLS)
+
+    code, text = invoke("run", "mtls.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code == 0, text

@@ -1,0 +1,165 @@
+from __future__ import annotations
+
+import re
+import shutil
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("cryptography", reason="certificates need the extra keys")
+
+from wire.trust.key_folder import KeysError, is_private, open_credentials, read_list
+from wire.trust.site_authority import issue, make_site, revoke
+
+NOW = datetime(2026, 11, 23, 12, tzinfo=UTC)
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """A site with agents inv1 and inv2."""
+    folder = tmp_path / "lab"
+    make_site(folder, now=NOW)
+    for name in ("inv1", "inv2"):
+        issue(folder, name, now=NOW)
+    return folder
+
+
+def refusal(folder: Path, name: str = "inv1", now: datetime = NOW) -> str:
+    """Return the one line with which an agent's certificate is refused."""
+    with pytest.raises(KeysError) as refused:
+        open_credentials(folder, ("agent",), name, now=now)
+    text = str(refused.value)
+    assert "\n" not in text
+    return text
+
+
+def test_a_site_is_private_and_its_members_are_listed(lab: Path) -> None:
+    """The folder is 0700 and each key 0600; the list names plant, operator, viewer and the agents."""
+    assert lab.stat().st_mode & 0o777 == 0o700
+    assert all(is_private(key) for key in lab.glob("*.key"))
+    assert [(member.name, member.role) for member in read_list(lab).members] == [
+        ("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"), ("inv1", "agent"), ("inv2", "agent"),
+    ]  # fmt: skip
+
+
+def test_a_host_needs_four_files_and_no_more(lab: Path, tmp_path: Path) -> None:
+    """Authority, list, own certificate, own key; the authority's key stays at home."""
+    host = tmp_path / "host"
+    host.mkdir()
+    for name in ("ca.pem", "members.json", "inv1.pem", "inv1.key"):
+        shutil.copy2(lab / name, host)
+
+    credentials, note = open_credentials(host, ("agent",), "inv1", now=NOW)
+
+    assert (credentials.own.common_name, note) == ("agent:inv1", "")
+    with pytest.raises(KeysError, match=r"ca\.key: is missing; certificates are issued and revoked where the site was"):
+        issue(host, "inv3")
+
+
+def test_without_a_name_the_first_role_counts_whose_key_is_there(lab: Path) -> None:
+    """A command takes the operator's certificate, and the viewer's where there is no other."""
+    assert open_credentials(lab, ("operator", "viewer"), now=NOW)[0].own.name == "operator"
+    (lab / "operator.key").unlink()
+    assert open_credentials(lab, ("operator", "viewer"), now=NOW)[0].own.name == "viewer"
+
+
+def of_another_site(lab: Path, name: str) -> None:
+    """Put a file of another site of the same members in the place of one."""
+    other = lab.parent / "other" / "lab"
+    make_site(other, now=NOW)
+    issue(other, "inv1", now=NOW)
+    shutil.copy2(other / name, lab)
+
+
+WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
+    "no folder": (shutil.rmtree, r"lab: there is no such folder of keys; gridpeers keys init .*lab makes one"),
+    "no key": (lambda lab: (lab / "inv1.key").unlink(), r"inv1.key: is missing; copy it"),
+    "no certificate": (lambda lab: (lab / "inv1.pem").unlink(), r"inv1.pem: is missing; copy it"),
+    "no list": (lambda lab: (lab / "members.json").unlink(), r"members.json: is missing; copy it"),
+    "no authority": (lambda lab: (lab / "ca.pem").unlink(), r"ca.pem: is missing; copy it"),
+    "readable by others": (
+        lambda lab: (lab / "inv1.key").chmod(0o644),
+        r"inv1.key: others may read or change it \(mode 0644\); chmod 600 ",
+    ),
+    "a certificate of another site": (
+        lambda lab: of_another_site(lab, "inv1.pem"),
+        r"inv1.pem: is not signed by .*ca.pem: it is of another site; copy both from the same one",
+    ),
+    "an authority that is not ours": (
+        lambda lab: of_another_site(lab, "ca.pem"),
+        r"members.json: is not signed by ca.pem beside it; copy both from the same site",
+    ),
+    "a key of another": (
+        lambda lab: shutil.copy2(lab / "inv2.key", lab / "inv1.key"),
+        r"inv1.key: is not the key of inv1.pem; copy both",
+    ),
+    "a certificate of another name": (
+        lambda lab: shutil.copy2(lab / "inv2.pem", lab / "inv1.pem"),
+        r'inv1.pem: is the certificate of "agent:inv2", not of "agent:inv1"; copy that of inv1',
+    ),
+    "no PEM": (lambda lab: (lab / "inv1.pem").write_text("x"), r"inv1.pem: is no certificate in PEM; copy it anew"),
+    "no private key": (lambda lab: (lab / "inv1.key").write_text("x"), r"inv1.key: is no private key: .*; copy it"),
+    "no JSON": (lambda lab: (lab / "members.json").write_text("x"), r"members.json: cannot be read: .*; copy it"),
+    "revoked": (
+        lambda lab: revoke(lab, "inv1"),
+        r"inv1.pem: was revoked; gridpeers keys issue inv1 gives inv1 a new one",
+    ),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_every_wrong_file_is_refused_in_one_line(lab: Path, what: str) -> None:
+    """The line names the file, what is wrong with it, and what to do."""
+    change, pattern = WRONG[what]
+    change(lab)
+
+    assert re.search(pattern, refusal(lab))
+
+
+def test_a_list_that_somebody_changed_is_refused(lab: Path) -> None:
+    """A viewer that makes itself an operator in its copy of the list."""
+    file = lab / "members.json"
+    file.write_text(file.read_text().replace('"role": "viewer"', '"role": "operator"'))
+
+    assert "members.json: is not signed by ca.pem beside it" in refusal(lab)
+
+
+def test_time_decides_whether_a_certificate_counts(lab: Path) -> None:
+    """Before its first day and after its last one it is refused; in its last 30 days its end is told."""
+    late = NOW + timedelta(days=366)
+    assert "inv1.pem: expired on 2027-11-23 12:00 UTC; gridpeers keys issue inv1 makes a new one" in refusal(
+        lab, now=late
+    )
+    assert "is valid from 2026-11-23 11:55 UTC, and the clock of this host shows 2026-11-22 12:00" in refusal(
+        lab, now=NOW - timedelta(days=1)
+    )
+    soon = open_credentials(lab, ("agent",), "inv1", now=NOW + timedelta(days=340))[1]
+    assert soon == "the certificate of inv1 ends on 2027-11-23; gridpeers keys issue inv1 renews it"
+
+
+def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
+    """An unknown name, a viewer as an agent, a second role for a name, a name that is none."""
+    assert 'no certificate was issued to "inv7"; those of role agent: inv1, inv2; gridpeers keys issue inv7' in refusal(
+        lab, "inv7"
+    )
+    assert "viewer has the role viewer; this needs one with role agent" in refusal(lab, "viewer")
+    for name, role, text in (
+        ("inv1", "viewer", "inv1: has the role agent already; give the viewer another name"),
+        ("a/b", "agent", '"a/b" cannot be a name'),
+        ("ca", "agent", '"ca" cannot be a name'),
+        ("x" * 60, "agent", "is too long for a certificate"),
+    ):
+        with pytest.raises(KeysError, match=text):
+            issue(lab, name, role)  # type: ignore[arg-type]
+
+
+def test_a_new_certificate_after_a_revoked_one_has_another_common_name(lab: Path) -> None:
+    """The revoked one could be used again otherwise; a renewal keeps the name."""
+    assert issue(lab, "inv1", now=NOW).common_name == "agent:inv1"
+    revoke(lab, "inv1")
+    assert issue(lab, "inv1", now=NOW).common_name == "agent:inv1:2"
+    assert open_credentials(lab, ("agent",), "inv1", now=NOW)[0].own.generation == 2
+    with pytest.raises(KeysError, match=r'no certificate was issued to "inv7"; there are those of'):
+        revoke(lab, "inv7")

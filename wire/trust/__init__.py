@@ -1,0 +1,1 @@
+"""Certificates and access: who a process is, and what it may say to whom."""

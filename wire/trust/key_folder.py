@@ -1,0 +1,223 @@
+"""The folder with a site's certificates and keys: what stands in it, and whether a process may use it.
+
+``ca.pem`` is the certificate of the site's authority and ``ca.key`` its private key, which stays where certificates are
+issued. ``NAME.pem`` and ``NAME.key`` are those of a member. ``members.json`` lists all members, signed by the
+authority. A host needs ``ca.pem``, ``members.json`` and the two files of its own members, and no more.
+
+The package cryptography is imported where it is used: a run without certificates does without.
+"""
+
+from __future__ import annotations
+
+import base64
+import stat
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from wire.bounds import is_name
+from wire.printable import printable
+from wire.trust.credentials import Credentials
+from wire.trust.member import Member, Role
+
+if TYPE_CHECKING:
+    from cryptography import x509
+
+CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"
+
+SOON = timedelta(days=30)
+"""Time before its end at which a certificate is said to end soon."""
+
+
+class KeysError(ValueError):
+    """Certificates or keys cannot be used; the message says which, why, and what to do."""
+
+
+class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """All members of a site, revoked ones included."""
+
+    site: str
+    """Name of the site."""
+    version: int
+    """Number of changes so far; of two lists the greater is the later."""
+    members: tuple[Member, ...] = ()
+
+    def of(self, name: str) -> Member | None:
+        """Return the member of a name; None if there is none."""
+        return next((member for member in self.members if member.name == name), None)
+
+
+class SignedList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The content of ``members.json``."""
+
+    list: MemberList
+    signature: str
+    """Signature of the authority over the list as JSON (ECDSA with SHA-256, base64)."""
+
+
+def open_credentials(
+    folder: Path, roles: Sequence[Role], name: str = "", *, now: datetime | None = None
+) -> tuple[Credentials, str]:
+    """Check a member's files and return its credentials, and a sentence if its certificate ends soon.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the site, or what was copied of it.
+    roles : Sequence[Role]
+        Roles that will do, the preferred first.
+    name : str, optional
+        Name of the member; without one, the first of these roles whose key is there.
+    now : datetime, optional
+        Present time.
+
+    Raises
+    ------
+    KeysError
+        If anything about the files is wrong.
+    """
+    now = now or datetime.now(UTC)
+    known = read_list(folder)
+    member = known.of(name) if name else _present(folder, known, roles)
+    if member is None:
+        if name:
+            have = ", ".join(each.name for each in known.members if each.role in roles) or "none"
+            raise KeysError(
+                f'{folder}: no certificate was issued to "{printable(name)}"; those of role {_or(roles)}: {have}; '
+                f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
+            )
+        raise KeysError(
+            f"{folder}: has no key of a member with role {_or(roles)}; copy NAME.pem and NAME.key of one, or issue one "
+            "with gridpeers keys issue"
+        )
+    if member.role not in roles:
+        raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {_or(roles)}")
+    if member.revoked:
+        raise KeysError(
+            f"{folder}/{member.name}.pem: was revoked; gridpeers keys issue {member.name} gives {member.name} a new one"
+        )
+    certificate, key = folder / f"{member.name}.pem", folder / f"{member.name}.key"
+    ca, own = _certificate(folder / CA), _certificate(certificate)
+    ends = _check_certificate(own, ca, certificate, folder, member, now)
+    _check_key(key, own)
+    soon = f"the certificate of {member.name} ends on {ends:%Y-%m-%d}; gridpeers keys issue {member.name} renews it"
+    return Credentials(
+        own=member,
+        ca=str((folder / CA).absolute()),
+        certificate=str(certificate.absolute()),
+        key=str(key.absolute()),
+        members=known.members,
+    ), soon if ends - now < SOON else ""
+
+
+def read_list(folder: Path) -> MemberList:
+    """Return the members of a site, if the list is whole and signed by the folder's authority."""
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    if not folder.is_dir():
+        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one")
+    public = _certificate(folder / CA).public_key()
+    data = _bytes(folder / LIST)
+    try:
+        signed = msgspec.json.decode(data, type=SignedList)
+        signature = base64.b64decode(signed.signature, validate=True)
+    except ValueError as error:
+        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
+    try:
+        assert isinstance(public, ec.EllipticCurvePublicKey)
+        public.verify(signature, msgspec.json.encode(signed.list), ec.ECDSA(hashes.SHA256()))
+    except (InvalidSignature, AssertionError):
+        raise KeysError(
+            f"{folder / LIST}: is not signed by {CA} beside it; copy both from the same site, unchanged"
+        ) from None
+    if not all(is_name(member.name) for member in signed.list.members):
+        raise KeysError(f"{folder / LIST}: has a name that is none; copy it anew from the site")
+    return signed.list
+
+
+def is_private(path: Path) -> bool:
+    """Return whether nobody but its owner may read or write a file."""
+    return not stat.S_IMODE(path.stat().st_mode) & 0o077
+
+
+def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
+    """Return the first member of these roles whose key is in the folder."""
+    there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
+    return next((member for role in roles for member in there if member.role == role), None)
+
+
+def _check_certificate(
+    own: x509.Certificate, ca: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime
+) -> datetime:
+    """Raise KeysError unless a certificate is valid and names the member; return its end."""
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.x509.oid import NameOID
+
+    try:
+        own.verify_directly_issued_by(ca)
+    except (InvalidSignature, ValueError, TypeError):
+        raise KeysError(
+            f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
+        ) from None
+    named = own.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    common_name = str(named[0].value) if named else ""
+    if common_name != member.common_name:
+        raise KeysError(
+            f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
+            f"{member.name}, or issue it anew"
+        )
+    for certificate, what in ((own, path), (ca, folder / CA)):
+        begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+        if now > ends:
+            renewal = f"gridpeers keys issue {member.name}" if certificate is own else "gridpeers keys init"
+            raise KeysError(f"{what}: expired on {ends:%Y-%m-%d %H:%M} UTC; {renewal} makes a new one")
+        if now < begins:
+            raise KeysError(
+                f"{what}: is valid from {begins:%Y-%m-%d %H:%M} UTC, and the clock of this host shows "
+                f"{now:%Y-%m-%d %H:%M}; set the clock"
+            )
+    return min(own.not_valid_after_utc, ca.not_valid_after_utc)
+
+
+def _check_key(path: Path, certificate: x509.Certificate) -> None:
+    """Raise KeysError unless a private key is that of a certificate, and private."""
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    data = _bytes(path)
+    if not is_private(path):
+        mode = stat.S_IMODE(path.stat().st_mode)
+        raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
+    try:
+        key = load_pem_private_key(data, None)
+    except (ValueError, TypeError) as error:
+        raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
+    if key.public_key() != certificate.public_key():
+        raise KeysError(f"{path}: is not the key of {path.with_suffix('.pem').name}; copy both from the same site")
+
+
+def _certificate(path: Path) -> x509.Certificate:
+    from cryptography import x509
+
+    data = _bytes(path)
+    try:
+        return x509.load_pem_x509_certificate(data)
+    except ValueError:
+        raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise KeysError(f"{path}: is missing; copy it from the folder where the site issues certificates") from None
+    except OSError as error:
+        raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def _or(roles: Sequence[Role]) -> str:
+    return " or ".join(roles)

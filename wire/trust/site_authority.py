@@ -1,0 +1,265 @@
+"""The authority of a site: make it, issue certificates, revoke them. Its private key stays in its folder."""
+
+from __future__ import annotations
+
+import base64
+import os
+import shutil
+import tempfile
+from collections.abc import Callable
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from wire.bounds import is_name
+from wire.printable import printable
+from wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, read_list
+from wire.trust.member import LONGEST_COMMON_NAME, Member, Role
+
+if TYPE_CHECKING:
+    from cryptography import x509
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+
+LIFE_OF_CA = timedelta(days=3650)
+"""Life of an authority: ten years, as no process can renew it."""
+
+LIFE_DAYS = 365
+"""Life (days) of a member's certificate."""
+
+SKEW = timedelta(minutes=5)
+"""A certificate is valid from so long before its issue: clocks of hosts differ."""
+
+FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
+"""Members of every new site."""
+
+
+def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = None) -> MemberList:
+    """Make a site's authority and its first certificates in a new folder, which is there whole or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+        New folder; its name is the site's.
+    days : float, optional
+        Life of the first certificates (days).
+    now : datetime, optional
+        Present time.
+
+    Raises
+    ------
+    KeysError
+        If the folder is there, or cannot be made.
+    """
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    now = now or datetime.now(UTC)
+    site = folder.absolute().name
+    if not is_name(site):
+        raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
+    if folder.exists():
+        raise KeysError(f"{folder}: is there already; gridpeers keys show {folder} shows it")
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        new = Path(tempfile.mkdtemp(prefix=f".{site}-", dir=folder.absolute().parent))  # mode 0700
+    except OSError as error:
+        raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
+    try:
+        key = ec.generate_private_key(ec.SECP256R1())
+        ca = _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA)
+        _write_key(new / CA_KEY, key)
+        _write_pem(new / CA, ca)
+        known = _write_list(new, MemberList(site=site, version=0))
+        for name, role in FIRST:
+            issue(new, name, role, days=days, now=now)
+        known = read_list(new)
+        new.rename(folder)
+    except BaseException:
+        shutil.rmtree(new, ignore_errors=True)
+        raise
+    return known
+
+
+def issue(
+    folder: Path, name: str, role: Role = "agent", *, days: float = LIFE_DAYS, now: datetime | None = None
+) -> Member:
+    """Issue a certificate to a name, or renew it; return the member.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the site, with its authority's key.
+    name : str
+        Name; of an agent that of its inverter.
+    role : Role, optional
+        Its role; a name keeps the one it has.
+    days : float, optional
+        Life of the certificate (days).
+    now : datetime, optional
+        Present time.
+
+    Raises
+    ------
+    KeysError
+        If the name cannot be used, has another role, or the authority's key is not here.
+    """
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    now = now or datetime.now(UTC)
+    if not is_name(name) or name in ("ca", "members"):
+        raise KeysError(
+            f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", "." and not "ca"'
+        )
+    known, ca, ca_key = _authority(folder)
+    before = known.of(name)
+    if before is not None and before.role != role:
+        raise KeysError(f"{name}: has the role {before.role} already; give the {role} another name")
+    generation = 1 if before is None else before.generation + before.revoked
+    ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
+    member = Member(name=name, role=role, generation=generation, expires=f"{ends:%Y-%m-%d}")
+    if len(member.common_name) > LONGEST_COMMON_NAME - 4:  # room for later generations
+        raise KeysError(
+            f"{name}: is too long for a certificate; {role}:NAME has at most {LONGEST_COMMON_NAME - 4} letters"
+        )
+    key = ec.generate_private_key(ec.SECP256R1())
+    certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
+    _write_key(folder / f"{name}.key", key)
+    _write_pem(folder / f"{name}.pem", certificate)
+    _write_list(folder, _with(known, member), ca_key)
+    return member
+
+
+def revoke(folder: Path, name: str) -> Member:
+    """Revoke the certificate of a name, and delete its key here; return the member.
+
+    Raises
+    ------
+    KeysError
+        If there is no such certificate, or the authority's key is not here.
+    """
+    known, _, ca_key = _authority(folder)
+    member = known.of(name)
+    if member is None:
+        have = ", ".join(each.name for each in known.members)
+        raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
+    if member.revoked:
+        raise KeysError(f"{name}: its certificate is revoked already")
+    revoked = msgspec.structs.replace(member, revoked=True)
+    _write_list(folder, _with(known, revoked), ca_key)
+    (folder / f"{name}.key").unlink(missing_ok=True)
+    return revoked
+
+
+def _with(known: MemberList, member: Member) -> MemberList:
+    others = [each for each in known.members if each.name != member.name]
+    return msgspec.structs.replace(known, version=known.version + 1, members=(*others, member))
+
+
+def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurvePrivateKey]:
+    """Return the members, and certificate and private key of the authority."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    known = read_list(folder)
+    if not (folder / CA_KEY).is_file():
+        raise KeysError(f"{folder / CA_KEY}: is missing; certificates are issued and revoked where the site was made")
+    key = _read_key(folder)
+    assert isinstance(key, ec.EllipticCurvePrivateKey)
+    return known, x509.load_pem_x509_certificate((folder / CA).read_bytes()), key
+
+
+def _read_key(folder: Path) -> object:
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    try:
+        return load_pem_private_key((folder / CA_KEY).read_bytes(), None)
+    except (ValueError, TypeError, OSError) as error:
+        raise KeysError(f"{folder / CA_KEY}: cannot be read: {printable(str(error), 80)}") from None
+
+
+def _certificate(
+    common_name: str,
+    key: EllipticCurvePrivateKey,
+    ca_key: EllipticCurvePrivateKey,
+    ca: x509.Certificate | None,
+    now: datetime,
+    life: timedelta,
+) -> x509.Certificate:
+    """Return a certificate signed by an authority, or the authority's own if there is none yet."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
+
+    subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
+    authority = ca is None
+    usage = {
+        "digital_signature": not authority,
+        "key_cert_sign": authority,
+        "crl_sign": authority,
+        "content_commitment": False,
+        "key_encipherment": False,
+        "data_encipherment": False,
+        "key_agreement": False,
+        "encipher_only": False,
+        "decipher_only": False,
+    }
+    builder = (
+        x509.CertificateBuilder()
+        .subject_name(subject)
+        .issuer_name(subject if ca is None else ca.subject)
+        .public_key(key.public_key())
+        .serial_number(x509.random_serial_number())
+        .not_valid_before(min(now - SKEW, now + life))
+        .not_valid_after(now + life)
+        .add_extension(x509.BasicConstraints(ca=authority, path_length=0 if authority else None), critical=True)
+        .add_extension(x509.KeyUsage(**usage), critical=True)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
+        .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(ca_key.public_key()), critical=False)
+    )
+    if not authority:
+        both = [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]  # each end of a link may be either
+        builder = builder.add_extension(x509.ExtendedKeyUsage(both), critical=False)
+    return builder.sign(ca_key, hashes.SHA256())
+
+
+def _write_list(folder: Path, known: MemberList, ca_key: EllipticCurvePrivateKey | None = None) -> MemberList:
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import ec
+
+    if ca_key is None:
+        key = _read_key(folder)
+        assert isinstance(key, ec.EllipticCurvePrivateKey)
+        ca_key = key
+    signature = ca_key.sign(msgspec.json.encode(known), ec.ECDSA(hashes.SHA256()))
+    signed = SignedList(list=known, signature=base64.b64encode(signature).decode())
+    _write(folder / LIST, msgspec.json.format(msgspec.json.encode(signed), indent=1) + b"\n", 0o644)
+    return known
+
+
+def _write_key(path: Path, key: EllipticCurvePrivateKey) -> None:
+    from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
+    _write(path, key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()), 0o600)
+
+
+def _write_pem(path: Path, certificate: x509.Certificate) -> None:
+    from cryptography.hazmat.primitives.serialization import Encoding
+
+    _write(path, certificate.public_bytes(Encoding.PEM), 0o644)
+
+
+def _opener(mode: int) -> Callable[[str, int], int]:
+    return lambda path, flags: os.open(path, flags, mode)
+
+
+def _write(path: Path, data: bytes, mode: int) -> None:
+    """Write a file whole or not at all; it has its mode before anything stands in it."""
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.unlink(missing_ok=True)
+        with open(part, "xb", opener=_opener(mode)) as file:
+            file.write(data)
+        part.replace(path)
+    except OSError as error:
+        raise KeysError(f"{path}: cannot be written: {error.strerror}") from None
