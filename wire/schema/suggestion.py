@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 LONGEST_LIST = 30
-"""Names that are listed at the most: all commands, all keys of any table of a scenario, but not all buses of a feeder."""
+"""Names that are listed at the most: all commands, or keys of a table of a scenario, but not all buses of a feeder."""
 
 SHORTEST_START = 3
 """Letters from which on the start of a name is taken for the name; "in" may be anything."""
