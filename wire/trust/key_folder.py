@@ -181,7 +181,8 @@ def _check_certificate(
                 f"{what}: is valid from {begins:%Y-%m-%d %H:%M} UTC, and the clock of this host shows "
                 f"{now:%Y-%m-%d %H:%M}; set the clock"
             )
-    return min(own.not_valid_after_utc, ca.not_valid_after_utc)
+    first_end: datetime = min(own.not_valid_after_utc, ca.not_valid_after_utc)
+    return first_end
 
 
 def _check_key(path: Path, certificate: x509.Certificate) -> None:
