@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, Connect, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
+from scenarios.live.access import Access
 
 
 def load(
@@ -20,6 +21,9 @@ def load(
     run: Run = RUN,
     connect: Connect = None,
     wait: Wait = 5.0,
+    keys: Keys = None,
+    member: As = "",
+    insecure: Insecure = False,
 ) -> None:
     """Set a load of a running plant.
 
@@ -34,7 +38,7 @@ def load(
         from scenarios.live.load_request import load_setting
 
         setting = load_setting(factor, P, Q)
-    with run_client(run, connect, wait) as client:
+    with run_client(run, connect, wait, Access(keys, member, insecure), acts=True) as client:
         from scenarios.live.run_requests import ask
 
         typer.echo(ask(client, "load", name, setting))
