@@ -73,6 +73,7 @@ class ViewedRun:
 
     def __enter__(self) -> Self:
         """Start plant and agents; return once the run has gone on for some seconds."""
+        signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))  # so that the context ends, too
         try:
             self.folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="gridpeers-view-")))
             self.endpoint = free_endpoint()
