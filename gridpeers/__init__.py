@@ -34,6 +34,9 @@ if TYPE_CHECKING:
     from gridpeers.studies.replaying import Counterfactual, counterfactual, replay
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
+    from scenarios.checks.check_registry import CHECKS
+    from scenarios.checks.check_verdict import CheckVerdict, NotJudgedError, Violation
+    from scenarios.checks.checked_case import CheckedCase
     from scenarios.results.evaluation.benchmark_registry import CLAIMS
     from scenarios.results.evaluation.claims import Claim
     from scenarios.results.evaluation.metric import METRICS
@@ -45,10 +48,12 @@ if TYPE_CHECKING:
     from wire.schema.plausible import Plausible, Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
-    link_fault, metric = FAULTS.register, METRICS.register
+    check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
 
 _HOME = {
     "BrokenRunError": "scenarios.run",
+    "CheckVerdict": "scenarios.checks.check_verdict",
+    "CheckedCase": "scenarios.checks.checked_case",
     "Claim": "scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
     "Counterfactual": "gridpeers.studies.replaying",
@@ -57,6 +62,7 @@ _HOME = {
     "Law": "agents.laws.law",
     "LinkFault": "netem.models.own_fault",
     "Neighbour": "agents.laws.law",
+    "NotJudgedError": "scenarios.checks.check_verdict",
     "Own": "agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
     "Plausible": "wire.schema.plausible",
@@ -69,8 +75,10 @@ _HOME = {
     "Term": "agents.laws.law",
     "Terms": "agents.laws.law",
     "Unit": "wire.schema.plausible",
+    "Violation": "scenarios.checks.check_verdict",
     "WindowData": "scenarios.results.evaluation.window_metrics",
     "catalogue": "scenarios.schema.loading",
+    "check": "scenarios.checks.check_registry:CHECKS.register",
     "claim": "scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "counterfactual": "gridpeers.studies.replaying",
@@ -88,6 +96,8 @@ _HOME = {
 
 __all__ = [
     "BrokenRunError",
+    "CheckVerdict",
+    "CheckedCase",
     "Claim",
     "Comparison",
     "Counterfactual",
@@ -96,6 +106,7 @@ __all__ = [
     "Law",
     "LinkFault",
     "Neighbour",
+    "NotJudgedError",
     "Own",
     "Plausible",
     "Prediction",
@@ -108,8 +119,10 @@ __all__ = [
     "Term",
     "Terms",
     "Unit",
+    "Violation",
     "WindowData",
     "catalogue",
+    "check",
     "claim",
     "compare",
     "counterfactual",

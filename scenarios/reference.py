@@ -21,6 +21,8 @@ from netem.schema.partition import Partition
 from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
+from scenarios.checks import check_registry
+from scenarios.checks.check_registry import CHECKS
 from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
 from scenarios.results.evaluation import claims, metric
 from scenarios.results.evaluation.benchmark_registry import CLAIMS
@@ -45,6 +47,11 @@ _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
     "laws": (LAWS, _LAW, 'law = "mine:Mine", or law = { use = "mine:Mine", gain = 2.0 }, for all cases or in one'),
     "metrics": (METRICS, metric.__doc__ or "", 'metrics = ["mine:nadir_Hz", { use = "mine:Within", band_Hz = 0.05 }]'),
     "claims": (CLAIMS, claims.__doc__ or "", 'claims = ["mine:restored"]'),
+    "checks": (
+        CHECKS,
+        check_registry.__doc__ or "",
+        'checks = ["mine:Calm", { use = "frequency", within_s = 1.0 }, { use = "rating", off = true }]',
+    ),
     "faults": (FAULTS, own_fault.__doc__ or "", '"mine:Jammer" = { share = 0.2 } in an entry [[link]]'),
     "graphs": (GRAPHS, graphs.__doc__ or "", 'graph = "mine:star", or graph = { use = "mine:Nearest", k = 3 }'),
 }

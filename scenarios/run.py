@@ -34,13 +34,15 @@ from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import no_room, refusal, set_broken, set_complete, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
-from scenarios.schema.plugin_keys import claims_of
+from scenarios.schema.plugin_keys import checks_of, claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.output import OutputLostError
-from wire.messages import Pacing, Telemetry
+from wire.messages import Pacing, PlantEvent, Telemetry
 
 if TYPE_CHECKING:
+    from scenarios.checks.check_verdict import CheckVerdict
     from scenarios.live.numbers.departures import Departures
+    from scenarios.results.event_windows import CaseRecord
     from scenarios.results.report import RunReport
 
 Driver = Literal["processes", "inprocess"]
@@ -54,7 +56,7 @@ _SHOWN = 3
 
 _AFTER_RUN = (
     *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
-    *("scenarios.results.report", "scenarios.results.plots.drawing"),
+    *("scenarios.results.report", "scenarios.results.plots.drawing", "scenarios.checks.judging"),
 )
 """Modules that are used after a run, with numpy, and imported while it goes on: this process has little to do then."""
 
@@ -165,6 +167,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
+    from scenarios.checks.checks_file import FILE, verdicts_json
     from scenarios.results.evaluation.claims import judge, judged
     from scenarios.results.findings import find
     from scenarios.results.report import RunReport, plain
@@ -183,6 +186,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
+    checks = {case: _judged(request, case, record, recorded[case].events) for case, record in cases.items()}
+    write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
         if request.lasting:
             from scenarios.results.plots.drawing import drawing_of
@@ -199,6 +204,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             findings=findings,
             verdicts=(*judge(findings, benchmark.claims), *own),
             benchmark=benchmark,
+            checks=checks,
             notes=[*notes, *_notes(recorded, request.clock)],
             folder=place + "/" if request.lasting else "",
         )
@@ -206,6 +212,18 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
     set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
     return report
+
+
+def _judged(
+    request: Request, case: str, record: CaseRecord, events: tuple[PlantEvent, ...]
+) -> tuple[CheckVerdict, ...]:
+    """Return the verdicts of the checks on a case."""
+    from scenarios.checks.checked_case import CheckedCase
+    from scenarios.checks.judging import judge_case
+
+    scenario, folder = request.scenario, request.folder / case
+    checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, events, folder)
+    return judge_case(checked, checks_of(scenario))
 
 
 def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 
+from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.results.link_record import COLUMNS
 from scenarios.sweep.column_labels import unit_of
 
@@ -51,6 +52,38 @@ def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     frame = pd.concat(frames, names=["window", "island"])
     frame.attrs["units"] = next(iter(frames.values())).attrs["units"]
     return frame
+
+
+def checks_frame(verdicts: Iterable[CheckVerdict]) -> pd.DataFrame:
+    """Return verdicts of checks, a row per check; value, unit and limit are those of its first violation.
+
+    Examples
+    --------
+    >>> frame = checks_frame([CheckVerdict(check="heal", status="not judged", reason="no link was cut")])
+    >>> frame["status"].to_dict(), frame["text"]["heal"]
+    ({'heal': 'not judged'}, 'no link was cut')
+    """
+    none = Violation(text="")
+    rows = {}
+    for verdict in verdicts:
+        first = verdict.violations[0] if verdict.violations else none
+        rows[verdict.check] = {
+            "status": verdict.status,
+            "violations": verdict.count,
+            "t": _nan(first.t),
+            "agent": first.agent,
+            "value": _nan(first.value),
+            "unit": first.unit,
+            "limit": _nan(first.limit),
+            "text": first.text or verdict.reason,
+        }
+    frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("check")
+    frame.attrs["units"] = {"t": "s"}
+    return frame
+
+
+def _nan(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -15,6 +15,10 @@ from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import draw
 from plant.equipment import Feeder
+from scenarios.checks import checks_file
+from scenarios.checks.check_verdict import CheckVerdict
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.judging import judge_case
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import live_drawing
 from scenarios.results.evaluation.benchmark_registry import benchmark_of
@@ -24,7 +28,7 @@ from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
 from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.schema import scenario_model as model
-from scenarios.schema.plugin_keys import claims_of
+from scenarios.schema.plugin_keys import checks_of, claims_of
 from wire.messages import PlantEvent
 from wire.schema.suggestion import suggestion
 
@@ -77,6 +81,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         super().__init__(folder, spec, feeder)
         self._cases = self.numbers["cases"]
         self._results = {case: Result(folder, spec, feeder, self, case) for case in spec.cases}
+        self._checks: dict[str, tuple[CheckVerdict, ...]] | None = None
 
     def __getitem__(self, case: str) -> Result:
         if case not in self._results:
@@ -95,6 +100,20 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         frame = pd.concat({case: result.metrics for case, result in self.items()}, names=["case"])
         frame.attrs["units"] = next(iter(self.values())).metrics.attrs["units"]
         return frame
+
+    def check_verdicts(self, case: str) -> tuple[CheckVerdict, ...]:
+        """Return the verdicts of the checks on a case; on a run without them, those that it would get now."""
+        if self._checks is None:
+            file = self.folder / checks_file.FILE
+            self._checks = self._folder.read(file.name, checks_file.read_verdicts) if file.exists() else {}
+        if case not in self._checks:
+            self._checks[case] = judge_case(self[case].checked_case, checks_of(self._spec))
+        return self._checks[case]
+
+    @property
+    def checks(self) -> pd.DataFrame:
+        """Verdicts of the checks of all cases, a row per (case, check)."""
+        return pd.concat({case: result.checks for case, result in self.items()}, names=["case"])
 
     @property
     def sha256(self) -> dict[str, str]:
@@ -269,6 +288,23 @@ class Result(_FromFolder):
     def disturbed(self) -> list[str]:
         """Windows of a run in real time in which something happened that the scenario does not tell."""
         return list(self._whole.get("disturbed", ()))
+
+    @cached_property
+    def checked_case(self) -> CheckedCase:
+        """The case as checks see it: what a check of one's own is called with."""
+        events = _plant_events(self)
+        came = windows(as_they_came(self.spec, events), self.spec.time.end_s)
+        return CheckedCase.of(self.spec, self._feeder, self.case, self.record, came, events, self.folder / self.case)
+
+    @property
+    def check_verdicts(self) -> tuple[CheckVerdict, ...]:
+        """Verdicts of the checks, each with its violations (docs/checks.md)."""
+        return self._run.check_verdicts(self.case)
+
+    @cached_property
+    def checks(self) -> pd.DataFrame:
+        """Verdicts of the checks, a row per check: status, number of violations, and the first one or the reason."""
+        return frames.checks_frame(self.check_verdicts)
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from io import StringIO
 
 from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from scenarios.checks.check_verdict import CheckVerdict, summary
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
 from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
@@ -38,6 +39,8 @@ class RunReport:
     """Claims judged; empty for a scenario without a benchmark."""
     benchmark: Benchmark = NO_BENCHMARK
     """The publication of the experiment; its numbers stand beside ours."""
+    checks: Mapping[str, tuple[CheckVerdict, ...]] = field(default_factory=dict)
+    """Verdicts of the checks, by case."""
     notes: Sequence[str]
     """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
@@ -97,6 +100,8 @@ def _print(report: RunReport, console: Console) -> None:
             if verdict.status == "MISS":
                 lines.append(Text(f"{'':7}  {verdict.claim.known_miss}", style="dim"))
         blocks.append([*lines, _count(report.verdicts), *report.benchmark.lines(report.findings)])
+    if report.checks:
+        blocks.append([_verdict_of(case, verdicts) for case, verdicts in report.checks.items()])
     blocks += [[Text.assemble(("NOTE", "yellow"), f"  {note}")] for note in _all_notes(report)]
     blocks += [[Text.assemble("Results: ", (report.folder, "bold"))]] if report.folder else []
     for number, block in enumerate(blocks):
@@ -104,6 +109,12 @@ def _print(report: RunReport, console: Console) -> None:
             console.print()
         for line in block:
             console.print(line, markup=False, highlight=False, soft_wrap=not isinstance(line, Table))
+
+
+def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
+    """Return the verdict of the checks on a case, one line."""
+    failed = any(verdict.status == "failed" for verdict in verdicts)
+    return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
 
 def _rendered(grid: Grid) -> Iterator[RenderableType]:

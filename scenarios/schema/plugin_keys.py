@@ -1,4 +1,4 @@
-"""The keys of a scenario that name something plugged in: its laws, graphs, metrics, claims, faults, and its benchmark.
+"""The keys of a scenario that name something plugged in: its laws, graphs, metrics, claims, checks, faults, benchmark.
 
 Such a key is a text, or a table with `use` (a law also with `command` or `fmu`), `folder` and parameters.
 """
@@ -18,6 +18,8 @@ from agents.graphs import GRAPHS, make_graph, neighbours_by
 from netem.models.own_fault import FAULTS
 from netem.schema.netem import Netem
 from plant.equipment import Feeder, InverterRow
+from scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
+from scenarios.checks.check_registry import CHECKS, check_name, chosen_checks
 from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
 from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.schema.participants import with_agent
@@ -75,6 +77,11 @@ def claims_of(scenario: ScenarioModel) -> list[Plugin]:
     return [plugin_of(key) for key in scenario.claims]
 
 
+def checks_of(scenario: ScenarioModel) -> dict[str, Plugin]:
+    """Return the checks that judge a scenario's runs, by their names in the verdict."""
+    return chosen_checks(scenario.checks)
+
+
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario as any process can follow it: with the folder of everything that stands beside its file."""
     cases = {
@@ -90,8 +97,9 @@ def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
         scenario,
         paper=placed(scenario.paper, BENCHMARKS, folder),
         law=placed(scenario.law, LAWS, folder),
-        metrics=tuple(placed(_labelled(key), METRICS, folder) for key in scenario.metrics),
+        metrics=tuple(placed(_labelled(key, METRICS), METRICS, folder) for key in scenario.metrics),
         claims=tuple(placed(key, CLAIMS, folder) for key in scenario.claims),
+        checks=tuple(placed(_labelled(key, CHECKS), CHECKS, folder) for key in scenario.checks),
         netem=_placed_faults(scenario.netem, folder),
         cases=cases,
     )
@@ -122,11 +130,11 @@ def _placed_faults(netem: Netem, folder: Path) -> Netem:
     return replace(netem, links=tuple(links))
 
 
-def _labelled(key: PluginKey) -> PluginKey:
-    """Return a metric with a name in tables: one of a decorator's name keeps that name."""
+def _labelled(key: PluginKey, registry: Registry[Any]) -> PluginKey:
+    """Return a metric or check with a name in tables: one of a decorator's name keeps that name."""
     table = table_of(key)
     use = str(table.get("use", ""))
-    return table | {"name": use} if METRICS.reference(use) != use and "name" not in table and good_name(use) else key
+    return table | {"name": use} if registry.reference(use) != use and "name" not in table and good_name(use) else key
 
 
 def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
@@ -161,6 +169,34 @@ def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
         names.append(name)
     for i, key in enumerate(scenario.claims):
         _check(f"claims[{i}]", key, CLAIMS, problems)
+    _check_checks(scenario, problems)
+
+
+def _check_checks(scenario: ScenarioModel, problems: Problems) -> None:
+    """Note checks that there are not, that cannot be made with their limits, and two of one name."""
+    names: list[str] = []
+    for i, key in enumerate(scenario.checks):
+        path, table = f"checks[{i}]", table_of(key)
+        label, off = table.pop("name", ""), table.pop("off", False)
+        if not isinstance(label, str) or (label and not good_name(label)):
+            problems.add(f"{path}.name", "a name in the verdict is up to 41 letters, digits and _: calm_at_night")
+            label = ""
+        if not isinstance(off, bool):
+            problems.add(f"{path}.off", "must be true or false; true takes the check out of the verdict")
+            off = False
+        plugin = _check(path, key if isinstance(key, str) else table, CHECKS, problems)
+        if plugin is None:
+            continue
+        name = check_name(table | {"name": label})
+        if name in ALWAYS_CHECKED and plugin.use != name:
+            problems.add(
+                path, f'every run has a check "{name}" already; give this one a name: {{ name = "my_{name}" }}'
+            )
+        elif name in names:
+            problems.add(path, f'there is a check "{name}" in this list already; give one of them another name')
+        elif off and name not in ALWAYS_CHECKED:
+            problems.add(f"{path}.off", f'no run has a check "{name}" unless it is named; leave this entry out')
+        names.append(name)
 
 
 def check_laws(scenario: ScenarioModel, problems: Problems) -> None:

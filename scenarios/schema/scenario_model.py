@@ -214,6 +214,9 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     "within_50mHz" }] (`gridpeers doc metrics`)."""
     claims: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
     """Claims of your own that the run is judged by: ["mine:restored"] (`gridpeers doc claims`)."""
+    checks: Annotated[tuple[PluginKey, ...], Example('["mine:Name"]')] = ()
+    """Checks of your own, and other limits for those that judge every run: ["mine:Calm", { use = "frequency", within_s
+    = 1.0 }, { use = "rating", off = true }] (`gridpeers doc checks`)."""
     without_agent: Annotated[tuple[str, ...], Example('["inv2"]')] = ()
     """Inverters that have no agent, in every case, e.g. ["inv2"]: the plant runs them on primary droop at their first
     set-points, other agents do not hear of them, and the sharing indices leave them out."""

@@ -69,6 +69,9 @@ def run(
     self_check: Annotated[
         bool, typer.Option("--self-check", help="Test afterwards whether emulated links did what the scenario says.")
     ] = False,
+    require_checks: Annotated[
+        bool, typer.Option("--require-checks", help="Exit code 1 also if a check fails, which else is only shown.")
+    ] = False,
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO/TIME when left out."),
@@ -82,8 +85,8 @@ def run(
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 
-    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed,
-    2 bad usage or a bad file, 3 the run broke.
+    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed (with
+    --require-checks a check, too), 2 bad usage or a bad file, 3 the run broke.
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
@@ -101,7 +104,8 @@ def run(
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
     page = page_socket(port) if view else None
-    carry_out(chosen(spec, case, seed), feeder, driver, out, pace, self_check=self_check, page=page)
+    chosen_cases = chosen(spec, case, seed)
+    carry_out(chosen_cases, feeder, driver, out, pace, self_check=self_check, require_checks=require_checks, page=page)
 
 
 def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
@@ -133,6 +137,7 @@ def carry_out(
     pace: Pace,
     *,
     self_check: bool = False,
+    require_checks: bool = False,
     outside: tuple[str, ...] | None = None,
     page: socket.socket | None = None,
 ) -> NoReturn:
@@ -200,4 +205,7 @@ def carry_out(
         from scenarios.results.report import show
 
         show(report, console)
-    raise typer.Exit(CLAIM_FAILED if any(verdict.status == "FAIL" for verdict in report.verdicts) else PASSED)
+    failed = any(verdict.status == "FAIL" for verdict in report.verdicts)
+    if require_checks:
+        failed |= any(verdict.status == "failed" for of in report.checks.values() for verdict in of)
+    raise typer.Exit(CLAIM_FAILED if failed else PASSED)

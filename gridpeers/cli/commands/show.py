@@ -9,7 +9,7 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, fail, load, require
 from wire.counted import counted
 
-Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "faults", "graphs"]
+Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
 """Values of the argument of `doc`."""
 
 
@@ -66,7 +66,7 @@ def doc(
     """Print a reference page that is made from the code.
 
     keys and messages are those of the wire; scenario is the scenario file, with units and defaults; laws, metrics,
-    claims, faults and graphs are what can be plugged in: those that there are, with their parameters, and your own.
+    claims, checks, faults and graphs are what can be plugged in: those that there are, with parameters, and your own.
 
     Example:  gridpeers doc scenario
     """

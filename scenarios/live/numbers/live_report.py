@@ -7,6 +7,9 @@ from dataclasses import replace
 
 from rich.console import Console
 
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.checks_file import FILE, verdicts_json
+from scenarios.checks.judging import judge_case
 from scenarios.live.live_folders import Folders
 from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Departures, compare, few
@@ -20,6 +23,7 @@ from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
+from scenarios.schema.plugin_keys import checks_of
 from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
@@ -45,12 +49,17 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     record = CaseRecord.of(departures.happened, feeder, case, recorded, departures.windows.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
     findings = find(departures.happened, feeder, {case: record})
+    checked = CheckedCase.of(
+        departures.happened, feeder, case, record.history, record.windows, recorded.events, metrics.folder / case
+    )
+    checks = {case: judge_case(checked, checks_of(scenario))}
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
         findings=findings,
         verdicts=(),
         benchmark=NO_BENCHMARK if departures.disturbed else benchmark_of(scenario.paper),
+        checks=checks,
         notes=[f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
         folder=shown(metrics.folder) + "/",
     )
@@ -58,6 +67,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     write_whole(
         metrics.folder / "metrics.json", metrics_json(metrics, findings, facts, _live_table(recorded, departures))
     )
+    write_whole(metrics.folder / FILE, verdicts_json(checks))
     write_whole(metrics.folder / "report.txt", plain(report))
 
     if not figures:

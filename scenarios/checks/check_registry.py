@@ -1,0 +1,88 @@
+"""Checks: what judges every run, their registry, and the choice that a scenario makes.
+
+    @gridpeers.check("nadir")
+    def nadir(case):
+        '''No grid-forming inverter falls below 59.3 Hz.'''
+        f = case.history.f[:, case.nameplates.GFM]
+        for row, column in zip(*(f < 59.3).nonzero()):
+            yield gridpeers.Violation(
+                text="low frequency", t=case.history.t[row], agent=case.nameplates.names[column],
+                value=f[row, column], unit="Hz", limit=59.3,
+            )
+
+A check is a function of a recorded case that returns its violations, none for a run that passes; it raises
+`gridpeers.NotJudgedError` where the record has no data for it. A class with parameters (annotated attributes,
+`docs/plugins.md`), which are its limits, and a method `__call__(self, case)` is a check too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from wire.plugins.plugin import KEYS, Plugin, callable_objection, plugin_of, table_of
+from wire.plugins.registry import Registry
+
+CHOICE_KEYS = (*KEYS, "name", "off")
+"""Keys of an entry of `checks` that are no limits of the check."""
+
+_PLACES = {
+    "frequency": "physics.band_checks:Frequency",
+    "voltage": "physics.band_checks:Voltage",
+    "power_sharing": "physics.sharing_checks:PowerSharing",
+    "var_sharing": "physics.sharing_checks:VarSharing",
+    "rating": "physics.rating_check:Rating",
+    "oscillation": "physics.oscillation_check:Oscillation",
+    "steady": "physics.steady_check:SteadyEnd",
+    "power_balance": "physics.balance_check:PowerBalance",
+    "message_account": "communication.account_check:MessageAccount",
+    "heal": "communication.heal_check:Rejoined",
+    "stale_values": "communication.stale_check:StaleValues",
+    "last_words": "communication.last_words_check:LastWords",
+}
+
+CHECKS: Registry[Any] = Registry(
+    "check",
+    "checks",
+    lambda it: callable_objection(it, "case", CHOICE_KEYS),
+    own={name: f"scenarios.checks.{place}" for name, place in _PLACES.items()},
+)
+"""Checks by name; those of gridpeers come first."""
+
+ALWAYS = tuple(CHECKS.own)
+"""Checks that judge every run, unless its scenario switches one off."""
+
+
+def chosen_checks(entries: Iterable[str | Mapping[str, Any]]) -> dict[str, Plugin]:
+    """Return the checks of a run by their names in the verdict: those of every run, changed by a scenario's entries.
+
+    An entry takes the place of the check that has its name; `off = true` takes that one out.
+
+    Examples
+    --------
+    >>> found = chosen_checks([{"use": "rating", "P_limit_pu": 1.2}, {"use": "steady", "off": True}, "mine:Calm"])
+    >>> found["rating"].parameters, "steady" in found, found["Calm"].use
+    ((('P_limit_pu', 1.2),), False, 'mine:Calm')
+    """
+    found = {name: Plugin(use=name) for name in ALWAYS}
+    for entry in entries:
+        table = table_of(entry)
+        name, off = check_name(table), table.pop("off", False)
+        table.pop("name", "")
+        if off:
+            found.pop(name, None)
+        else:
+            found[name] = plugin_of(table)
+    return found
+
+
+def check_name(entry: str | Mapping[str, Any]) -> str:
+    """Return the name of an entry in the verdict: its own, or the last part of its reference.
+
+    Examples
+    --------
+    >>> check_name("mine:Calm"), check_name({"use": "frequency", "name": "tight"})
+    ('Calm', 'tight')
+    """
+    table = table_of(entry)
+    return str(table.get("name") or str(table.get("use", "")).rpartition(":")[2].rpartition(".")[2])

@@ -1,0 +1,88 @@
+"""The verdict of a check on a run: its status, and each violation with time, agent, value, unit and limit."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+CheckStatus = Literal["passed", "failed", "not judged"]
+"""Not judged: the record has no data for the check, or the run never was in a state that it is about."""
+
+SHOWN = 20
+"""Most violations that a verdict keeps; it counts all."""
+
+
+class NotJudgedError(Exception):
+    """A check cannot judge this run; the text is the reason, such as what the record lacks."""
+
+
+class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One violation of a limit.
+
+    Examples
+    --------
+    >>> found = dict(text="abs(f - 60), event1", t=3.5, agent="inv1", value=0.1364, unit="Hz", limit=0.01)
+    >>> Violation(**found).sentence
+    'abs(f - 60), event1: inv1 0.136 Hz at t = 3.50 s (limit 0.01 Hz)'
+    """
+
+    text: str
+    """What is out of its limit, and when it is judged."""
+    t: float | None = None
+    """When (s of run time)."""
+    agent: str = ""
+    """Agent or inverter; of a link its receiver. Empty for one of the whole network."""
+    value: float | None = None
+    """What was found, in `unit`."""
+    unit: str = ""
+    """Unit of value and limit; empty for a pure number."""
+    limit: float | None = None
+    """What would have passed, in `unit`."""
+
+    @property
+    def sentence(self) -> str:
+        """The violation on one line."""
+        unit = f" {self.unit}" if self.unit else ""
+        found = [self.agent] if self.agent else []
+        found += [f"{self.value:.3g}{unit}"] if self.value is not None else []
+        found += [f"at t = {self.t:.2f} s"] if self.t is not None else []
+        found += [f"(limit {self.limit:g}{unit})"] if self.limit is not None else []
+        return f"{self.text}: {' '.join(found)}" if found else self.text
+
+
+class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """The judgement of one check on one case."""
+
+    check: str
+    """Name of the check."""
+    status: CheckStatus
+    """Its judgement."""
+    reason: str = ""
+    """Why it was not judged, or, of a check that raised an error, why it failed."""
+    violations: tuple[Violation, ...] = ()
+    """The violations, the first `SHOWN` as the check gave them."""
+    count: int = 0
+    """Number of all violations."""
+
+    @property
+    def sentence(self) -> str:
+        """The verdict on one line."""
+        more = f", and {self.count - 1} more" if self.count > 1 else ""
+        detail = self.violations[0].sentence + more if self.violations else self.reason
+        return f"{self.check} {self.status}" + (f": {detail}" if detail else "")
+
+
+def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
+    """Return the verdict of a case on one line: how many passed, and each that failed.
+
+    Examples
+    --------
+    >>> summary((CheckVerdict(check="rating", status="passed"), CheckVerdict(check="heal", status="not judged")))
+    '1 of 1 checks passed, 1 not judged'
+    """
+    passed = sum(verdict.status == "passed" for verdict in verdicts)
+    failed = [verdict for verdict in verdicts if verdict.status == "failed"]
+    idle = len(verdicts) - passed - len(failed)
+    line = f"{passed} of {passed + len(failed)} checks passed" + (f", {idle} not judged" if idle else "")
+    return "; ".join([line, *(verdict.sentence for verdict in failed)])

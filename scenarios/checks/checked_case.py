@@ -1,0 +1,167 @@
+"""A recorded case as its checks see it: rows, windows, islands, events, and the record of messages and decisions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from plant.equipment import Feeder
+from plant.equipment.bus_islands import islands_after
+from scenarios.checks.check_verdict import NotJudgedError
+from scenarios.results.event_windows import Window
+from scenarios.results.history import Flags, History, Nameplates, read_only
+from scenarios.results.island_membership import part_of
+from scenarios.schema.configs import limits_of
+from scenarios.schema.participants import without_agent
+from scenarios.schema.scenario_model import ScenarioModel
+from wire.messages import PlantEvent
+
+if TYPE_CHECKING:
+    from scenarios.checks.communication.record_content import RecordContent
+
+NEAR = 0.02
+"""Part of its available power within which an inverter counts as at that limit."""
+
+_RESTARTS = ("switch", "inverter", "load")
+"""Kinds of events from which on a window settles anew: a switch that waited for synchronism, an inverter that was
+connected later than the scenario says, a load that somebody changed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class IslandWindow:
+    """One island in the window of one event: its own columns, all rows of the case."""
+
+    window: Window
+    label: str
+    """Label of the event, with the island where there are several."""
+    fed: bool
+    """Whether the substation feeds it: secondary control is on hold then."""
+    history: History
+    nameplates: Nameplates
+
+
+@dataclass(frozen=True, kw_only=True)
+class CheckedCase:
+    """One recorded case; checks only read it."""
+
+    scenario: ScenarioModel
+    """As it happened: in a live run with the switches that people operated."""
+    feeder: Feeder
+    """Its feeder."""
+    case: str
+    """Name of the case."""
+    history: History
+    """All rows, as read-only arrays (rows, inverters): t (s), f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V)."""
+    windows: Sequence[Window]
+    """Windows of the events: label, start and end (s)."""
+    events: tuple[PlantEvent, ...]
+    """Events of plant, roster and links."""
+    folder: Path | None = None
+    """Folder with the record run.mcap; None for a run in memory."""
+
+    @classmethod
+    def of(
+        cls,
+        scenario: ScenarioModel,
+        feeder: Feeder,
+        case: str,
+        history: History,
+        windows: Sequence[Window],
+        events: Sequence[PlantEvent],
+        folder: Path | None = None,
+    ) -> CheckedCase:
+        """Return a case whose arrays refuse writes."""
+        return cls(
+            scenario=scenario,
+            feeder=feeder,
+            case=case,
+            history=read_only(history),
+            windows=windows,
+            events=tuple(events),
+            folder=folder,
+        )
+
+    @cached_property
+    def content(self) -> RecordContent:
+        """States, decisions and accounts of links from the record; `NotJudgedError` where the run has none."""
+        from scenarios.checks.communication.record_content import read_content
+        from scenarios.record.record_file import RecordFileError
+        from scenarios.record.record_info import FILE
+
+        if self.folder is None or not (self.folder / FILE).exists():
+            raise NotJudgedError("the run has no record run.mcap")
+        try:
+            return read_content(self.folder / FILE)
+        except RecordFileError as error:
+            raise NotJudgedError(str(error)) from error
+
+    @cached_property
+    def nameplates(self) -> Nameplates:
+        """Nameplates in the order of the columns; those without an agent do not share."""
+        everybody = Nameplates.of_columns(self.history.inverters, self.feeder)
+        return read_only(everybody.without(without_agent(self.scenario, self.case)))
+
+    @property
+    def f_nom(self) -> float:
+        """Nominal frequency (Hz)."""
+        return self.feeder.f_nom
+
+    @property
+    def T_c(self) -> float:
+        """Control period (s)."""
+        return self.scenario.time.T_c_s
+
+    def disturbed_at(self, window: Window) -> float:
+        """Return the time (s) from which on a window settles: the last switching or connection in it."""
+        times = [e.t for e in self.events if e.kind in _RESTARTS and window.start - 1e-9 <= e.t < window.end]
+        return max((window.start, *times))
+
+    def rows_from(self, window: Window, after_s: float) -> Flags:
+        """Return the rows of a window that come `after_s` or later after its last disturbance."""
+        t = self.history.t
+        late: Flags = t >= self.disturbed_at(window) + after_s - 1e-9
+        return window.rows(t) & late
+
+    @cached_property
+    def parts(self) -> tuple[IslandWindow, ...]:
+        """Each island of each window that has inverters, by the switches alone."""
+        operations = ((event.open, event.close) for event in self.scenario.events)
+        after = islands_after(self.feeder, operations)
+        islands = {event.label: buses for event, buses in zip(self.scenario.events, after, strict=True)}
+        bus_of = {row.name: row.bus for row in (*self.feeder.inverters, *self.feeder.spares)}
+        source = self.feeder.source.bus if self.feeder.source else None
+        found = []
+        for window in self.windows:
+            members = [
+                (buses, tuple(name for name in self.history.inverters if bus_of[name] in buses))
+                for buses in islands[window.label]
+            ]
+            members = [(buses, names) for buses, names in members if names]
+            for buses, names in members:
+                history, nameplates = part_of(self.history, self.nameplates, names)
+                label = window.label + (f", island of {names[0]}" if len(members) > 1 else "")
+                found.append(
+                    IslandWindow(
+                        window=window, label=label, fed=source in buses, history=history, nameplates=nameplates
+                    )
+                )
+        return tuple(found)
+
+    def at_limit(self, part: IslandWindow) -> Flags:
+        """Return which inverters of an island deliver all power that they have available, by row: they cannot share.
+
+        Only limits that an event changed count; shape (T, N).
+        """
+        names = part.history.inverters
+        found: Flags = np.zeros(part.history.P.shape, bool)
+        for limit in limits_of(self.scenario, self.case):  # in the order of time: a later one replaces an earlier one
+            if limit.inverter in names:
+                i = names.index(limit.inverter)
+                since = part.history.t >= limit.t - 1e-9
+                found[since, i] = part.history.P[since, i] >= (1.0 - NEAR) * limit.P_max
+        return found

@@ -1,0 +1,78 @@
+"""Check of last words: each agent that stops speaking has a reason that the run knows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Annotated
+
+import msgspec
+
+from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.communication.record_content import RecordContent, SentState
+from scenarios.emulation.emulation_config import EmulationConfig
+from wire.messages import PlantEvent
+from wire.schema.plausible import Plausible, Unit
+
+_SAID = re.compile(r"\S+ (leaves|left|dies)\b")
+"""Events of an agent that ends as the scenario, or a person, wants it."""
+
+
+class LastWords:
+    """Each process of an agent speaks until the run ends, or it leaves or is killed as the scenario or a person says.
+
+    An unexplained silence is a failure of the agent, of its process, or of its connection.
+    """
+
+    silent_s: Annotated[float, Unit("s"), Plausible("a silence", 0.0, 3600.0)] = 1.0
+    """Longest time (s) between an agent's last state and the end of the run, or the event that explains it."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield the agents that stop without a reason."""
+        content = case.content
+        if not content.states:
+            raise NotJudgedError("the record has no states of agents")
+        joining = {name for event in case.scenario.events for name in event.join}
+        killed = _killed(content)
+        end = min(float(case.history.t[-1]), content.t_end)
+        for agent in content.agents:
+            epochs: dict[int, list[SentState]] = {}
+            for state in content.of_agent(agent):
+                epochs.setdefault(state.epoch, []).append(state)
+            if not epochs and agent not in joining and content.info.driver != "live":
+                yield Violation(text="never sends a state", agent=agent, t=0.0)
+            for states in epochs.values():
+                last = states[-1].t
+                if last >= end - self.silent_s or self._explained(case, agent, last, killed):
+                    continue
+                yield Violation(
+                    text="sends nothing more, and no event says why",
+                    agent=agent,
+                    t=last,
+                    value=end - last,
+                    unit="s",
+                    limit=self.silent_s,
+                )
+
+    def _explained(self, case: CheckedCase, agent: str, last: float, killed: dict[str, float]) -> bool:
+        """Whether an event, or a fault of the scenario, explains that an agent ends at a time (s)."""
+        if agent in killed and abs(last - killed[agent]) <= self.silent_s + 2.0 * case.T_c:
+            return True
+        return any(_ends(event, agent) and abs(event.t - last) <= self.silent_s for event in case.events)
+
+
+def _ends(event: PlantEvent, agent: str) -> bool:
+    return event.kind == "roster" and event.subject == agent and bool(_SAID.match(event.text))
+
+
+def _killed(content: RecordContent) -> dict[str, float]:
+    """Return when (s) the scenario kills agents."""
+    for tree in (content.info.plant.links, *(config.links for config in content.info.agents)):
+        if not tree:
+            continue
+        try:
+            return {node.name: node.from_s for node in EmulationConfig.of_tree(tree).netem.nodes if node.kill}
+        except msgspec.ValidationError:
+            continue
+    return {}

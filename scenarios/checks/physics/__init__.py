@@ -1,0 +1,1 @@
+"""Checks of what the plant recorded: frequency, voltage, sharing, loading, oscillation, balance."""

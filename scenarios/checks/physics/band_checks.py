@@ -1,0 +1,86 @@
+"""Checks of bands: frequency and voltage are back in them in time after each event, and stay there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Annotated
+
+import numpy as np
+
+from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.checked_case import CheckedCase, IslandWindow
+from scenarios.results.history import Flags, Floats
+from wire.schema.plausible import Plausible, Unit
+from wire.schema.relations import Below
+
+_SETTLING = Plausible("a settling time", 0.0, 3600.0)
+
+
+class Frequency:
+    """Each grid-forming inverter is within a band of nominal frequency some time after each event, and stays there."""
+
+    band_Hz: Annotated[float, Unit("Hz"), Plausible("a band of frequency", 1e-4, 10.0, above_zero=True)] = 0.01
+    """Largest abs(f - f_nom) (Hz): what the paper calls restored."""
+    within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Time (s) after the event from which on it holds."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield the worst row of each inverter in each window; an island without a grid-forming one is dark."""
+        for part in _parts(case, self.within_s):
+            rows, history, plates = case.rows_from(part.window, self.within_s), part.history, part.nameplates
+            error = np.abs(history.f - case.f_nom)
+            forming = history.present & plates.GFM
+            yield from _worst(
+                part, rows, error, ~(error <= self.band_Hz) & forming, f"abs(f - {case.f_nom:g}), {part.label}", "Hz",
+                self.band_Hz,
+            )  # fmt: skip
+            dark = rows & ~forming.any(axis=1)
+            if not part.fed and dark.any():
+                yield Violation(
+                    text=f"no grid-forming inverter is on the network, {part.label}",
+                    t=float(history.t[dark][0]),
+                    agent=history.inverters[0],
+                )
+
+
+class Voltage:
+    """The terminal voltage of each inverter is within a band some time after each event, and stays there."""
+
+    low_pu: Annotated[float, Unit("pu"), Plausible("a least voltage", 0.3, 1.2), Below("high_pu")] = 0.88
+    """Least voltage (pu of nominal): the end of continuous operation of IEEE 1547-2018."""
+    high_pu: Annotated[float, Unit("pu"), Plausible("a greatest voltage", 0.8, 1.5)] = 1.10
+    """Greatest voltage (pu of nominal), of the same."""
+    within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
+    """Time (s) after the event from which on it holds: the clearing time of OV1 of IEEE 1547-2018."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield the worst row of each inverter in each window."""
+        for part in _parts(case, self.within_s):
+            rows, history = case.rows_from(part.window, self.within_s), part.history
+            V = history.V / part.nameplates.V_nom
+            low, high = (self.low_pu > V) & history.present, ~(self.high_pu >= V) & history.present
+            yield from _worst(part, rows, V, high, f"V, {part.label}", "pu", self.high_pu)
+            yield from _worst(part, rows, V, low, f"V, {part.label}", "pu", self.low_pu, least=True)
+
+
+def _parts(case: CheckedCase, within_s: float) -> list[IslandWindow]:
+    """Return the islands of the windows that last long enough; raise NotJudgedError if there are none."""
+    if not case.windows:
+        raise NotJudgedError("the run has no event")
+    parts = [part for part in case.parts if case.rows_from(part.window, within_s).any()]
+    if not parts:
+        raise NotJudgedError(f"no event has a window of more than {within_s:g} s")
+    return parts
+
+
+def _worst(
+    part: IslandWindow, rows: Flags, x: Floats, out: Flags, text: str, unit: str, limit: float, *, least: bool = False
+) -> Iterator[Violation]:
+    """Yield the row of each column that is farthest out of a limit."""
+    for i, name in enumerate(part.history.inverters):
+        at = np.flatnonzero(rows & out[:, i])
+        if at.size:
+            worst = at[(x[at, i].argmin if least else x[at, i].argmax)()]
+            yield Violation(
+                text=text, t=float(part.history.t[worst]), agent=name, value=float(x[worst, i]), unit=unit, limit=limit
+            )

@@ -1,0 +1,130 @@
+"""The power flow of islands from what a row of a run says of their inverters: what loads and losses take.
+
+A row has P, Q and V of every inverter. One grid-forming inverter of each island keeps its internal voltage here, the
+others deliver their recorded P and Q, and the feeder's tables say what its lines and loads take. What is left for the
+one inverter is generation as it should be; the row says what it was.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.inverters import Inverter, Inverters
+from plant.dynamics.phasors import PHASES
+from plant.dynamics.start.power_flow import PowerFlow
+from plant.equipment import Feeder
+from plant.feeder.circuits import circuit_of
+from plant.network import Network
+from plant.plant_config import PlantSettings
+from scenarios.results.history import Flags, Floats
+
+MOST_NODES = 1500
+"""Nodes above which a feeder takes seconds."""
+
+
+class IslandBalance(NamedTuple):
+    """Generation of one island in one row, beside what its loads and losses take."""
+
+    inverters: tuple[int, ...]
+    """Positions of its inverters."""
+    generated: complex
+    """Power that its inverters delivered (VA)."""
+    taken: complex
+    """Power that loads and losses take at the voltages of that row (VA)."""
+
+
+class IslandPowerFlow:
+    """Power flows of one feeder; each state of switches and inverters is factored once.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        As run.
+    names : tuple[str, ...]
+        Inverters, in the order of the rows' columns.
+    settings : PlantSettings
+        Parameters of the inverters.
+    """
+
+    def __init__(self, feeder: Feeder, names: tuple[str, ...], settings: PlantSettings) -> None:
+        spares = [row.name for row in feeder.spares if row.name in names]
+        self.network = Network(feeder, spares=spares)
+        self._at = [names.index(unit.name) for unit in self.network.inverters]
+        self._units = tuple(
+            Inverter(
+                name=unit.name,
+                kind=unit.kind,
+                phases=unit.phases,
+                S_b=unit.P_rated,
+                V_b=unit.V_nom,
+                m_p=unit.m_p,
+                m_q=unit.m_q,
+                parameters=feeder.parameters_of(unit, settings.gfm, settings.gfl),
+                f_nom=feeder.f_nom,
+            )
+            for unit in self.network.inverters
+        )
+        self._loads = self.network.loads()
+        self._circuits: dict[frozenset[str], Circuit] = {}
+        self._flows: dict[tuple[frozenset[str], bytes], tuple[PowerFlow, Inverters]] = {}
+
+    def balances(self, closed: frozenset[str], P: Floats, Q: Floats, V: Floats, present: Flags) -> list[IslandBalance]:
+        """Return the balance of each island without the substation that has a three-phase grid-forming inverter.
+
+        Parameters
+        ----------
+        closed
+            Names of the closed switches.
+        P, Q, V, present
+            The row: powers (W, var), terminal voltages (V), and which inverters are on the network.
+
+        Raises
+        ------
+        RuntimeError
+            If no state of the network has these powers (`plant.dynamics.PlantError`).
+        """
+        P, Q, V, online = P[self._at], Q[self._at], V[self._at], present[self._at]
+        flow, units = self._flow(closed, online)
+        reduction = flow.reduction
+        swings = [
+            int(of[0])
+            for island in np.unique(reduction.inverter_island[reduction.online])
+            if not reduction.has_source[island]
+            for of in [np.flatnonzero(self._forming(units, reduction.online) & (reduction.inverter_island == island))]
+            if of.size
+        ]
+        if not swings:
+            return []
+        frozen = np.zeros(len(units), bool)
+        frozen[swings] = True
+        S = P + 1j * Q
+        I = np.conj(np.where(units.single, 3.0, 1.0) * S / (3.0 * np.where(V > 0.0, V, 1.0)))  # noqa: E741  # current
+        J = (flow.y * V + np.where(online, I, 0.0))[:, None] * PHASES
+        J, at_terminals = flow.solve(J, P / units.S_b, Q / units.S_b, frozen)
+        nearer = V[swings] / np.abs(at_terminals[swings]).mean(axis=1)  # unbalanced phases shift the mean a little
+        J[swings] *= nearer[:, None]
+        J, at_terminals = flow.solve(J, P / units.S_b, Q / units.S_b, frozen)
+        delivered = np.sum(at_terminals * np.conj(J - flow.y[:, None] * at_terminals), axis=1)
+        found = []
+        for swing in swings:
+            members = np.flatnonzero(reduction.online & (reduction.inverter_island == reduction.inverter_island[swing]))
+            generated = complex(S[members].sum())
+            taken = generated - complex(S[swing]) + complex(delivered[swing])
+            found.append(IslandBalance(tuple(self._at[i] for i in members), generated, taken))
+        return found
+
+    def _forming(self, units: Inverters, online: Flags) -> Flags:
+        whole: Flags = units.forming & ~units.single & online
+        return whole
+
+    def _flow(self, closed: frozenset[str], online: Flags) -> tuple[PowerFlow, Inverters]:
+        key = closed, online.tobytes()
+        if key not in self._flows:
+            if closed not in self._circuits:
+                self._circuits[closed] = circuit_of(self.network, closed, self._loads)
+            units = Inverters(self._units, online.tolist())
+            self._flows[key] = PowerFlow(self._circuits[closed], units, np.zeros(len(units), bool)), units
+        return self._flows[key]

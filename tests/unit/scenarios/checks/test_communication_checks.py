@@ -1,0 +1,217 @@
+"""Checks of messages and agents: the sound case passes, and each planted fault is caught."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import msgspec
+import pytest
+
+import gridpeers as gp
+from scenarios.checks.checked_case import CheckedCase
+from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
+
+COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
+
+LOSSY = (("case.IV.link", repr([{"on": "* <-> *", "loss": 0.2, "delay": 0.03}])),)
+CUT = (("case.IV.link", repr([{"on": "inv2 <-> *", "cut": True, "from_s": 2.0, "to_s": 2.16}])), ("time.end_s", "5.0"))
+KILLED = (("node", repr([{"name": "inv2", "kill": True, "from_s": 2.0}])), ("time.end_s", "5.0"))
+
+
+@pytest.fixture(scope="module")
+def sound() -> CheckedCase:
+    """Islanding under full coordination."""
+    return ran().checked_case
+
+
+@pytest.mark.parametrize("check", ["message_account", "stale_values", "last_words"])
+def test_a_sound_run_passes(sound: CheckedCase, check: str) -> None:
+    """Without faults of links everything is heard in time."""
+    assert verdict(sound, check).sentence == f"{check} passed"
+
+
+@pytest.mark.parametrize("check", ["message_account", "stale_values", "last_words"])
+def test_a_run_on_lossy_links_is_accounted_for(check: str) -> None:
+    """Losses and delays of emulated links are on the account."""
+    assert verdict(ran_with(LOSSY).checked_case, check).sentence == f"{check} passed"
+
+
+def test_without_a_cut_there_is_no_heal_to_judge(sound: CheckedCase) -> None:
+    """No cut, no verdict."""
+    assert verdict(sound, "heal").sentence == "heal not judged: no link was cut and healed"
+
+
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_without_decisions_in_the_record_nothing_is_judged(check: str) -> None:
+    """Record = "physics" has rows and events alone: the verdict says so, and is not "passed"."""
+    found = verdict(
+        ran_with((("record", repr("physics")), ("time.end_s", "1.5"), ("event", repr(EVENT)))).checked_case, check
+    )
+
+    assert (found.status, 'record = "physics"' in found.reason) == ("not judged", True)
+
+
+EVENT = [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]
+
+
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_without_a_record_nothing_is_judged(sound: CheckedCase, check: str) -> None:
+    """A run in memory has no messages to look at."""
+    found = verdict(replace(sound, folder=None), check)
+
+    assert (found.status, found.reason) == ("not judged", "the run has no record run.mcap")
+
+
+# ---------------------------------------------------------------- planted faults
+
+
+def test_an_account_that_does_not_close_is_caught() -> None:
+    """A link that loses a message without a word: sent is more than delivered, dropped and in flight."""
+    case = ran_with(LOSSY).checked_case
+    link = ("inv1", "inv2")
+    counts = case.content.counts[link]
+    wrong = dict(case.content.counts) | {link: msgspec.structs.replace(counts, delivered=counts.delivered - 1)}
+    found = verdict(with_content(case, replace(case.content, counts=wrong)), "message_account")
+
+    assert (found.count, found.violations[0].agent) == (1, "inv2")
+    assert found.violations[0].value == (found.violations[0].limit or 0) - 1
+
+
+def test_a_message_without_a_verdict_is_caught() -> None:
+    """A state that its sender noted, and that the emulated link never judged."""
+    case = ran_with(LOSSY).checked_case
+    link = ("inv1", "inv2")
+    first, *others = case.content.traces[link]
+    short = type(first)(first.src, first.dst, first.seq[:-9] + first.seq[-8:], first.t[:-9] + first.t[-8:],
+                        first.outcome[:-9] + first.outcome[-8:])  # fmt: skip
+    wrong = dict(case.content.traces) | {link: [short, *others]}
+    found = verdict(with_content(case, replace(case.content, traces=wrong)), "message_account")
+
+    assert (found.count, found.violations[0].agent, found.violations[0].value) == (1, "inv2", 1.0)
+    assert "states of inv1 without a verdict" in found.violations[0].text
+
+
+def test_a_state_that_never_arrived_is_caught(sound: CheckedCase) -> None:
+    """Without faults of links a decision has the states of the tick before: one that uses an older one has lost it."""
+    content = sound.content
+    epoch, entry = content.decisions["inv3"][-1]
+    late = msgspec.structs.replace(entry, tick=200, states=[3, *entry.states[1:]])
+    decisions = dict(content.decisions) | {"inv3": [*content.decisions["inv3"], (epoch, late)]}
+    found = verdict(with_content(sound, replace(content, decisions=decisions)), "message_account")
+
+    assert (found.status, found.violations[0].agent, found.violations[0].t) == ("failed", "inv3", pytest.approx(4.0))
+    assert f"states of {entry.neighbours[0]} neither heard nor lost" in found.violations[0].text
+
+
+def test_a_value_that_nobody_sent_is_caught(sound: CheckedCase) -> None:
+    """A decision that names a state which its sender never sent."""
+    content = sound.content
+    states = dict(content.states)
+    states["inv1"] = {key: state for key, state in states["inv1"].items() if state.number != 150}
+    found = verdict(with_content(sound, replace(content, states=states)), "message_account")
+
+    assert found.status == "failed"
+    assert found.violations[0].t == pytest.approx(3.02)
+
+
+def test_a_stale_value_is_caught(sound: CheckedCase) -> None:
+    """A value of 0.4 s where 0.25 s is the limit, with who used it and when."""
+    content = sound.content
+    epoch, entry = content.decisions["inv3"][-1]
+    late = msgspec.structs.replace(entry, tick=200, states=[20, *entry.states[1:]])
+    decisions = dict(content.decisions) | {"inv3": [*content.decisions["inv3"], (epoch, late)]}
+    old = with_content(sound, replace(content, decisions=decisions))
+    found = verdict(old, "stale_values")
+
+    assert (found.count, found.violations[0].agent, found.violations[0].unit) == (1, "inv3", "s")
+    assert (found.violations[0].value, found.violations[0].limit) == (pytest.approx(0.4), 0.25)
+    assert found.violations[0].t == pytest.approx(4.0)
+    assert verdict(old, "stale_values", max_age_s=0.5).status == "passed"
+
+
+def test_a_cut_that_holds_the_last_state_makes_it_stale() -> None:
+    """The paper's law holds what it heard last: after a cut of half a second that is too old."""
+    changes = (("case.IV.link", repr([{"on": "inv2 -> inv1", "cut": True, "from_s": 2.0, "to_s": 2.5}])),)
+    found = verdict(ran_with((*changes, ("time.end_s", "5.0"))).checked_case, "stale_values")
+
+    assert (found.count, found.violations[0].agent) == (1, "inv1")
+    assert found.violations[0].value == pytest.approx(0.5, abs=0.05)
+
+
+def test_agents_that_rejoin_after_a_cut_pass() -> None:
+    """A cut of 0.16 s heals at once; before the limit's time is over the run ends, and it is judged all the same."""
+    assert verdict(ran_with(CUT).checked_case, "heal").sentence == "heal passed"
+
+
+def test_a_split_that_outlasts_its_heal_is_caught() -> None:
+    """Agents that never use a state of inv2 after the cut are named, each."""
+    case = ran_with(CUT).checked_case
+    content = case.content
+    decisions = {}
+    for agent, entries in content.decisions.items():
+        decisions[agent] = [(epoch, deaf(entry)) if entry.tick >= 100 else (epoch, entry) for epoch, entry in entries]
+    found = verdict(with_content(case, replace(content, decisions=decisions)), "heal", within_s=1.0)
+
+    assert found.count == 8
+    assert all("no new value of inv2 is used after the cut ended at 2.16 s" in one.text for one in found.violations)
+
+
+def deaf(entry: Any) -> Any:
+    """A decision that leaves inv2 out, as a state that was never heard."""
+    if "inv2" not in entry.neighbours:
+        return entry
+    at = entry.neighbours.index("inv2")
+    unused = [*(entry.unused or [""] * len(entry.neighbours))]
+    unused[at] = "silent"
+    states = [*entry.states]
+    states[at] = None
+    return msgspec.structs.replace(entry, unused=unused, states=states)
+
+
+def test_an_agent_that_falls_silent_is_caught(sound: CheckedCase) -> None:
+    """No event says why: the time of its last state, and how long it was silent."""
+    content = sound.content
+    states = dict(content.states)
+    states["inv7"] = {key: state for key, state in states["inv7"].items() if state.t <= 3.0}
+    found = verdict(with_content(sound, replace(content, states=states)), "last_words")
+
+    assert (found.count, found.violations[0].agent, found.violations[0].t) == (1, "inv7", pytest.approx(3.0))
+    assert found.violations[0].value == pytest.approx(4.0, abs=0.05)
+
+
+def test_an_agent_that_never_speaks_is_caught(sound: CheckedCase) -> None:
+    """It was configured, and nobody heard of it."""
+    states = {name: of for name, of in sound.content.states.items() if name != "inv7"}
+    found = verdict(with_content(sound, replace(sound.content, states=states)), "last_words")
+
+    assert found.violations[0].sentence == "never sends a state: inv7 at t = 0.00 s"
+
+
+def test_an_agent_that_the_scenario_kills_or_lets_leave_is_explained() -> None:
+    """The scenario kills inv2; another one lets it leave and return."""
+    assert verdict(ran_with(KILLED).checked_case, "last_words").sentence == "last_words passed"
+    assert (
+        verdict(ran("plug-n-play", next(iter(gp.load("plug-n-play").cases))).checked_case, "last_words").status
+        == "passed"
+    )
+
+
+def test_an_agent_that_leaves_without_an_event_is_caught() -> None:
+    """The same run whose record lacks the event."""
+    case = ran("plug-n-play", next(iter(gp.load("plug-n-play").cases))).checked_case
+    found = verdict(replace(case, events=()), "last_words")
+
+    assert found.status == "failed"
+    assert found.violations[0].agent == "inv2"
+
+
+def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
+    """States and decisions are those that `RunRecord` has, which makes each again."""
+    result = ran_with(LOSSY)
+    content, record = result.checked_case.content, result.run_record
+
+    for agent in ("inv1", "inv5"):
+        sent = [message.number for message in record.messages(agent, kind="State")]
+        assert [state.number for state in content.of_agent(agent)] == sent
+    assert dict(content.counts) == record.link_counts()

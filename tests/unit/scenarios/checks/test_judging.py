@@ -1,0 +1,179 @@
+"""Checks of one's own, the choice of a scenario, and what a verdict says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import pytest
+
+import gridpeers as gp
+from scenarios.checks.check_registry import ALWAYS, CHECKS
+from scenarios.checks.check_verdict import SHOWN, CheckVerdict, NotJudgedError, Violation, summary
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.checks_file import read_verdicts, verdicts_json
+from scenarios.checks.judging import judge_case
+from tests.unit.scenarios.checks.cases import ran
+from wire.plugins.plugin import Plugin, plugin_problems
+
+HERE = __name__
+
+
+class Nadir:
+    """No grid-forming inverter falls below a frequency."""
+
+    least_Hz: Annotated[float, gp.Unit("Hz"), gp.Range(40, 70)] = 59.3
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield every row of every inverter below it."""
+        f = case.history.f[:, case.nameplates.GFM]
+        for row, column in zip(*(f < self.least_Hz).nonzero(), strict=True):
+            yield Violation(text="low", t=case.history.t[row], agent="inv1", value=f[row, column], limit=self.least_Hz)
+
+
+def judged(check: Callable[[Any], Any], monkeypatch: pytest.MonkeyPatch) -> CheckVerdict:
+    """The verdict of a function on a sound case."""
+    monkeypatch.setitem(vars(CHECKS)["_added"], "mine", check)
+    (found,) = judge_case(ran().checked_case, {"mine": Plugin(use="mine")})
+    return found
+
+
+def raising(error: BaseException) -> Callable[[Any], Any]:
+    """A check that raises an error."""
+
+    def check(case: CheckedCase) -> Any:
+        raise error
+
+    return check
+
+
+@pytest.mark.parametrize(
+    ("check", "said"),
+    [
+        (lambda case: (), "mine passed"),
+        (lambda case: [Violation(text="late", t=1.5, agent="inv2", value=3.0, unit="s", limit=2.0)],
+         "mine failed: late: inv2 3 s at t = 1.50 s (limit 2 s)"),
+        (raising(NotJudgedError("no clouds")), "mine not judged: no clouds"),
+        (raising(ZeroDivisionError("division")), "mine failed: cannot judge: ZeroDivisionError: division"),
+        (lambda case: None, "mine failed: cannot judge: TypeError: returned None; return violations"),
+        (lambda case: True, "mine failed: cannot judge: TypeError: returned True; return violations"),
+        (lambda case: "late", "mine failed: cannot judge: TypeError: returned 'late'"),
+        (lambda case: ["late"], "mine failed: cannot judge: TypeError: yielded 'late'; yield a gridpeers.Violation"),
+        (lambda case: case.history.t.fill(0.0), "mine failed: cannot judge: ValueError: assignment destination"),
+    ],
+)  # fmt: skip
+def test_a_check_of_ones_own_passes_fails_or_is_not_judged(
+    check: Callable[[Any], Any], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of the check is a failure with its reason, on one line; it may not write to the record."""
+    assert judged(check, monkeypatch).sentence.startswith(said)
+
+
+def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers of numpy are numbers; those that are none are left out."""
+    many = [Violation(text="x", t=np.float64(k), value=float("nan")) for k in range(100)]  # type: ignore[arg-type]
+    found = judged(lambda case: many, monkeypatch)
+
+    assert (found.count, len(found.violations)) == (100, SHOWN)
+    assert (found.violations[1].t, found.violations[1].value) == (1.0, None)
+    assert found.sentence == "mine failed: x: at t = 0.00 s, and 99 more"
+
+
+def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
+    """A class with limits beside those of every run, one with another limit, one taken out."""
+    keys = ["frequency", {"use": "rating", "P_limit_pu": 0.1}, {"use": "steady", "off": True}]
+    own = [{"use": f"{HERE}:Nadir", "least_Hz": 59.99}, {"use": "frequency", "name": "tight", "within_s": 0.5}]
+    run = gp.load("islanding").replace({"checks": [*keys, *own], "time.end_s": 4.5}).run("IV")
+
+    assert list(run.checks.index) == [*(name for name in ALWAYS if name != "steady"), "Nadir", "tight"]
+    status = run.checks["status"]
+    assert [status[name] for name in ("frequency", "rating", "Nadir", "tight")] == ["passed", *3 * ["failed"]]
+    assert run.checks["limit"]["Nadir"] == 59.99
+    assert run.check_verdicts == read_verdicts(run.folder / "checks.json")["IV"]
+
+
+@pytest.mark.parametrize(
+    ("entries", "said"),
+    [
+        (["frequncy"], 'checks[0]: there is no check "frequncy"; did you mean "frequency"?'),
+        ([{"use": "frequency", "band_Hz": 60.0}], "checks[0].band_Hz: 60 Hz is not plausible for a band of frequency"),
+        ([{"use": "frequency", "within": 1}], "checks[0].within: unknown parameter; write within_s"),
+        ([{"use": "voltage", "low_pu": 1.1, "high_pu": 0.9}], "checks[0].low_pu: 1.1 must be below high_pu = 0.9"),
+        ([{"use": "rating", "longest_s": -1}], "checks[0].longest_s: a time of overload must not be negative, got -1"),
+        ([{"use": "steady", "off": 1}], "checks[0].off: must be true or false"),
+        ([{"use": "rating", "name": "a b"}], "checks[0].name: a name in the verdict is up to 41 letters"),
+        (["rating", "rating"], 'checks[1]: there is a check "rating" in this list already'),
+        ([{"use": "rating", "name": "steady"}], 'checks[0]: every run has a check "steady" already'),
+        ([{"use": "rating", "name": "mine", "off": True}], 'checks[0].off: no run has a check "mine" unless'),
+        (["math:pi"], "checks[0]: math:pi is no check"),
+        ([{"limit_pu": 1.0}], "checks[0]: names no check"),
+    ],
+)  # fmt: skip
+def test_a_wrong_check_is_refused_before_anything_starts(entries: list[Any], said: str) -> None:
+    """Unknown names, impossible limits, limits that contradict each other: a line each, at its key."""
+    with pytest.raises(gp.ScenarioError) as error:
+        gp.load("islanding").replace({"checks": entries})
+
+    assert any(said in line for line in error.value.problems), error.value.problems
+
+
+def test_all_wrong_checks_come_at_once() -> None:
+    """One entry with three mistakes, and another one, are four problems."""
+    entries = [{"use": "frequency", "band_Hz": -1, "within_s": 1e9, "off": "yes"}, "nothing"]
+    with pytest.raises(gp.ScenarioError) as error:
+        gp.load("islanding").replace({"checks": entries})
+
+    assert len(error.value.problems) == 4
+
+
+def test_gridpeers_own_checks_are_entries_like_any_other() -> None:
+    """Each has a sentence, and limits that its defaults keep."""
+    for name in ALWAYS:
+        assert plugin_problems(CHECKS, Plugin(use=name)) == []
+        assert CHECKS.resolve(name).__doc__
+
+
+def test_verdicts_read_back_from_their_file(tmp_path: Path) -> None:
+    """Every field, and those that are left out."""
+    verdicts = {
+        "IV": (
+            CheckVerdict(check="rating", status="failed", count=2, violations=(Violation(text="x", value=1.5),)),
+            CheckVerdict(check="heal", status="not judged", reason="no cut"),
+        )
+    }
+    (tmp_path / "checks.json").write_text(verdicts_json(verdicts), encoding="utf-8")
+
+    assert read_verdicts(tmp_path / "checks.json") == verdicts
+
+
+def test_a_verdict_is_one_line_with_each_failure() -> None:
+    """How many passed, what failed, with time, agent, value and limit, and how many were not judged."""
+    late = Violation(text="late", t=1.5, agent="inv2", value=3.0, unit="s", limit=2.0)
+    line = summary(
+        (
+            CheckVerdict(check="voltage", status="passed"),
+            CheckVerdict(check="heal", status="not judged", reason="no cut"),
+            CheckVerdict(check="frequency", status="failed", violations=(late,), count=1),
+        )
+    )
+
+    assert line == "1 of 2 checks passed, 1 not judged; frequency failed: late: inv2 3 s at t = 1.50 s (limit 2 s)"
+
+
+def test_the_report_of_a_run_has_the_verdict() -> None:
+    """A line for each case, in report.txt and on the terminal."""
+    lines = [line for line in ran().report.splitlines() if line.startswith("CHECKS")]
+
+    assert lines == ["CHECKS  case IV: 11 of 11 checks passed, 1 not judged"]
+
+
+def test_a_folder_without_verdicts_is_judged_when_it_is_asked(tmp_path: Path) -> None:
+    """The folder of an older run gets the verdict that it would get now."""
+    ran().save(tmp_path / "run")
+    (tmp_path / "run" / "checks.json").unlink()
+    result = gp.read(tmp_path / "run")
+
+    assert isinstance(result, gp.Result)
+    assert result.check_verdicts == ran().check_verdicts

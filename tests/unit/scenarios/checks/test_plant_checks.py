@@ -1,0 +1,238 @@
+"""Checks of the plant's rows: the sound case passes, and each planted fault is caught, with time, agent and value."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.physics.matrix_pencil import modes
+from tests.unit.scenarios.checks.cases import changed, ran, verdict
+from wire.messages import PlantEvent
+
+PLANT_CHECKS = (
+    *("frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance"),
+)
+
+Arrays = dict[str, np.ndarray[Any, Any]]
+
+
+@pytest.fixture(scope="module")
+def sound() -> CheckedCase:
+    """Islanding under full coordination."""
+    return ran().checked_case
+
+
+@pytest.mark.parametrize("check", PLANT_CHECKS)
+def test_a_sound_run_passes(sound: CheckedCase, check: str) -> None:
+    """Full coordination keeps every limit that is on by default."""
+    found = verdict(sound, check)
+
+    assert (found.status, found.sentence) == ("passed", f"{check} passed")
+
+
+def test_a_frequency_out_of_its_band_is_caught(sound: CheckedCase) -> None:
+    """The inverter, the row that is farthest off, and the limit are named; before the limit's time it may be off."""
+
+    def fault(of: Arrays) -> None:
+        of["f"][(of["t"] > 6.3) & (of["t"] < 6.45), 3] = 60.05
+
+    found = verdict(changed(sound, fault), "frequency")
+
+    assert found.status == "failed"
+    assert (found.violations[0].agent, found.violations[0].unit, found.violations[0].limit) == ("inv4", "Hz", 0.01)
+    assert found.violations[0].value == pytest.approx(0.05)
+    assert found.violations[0].t == pytest.approx(6.31)
+    assert verdict(changed(sound, fault), "frequency", within_s=2.5).status == "passed"
+
+
+def test_a_frequency_that_is_no_number_is_caught(sound: CheckedCase) -> None:
+    """A record without numbers does not pass for one within limits."""
+
+    def fault(of: Arrays) -> None:
+        of["f"][-5, 0] = np.nan
+
+    assert verdict(changed(sound, fault), "frequency").status == "failed"
+
+
+def test_an_island_without_a_grid_forming_inverter_is_caught(sound: CheckedCase) -> None:
+    """A dark island has no frequency to be in a band: that is no pass."""
+
+    def fault(of: Arrays) -> None:
+        forming = sound.nameplates.GFM
+        for name in ("P", "Q"):
+            of[name][np.ix_(of["t"] > 6.5, forming)] = 0.0
+
+    found = verdict(changed(sound, fault), "frequency")
+
+    assert found.status == "failed"
+    assert "no grid-forming inverter is on the network, event2" in found.violations[0].sentence
+
+
+@pytest.mark.parametrize(("V", "limit"), [(1.15, 1.10), (0.85, 0.88)])
+def test_a_voltage_out_of_its_band_is_caught(sound: CheckedCase, V: float, limit: float) -> None:
+    """Above and below, at one inverter."""
+
+    def fault(of: Arrays) -> None:
+        of["V"][of["t"] > 6.9, 4] = V * sound.nameplates.V_nom[4]
+
+    found = verdict(changed(sound, fault), "voltage")
+
+    assert found.count == 1
+    assert (found.violations[0].agent, found.violations[0].limit) == ("inv5", limit)
+    assert found.violations[0].value == pytest.approx(V)
+
+
+@pytest.mark.parametrize(("check", "quantity"), [("power_sharing", "P"), ("var_sharing", "Q")])
+def test_unequal_sharing_is_caught(sound: CheckedCase, check: str, quantity: str) -> None:
+    """One inverter takes over from another: the sum stays."""
+
+    def fault(of: Arrays) -> None:
+        taken = 0.9 * of[quantity][:, 1]
+        of[quantity][:, 1] -= taken
+        of[quantity][:, 7] += taken
+
+    found = verdict(changed(sound, fault), check)
+
+    assert found.status == "failed"
+    assert found.violations[0].agent in ("inv2", "inv8")
+    assert (found.violations[0].value or 0.0) > (found.violations[0].limit or 0.0)
+
+
+def test_an_inverter_at_its_available_power_need_not_share() -> None:
+    """Clouds that leave an inverter less than its share are no fault of the control."""
+    case = ran("intermittency", "225kW").checked_case
+
+    assert verdict(case, "power_sharing").status == "passed"
+    assert ran("intermittency", "225kW").metrics["MPSI"]["clouds"] > 0.01
+
+
+def test_a_lasting_overload_is_caught(sound: CheckedCase) -> None:
+    """Its length is the value; a shorter one passes. Of real power less is too much."""
+
+    def fault(of: Arrays) -> None:
+        of["Q"][(of["t"] > 5.0 - 1e-9) & (of["t"] < 6.2 + 1e-9), 2] = 1.4 * sound.nameplates.s[2]
+
+    found = verdict(changed(sound, fault), "rating")
+
+    assert (found.status, found.violations[0].agent, found.violations[0].t) == ("failed", "inv3", 5.0)
+    assert found.violations[0].value == pytest.approx(1.2)
+    assert verdict(changed(sound, fault), "rating", longest_s=1.3).status == "passed"
+
+    def real(of: Arrays) -> None:
+        of["P"][(of["t"] > 5.0 - 1e-9) & (of["t"] < 6.2 + 1e-9), 2] = 1.1 * sound.nameplates.s[2]
+
+    assert "P above 1.05 pu of the rating" in verdict(changed(sound, real), "rating").sentence
+
+
+@pytest.mark.parametrize(("f", "damping"), [(1.3, 0.0), (1.3, 0.02), (2.1, -0.01), (9.0, 0.0), (25.0, 0.0)])
+def test_a_lasting_oscillation_is_caught(sound: CheckedCase, f: float, damping: float) -> None:
+    """Slow and fast, lasting, growing and hardly damped: frequency and damping are found."""
+
+    def fault(of: Arrays) -> None:
+        tail = of["t"] - 4.0
+        of["P"][:, 5] += 0.1 * sound.nameplates.s[5] * np.exp(-damping * 6.28 * f * tail) * np.sin(6.2832 * f * tail)
+
+    found = verdict(changed(sound, fault), "oscillation")
+
+    assert (found.status, found.violations[0].agent, found.violations[0].unit) == ("failed", "inv6", "%")
+    assert f"at {f:.2g} Hz" in found.violations[0].text
+    assert found.violations[0].value == pytest.approx(100.0 * damping, abs=0.2)
+
+
+def test_a_swing_that_dies_out_is_no_lasting_oscillation(sound: CheckedCase) -> None:
+    """One that is well damped, and one that is too small to matter, pass."""
+
+    def damped(of: Arrays) -> None:
+        tail = of["t"] - 4.0
+        of["P"][:, 5] += 0.2 * sound.nameplates.s[5] * np.exp(-0.15 * 6.28 * 1.3 * tail) * np.sin(6.28 * 1.3 * tail)
+
+    def small(of: Arrays) -> None:
+        of["P"][:, 5] += 0.004 * sound.nameplates.s[5] * np.sin(6.28 * 1.3 * of["t"])
+
+    assert verdict(changed(sound, damped), "oscillation").status == "passed"
+    assert verdict(changed(sound, small), "oscillation").status == "passed"
+
+
+def test_the_modes_of_a_known_signal_are_found() -> None:
+    """Two swings, a decay and a mean, with noise: frequencies, dampings and sizes of the closed form."""
+    t = np.arange(150) * 0.02
+    x = 60.0 + 0.3 * np.exp(-2.0 * t) + 1e-5 * np.random.default_rng(1).standard_normal(150)
+    for f, damping, size in ((1.0, 0.02, 0.1), (4.0, 0.05, 0.05)):
+        w = 2.0 * np.pi * f
+        x += size * np.exp(-damping * w * t) * np.cos(w * np.sqrt(1.0 - damping**2) * t)
+
+    slow, fast = sorted(modes(x, 0.02)[:2])
+
+    assert (slow.f, slow.damping) == (pytest.approx(1.0, abs=0.01), pytest.approx(0.02, abs=0.002))
+    assert (fast.f, fast.damping) == (pytest.approx(4.0, abs=0.02), pytest.approx(0.05, abs=0.005))
+    assert slow.swing == pytest.approx(0.2 * np.exp(-0.02 * 2.0 * np.pi * t[-1]), rel=0.05)
+
+
+def test_a_value_that_still_moves_is_caught(sound: CheckedCase) -> None:
+    """A drift of the frequency by 0.1 Hz/s at the end of a window is no steady value."""
+
+    def fault(of: Arrays) -> None:
+        of["f"][:, 0] += 0.1 * np.clip(of["t"] - 6.0, 0.0, None)
+
+    found = verdict(changed(sound, fault), "steady")
+
+    assert (found.count, found.violations[0].agent, found.violations[0].unit) == (1, "inv1", "Hz/s")
+    assert found.violations[0].value == pytest.approx(0.1, abs=0.01)
+
+
+@pytest.mark.parametrize("column", [0, 1, 8])
+def test_power_from_nowhere_is_caught(sound: CheckedCase, column: int) -> None:
+    """An inverter whose recorded power is 3 % more than the network takes, whichever it is."""
+
+    def fault(of: Arrays) -> None:
+        of["P"][:, column] *= 1.06
+
+    found = verdict(changed(sound, fault), "power_balance")
+
+    assert found.status == "failed"
+    assert "real power" in found.violations[0].text
+    assert (found.violations[0].value or 0.0) > 0.5
+
+
+def test_with_the_substation_the_balance_is_not_judged(sound: CheckedCase) -> None:
+    """The record does not have what the substation delivers."""
+    connected = replace(sound, events=tuple(event for event in sound.events if event.kind != "switch"))
+    found = verdict(connected, "power_balance")
+
+    assert (found.status, found.reason) == ("not judged", "no recorded row has an island without the substation")
+
+
+@pytest.mark.parametrize(
+    "check", [name for name in PLANT_CHECKS if name not in ("rating", "oscillation", "power_balance")]
+)
+def test_without_an_event_nothing_is_judged(sound: CheckedCase, check: str) -> None:
+    """A verdict on nothing is not "passed"."""
+    found = verdict(replace(sound, windows=()), check)
+
+    assert (found.status, found.reason) == ("not judged", "the run has no event")
+
+
+@pytest.mark.parametrize("check", ["frequency", "voltage", "steady", "power_sharing"])
+def test_windows_that_are_too_short_are_not_judged(sound: CheckedCase, check: str) -> None:
+    """A limit after 20 s says nothing about a window of 3 s."""
+    limit = "within_s" if check in ("frequency", "voltage") else "after_s"
+
+    assert verdict(sound, check, **{limit: 20.0}).status == "not judged"
+
+
+def test_a_load_that_was_changed_by_hand_ends_the_balance(sound: CheckedCase) -> None:
+    """The feeder's tables do not say what such a load takes: rows from then on are not judged."""
+
+    def fault(of: Arrays) -> None:
+        of["P"][of["t"] > 5.0, 1] *= 1.1
+
+    wrong = changed(sound, fault)
+    at = {t: PlantEvent(t=t, kind="load", subject="48", text="load 48 set to 0.5 of its power") for t in (1.0, 5.0)}
+
+    assert verdict(wrong, "power_balance").status == "failed"
+    assert verdict(replace(wrong, events=(*wrong.events, at[5.0])), "power_balance").status == "passed"
+    assert verdict(replace(wrong, events=(*wrong.events, at[1.0])), "power_balance").status == "not judged"
