@@ -130,8 +130,7 @@ class RecordPages:
             yield from self.news(page)
         try:
             view = self._run.view(page.case)
-            t_end = view.record.t_end
-            t = t_end if question.at is None else min(max(0.0, question.at), t_end)
+            t = _time_of(question, view)
             frame = view.frame(t, question.since)
         except RecordFileError as error:
             yield as_json({"problem": str(error)})
@@ -147,8 +146,7 @@ class RecordPages:
             return
         try:
             view = self._run.view(page.case)
-            t_end = view.record.t_end
-            t = t_end if question.at is None else min(max(0.0, question.at), t_end)
+            t = _time_of(question, view)
             ok, text = True, view.decision(question.agent, t)
         except RecordFileError as error:
             ok, text = False, str(error).removeprefix(f"{view.record.path}: ")
@@ -156,6 +154,11 @@ class RecordPages:
             ok, text = False, named(error)
         command = command_line("why", str(view.record.path.parent), question.agent, f"{t:.10g}")
         yield as_json({"decision": {"agent": question.agent, "t": t, "ok": ok, "text": text, "command": command}})
+
+
+def _time_of(question: RecordQuestion, view: RecordView) -> float:
+    """Return the run time (s) that a page asks for, within the record."""
+    return view.known_end if question.at is None else min(max(0.0, question.at), view.record.t_end)
 
 
 def _of(view: RecordView) -> dict[str, Any]:

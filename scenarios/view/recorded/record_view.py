@@ -25,7 +25,7 @@ from scenarios.view.recorded.link_faults import NOTHING, LinkFaults
 from scenarios.view.recorded.plant_rows import PlantRows
 from scenarios.view.run_view import Cursor, EventView, Frame, RunView
 from scenarios.view.strips import LENGTH
-from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+from wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
 WINDOW = 1.0
 """Time (s) before a moment over which messages are counted."""
@@ -60,6 +60,18 @@ class RecordView:
         self._by_name = {name: switch.name for switch in self.map.switches for name in (switch.alias, switch.name)}
         self.missing = tuple(_missing(record, has_feeder=feeder is not None))
         """Sentences on what the record, or this host, does not have."""
+
+    @property
+    def known_end(self) -> float:
+        """Latest run time (s) of which there are rows and messages: journals come into a record after the rows."""
+        record, index = self.record, self.record.index
+        if record.complete or record.info.level == "physics":
+            return record.t_end
+        for part in reversed(range(index.parts)):
+            times = [journal.t for journal in index.journals_in(part) if journal.sender == PLANT]
+            if times:
+                return min(record.t_end, max(times))
+        return record.t_end
 
     @property
     def events(self) -> list[EventView]:
@@ -117,9 +129,12 @@ class RecordView:
     # ---------------------------------------------------------------- inner
 
     def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
-        """Return the agents that were there: by their decisions, or by the schedule if the record has none."""
+        """Return the agents that were there: by their decisions, or by the schedule if the record has none.
+
+        Behind the last journal of a record without an end nothing is known of any.
+        """
         if self.record.info.level != "physics":
-            return list(agents)
+            return list(agents or ([] if self.record.complete else self._configs))
         plant = self.record.info.plant
         present = dict.fromkeys(plant.agents)
         for action in plant.schedule:

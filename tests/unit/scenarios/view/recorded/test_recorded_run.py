@@ -88,6 +88,24 @@ def test_a_record_that_is_cut_off_says_so(whole: Path, tmp_path: Path) -> None:
     assert run.view().frame(news.t_end).inverters[0].P is not None
 
 
+def test_rows_without_messages_leave_nobody_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Journals come after the rows: at the end of a cut record agents are unknown, not gone; its page opens before."""
+    (tmp_path / "it.toml").write_text(ISLANDED.replace("end_s = 1.0", "end_s = 4.0"), encoding="utf-8")
+    monkeypatch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
+    data, file = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case").path.read_bytes(), tmp_path / FILE
+    behind = 0
+    for length in range(len(data) // 2, len(data), len(data) // 17):
+        file.write_bytes(data[:length])
+        view = RecordedRun(tmp_path).view()
+        known, end = view.frame(view.known_end), view.frame(view.record.t_end)
+        assert [one.note for one in known.inverters] == [one.note for one in end.inverters] == [""] * 9
+        if view.known_end < view.record.t_end - 0.05:
+            behind += 1
+            assert all(known.links.values())
+            assert not any(end.links.values())
+    assert behind > 2
+
+
 def test_the_latest_case_is_shown_until_another_is_chosen(whole: Path, tmp_path: Path) -> None:
     """A run with several cases has a record of each; a new one is found when it comes."""
     (tmp_path / "status.txt").write_text("running\n", encoding="utf-8")
