@@ -83,7 +83,8 @@ def killed(folder: Path, clock: Clock, after: float, who: str = "command") -> Le
     last = _last_time(history)
     record = RunRecord.open(folder / "out" / "IV")
     speed = 1.0 if clock == "wall" else max((last - t) / (killed_at - first), 1e-9)
-    return Left(record, last, max(0.0, last - record.t_end) / speed)
+    lost = min(max(0.0, last - record.t_end) / speed, killed_at - first)  # a busy machine may let a run stand still
+    return Left(record, last, lost)
 
 
 def wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5000) -> tuple[float, float]:
