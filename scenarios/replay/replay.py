@@ -21,7 +21,7 @@ from agents.laws.law import Law
 from plant.build import start_plant
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.record.recomputation import recomputed
-from scenarios.record.record_reader import RunRecord
+from scenarios.record.record_reader import RecordFileError, RunRecord
 from scenarios.replay.difference import Difference, message_difference, row_difference
 from scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
 from scenarios.replay.replay_error import ReplayError
@@ -304,6 +304,8 @@ def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
             if difference is not None:
                 return ReplayedPart(name=agent, count=count, t_end=t, difference=difference)
             count, t = count + 1, each.decision.t
+    except RecordFileError:
+        raise
     except ValueError as error:
         raise ReplayError(f"{agent}: its law cannot be made here: {error}") from None
     return ReplayedPart(name=agent, count=count, t_end=t, difference=None)

@@ -154,7 +154,7 @@ def agent_again(
     Raises
     ------
     ReplayError
-        If its law is not here.
+        If its law or its graph is not here.
     """
     try:
         law = make_law(config.control)
@@ -163,7 +163,11 @@ def agent_again(
     laws.append(law)
     # the deadline is that of a process, which has found its plant in this run
     config = replace(config, epoch=recorded.epoch, record="physics", deadline=0.0)
-    return ReplayedProcess(recorded, RealtimeAgent(config, instance, links, law), links)
+    try:
+        node = RealtimeAgent(config, instance, links, law)
+    except ValueError as error:
+        raise ReplayError(f"{config.name}: cannot be made again here: {error}") from None
+    return ReplayedProcess(recorded, node, links)
 
 
 def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, links: Links | None) -> ReplayedProcess:
