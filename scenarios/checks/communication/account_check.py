@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from math import inf
 from typing import Annotated
 
 from netem.ledger import LinkCounts
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.record_content import Link, RecordContent
+from scenarios.checks.communication.record_content import Link, RecordContent, SentState
 from scenarios.checks.communication.used_states import used_states
 from wire.messages import PLANT
 from wire.schema.plausible import Plausible, Unit
@@ -52,22 +53,23 @@ class MessageAccount:
         if content.simulated:
             yield from _not_used(content, agent)
             return
-        own = [state.t for state in content.of_agent(agent)]
+        own: dict[int, list[float]] = {}
+        for state in content.of_agent(agent):
+            own.setdefault(state.epoch, []).append(state.t)
         for link, arrived in sorted(content.heard.items()):
-            if link[1] != agent or link[0] == PLANT or not own:
-                continue
-            first = min(
-                (state.t for key, state in content.states.get(link[0], {}).items() if key in arrived), default=0
-            )
-            last = min(own[-1], content.t_end) - self.in_flight_s
-            yield (
-                link,
-                [
-                    state.t
-                    for key, state in content.states.get(link[0], {}).items()
-                    if first <= state.t <= last and not state.quiet and key not in arrived
-                ],
-            )
+            if link[1] == agent and link[0] != PLANT:
+                states = content.states.get(link[0], {})
+                spans = [(times[0], min(times[-1], content.t_end) - self.in_flight_s) for times in own.values()]
+                yield link, [t for span in spans for t in _not_arrived(states, arrived, span)]
+
+
+def _not_arrived(
+    states: Mapping[tuple[int, int], SentState], arrived: Mapping[tuple[int, int], str], span: tuple[float, float]
+) -> list[float]:
+    """Return when (s) states were sent that did not arrive, from the first that did while a process was there."""
+    there = {key: state for key, state in states.items() if span[0] <= state.t <= span[1] and not state.quiet}
+    first = min((state.t for key, state in there.items() if key in arrived), default=inf)
+    return [state.t for key, state in there.items() if state.t >= first and key not in arrived]
 
 
 def _closes(link: Link, counts: LinkCounts) -> Iterator[Violation]:

@@ -10,6 +10,7 @@ import pytest
 
 import gridpeers as gp
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.communication.record_content import RecordContent
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
 
 COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
@@ -215,3 +216,38 @@ def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
         sent = [message.number for message in record.messages(agent, kind="State")]
         assert [state.number for state in content.of_agent(agent)] == sent
     assert dict(content.counts) == record.link_counts()
+
+
+def in_real_time(case: CheckedCase) -> RecordContent:
+    """The record of a case as if it had kept real time, in which every agent heard every state."""
+    content = case.content
+    info = msgspec.structs.replace(content.info, plant=msgspec.structs.replace(content.info.plant, clock="wall"))
+    heard = {(src, dst): dict.fromkeys(content.states[src], "") for src in content.states for dst in content.states}
+    return replace(content, info=info, heard={link: of for link, of in heard.items() if link[0] != link[1]})
+
+
+def test_in_real_time_a_state_that_does_not_arrive_is_caught(sound: CheckedCase) -> None:
+    """A number between others that the receiver never noted, and was not rejected either."""
+    content = in_real_time(sound)
+    (lost,) = (key for key, state in content.states["inv1"].items() if state.number == 150)
+    arrived = {key: why for key, why in content.heard["inv1", "inv2"].items() if key != lost}
+    wrong = replace(content, heard=dict(content.heard) | {("inv1", "inv2"): arrived})
+    found = verdict(with_content(sound, wrong), "message_account")
+
+    assert verdict(with_content(sound, content), "message_account").status == "passed"
+    assert (found.count, found.violations[0].agent, found.violations[0].value) == (1, "inv2", 1.0)
+    assert found.violations[0].t == pytest.approx(3.0)
+
+
+def test_in_real_time_nothing_is_missed_while_the_receiver_is_away(sound: CheckedCase) -> None:
+    """A process that left and came back owes no account of what was sent meanwhile, nor of its last second."""
+    content = in_real_time(sound)
+    states = {}
+    for (epoch, number), state in content.states["inv2"].items():
+        if not 2.0 < state.t < 3.0:
+            back = epoch + (state.t >= 3.0)
+            states[back, number] = state._replace(epoch=back)
+    arrived = {key: "" for key, state in content.states["inv1"].items() if not 1.9 < state.t < 3.1}
+    other = replace(content, states=dict(content.states) | {"inv2": states}, heard={("inv1", "inv2"): arrived})
+
+    assert verdict(with_content(sound, other), "message_account").status == "passed"
