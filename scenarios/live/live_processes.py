@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 import signal
 import sys
 import threading
@@ -35,6 +36,7 @@ from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError
 from wire.messages import PLANT, Pacing
+from wire.printable import printable
 
 LOGGED = ("roster", "warning")
 """Kinds of events that a plant in this process also writes to its log."""
@@ -69,14 +71,18 @@ class ProcessOutcome:
 
 
 def meaning(word: str, config: PlantConfig) -> str:
-    """Return a sentence for a word of the starting plant; "" for a word that needs none."""
+    """Return a sentence for a line that the plant prints; "" for one that needs none.
+
+    It prints a word at each step of its start, and Zenoh's line for each TLS handshake that has failed.
+    """
     if word == COMPILING:
         return "the plant is being built; the very first time its inner loop is compiled, which takes some seconds"
     if word == READY:
         agents = f"{len(config.agents)} agents {short(config.agents)}"
         wait = config.wait_for_agents
         return f"waits up to {wait:g} s for its {agents}" if wait > 0.0 else f"waits for none of its {agents}"
-    return ""
+    refused = re.search(r"WARN.*zenoh_link_tls\S*\s(.*?)(?:\. Hint:.*)?$", word)
+    return f"a link was refused: {printable(refused[1])}" if refused else ""
 
 
 def plant_here(

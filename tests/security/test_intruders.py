@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from tests.processes.terminals import wait_for
 from tests.security.intruder import Intruder, answered, credentials, handshake
 from tests.security.recording import Recording
 from tests.toy.town import Town
@@ -41,6 +42,7 @@ def test_members_of_a_site_take_part_in_its_run(town: Town) -> None:
 def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
     """TLS refuses at once."""
     assert "CERTIFICATE_REQUIRED" in handshake(town.endpoint, None)
+    wait_for(town.folder / "plant.log", "peer sent no certificates")
 
 
 def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_path: Path) -> None:
@@ -54,6 +56,7 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
     assert handshake(town.endpoint, other / "inv3.pem", other / "inv3.key") in (
         "TLSV1_ALERT_UNKNOWN_CA", "TLSV1_ALERT_DECRYPT_ERROR", "SSLV3_ALERT_BAD_CERTIFICATE",
     )  # fmt: skip
+    wait_for(town.folder / "plant.log", "invalid peer certificate: ")
 
 
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
@@ -65,6 +68,7 @@ def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, t
     issue(site, "inv3", days=1.0, now=datetime.now(UTC) - timedelta(days=2))
 
     assert handshake(town.endpoint, site / "inv3.pem", site / "inv3.key") == "SSLV3_ALERT_CERTIFICATE_EXPIRED"
+    wait_for(town.folder / "plant.log", "certificate expired")
     assert handshake(town.endpoint, lab / "inv3.pem", lab / "inv3.key") == ""
 
 

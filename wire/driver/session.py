@@ -72,6 +72,10 @@ _PROFILES: dict[Clock, _Profile] = {
 FIRST_LINK = 0.5
 """Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
 
+_REFUSED_LINKS = "zenoh_link_tls=warn"
+"""What of Zenoh's log the rendezvous prints on standard output where links have certificates: each handshake that has
+failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 s after each."""
+
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
@@ -147,6 +151,8 @@ class Session:
             ) from None
         if "RUST_LOG" in os.environ:  # RUST_LOG=zenoh=debug shows what Zenoh does, in the process's log
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
+        elif credentials is not None and rendezvous:
+            zenoh.init_log_from_env_or(_REFUSED_LINKS)
         self.inbox = inbox or Inbox()
         self._zenoh = zenoh
         self._profile = profile = _PROFILES[clock]
