@@ -11,8 +11,9 @@ def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:
     """Its reason stays; colours of a terminal, thread and hint go."""
     config, _ = toy_configs(2)
     line = (
-        "\x1b[2m2026-11-23T09:08:43.534631Z\x1b[0m \x1b[33m WARN\x1b[0m app-0 ThreadId(02) \x1b[2mzenoh_link_tls::unicast"
-        "\x1b[0m\x1b[2m:\x1b[0m peer sent no certificates. Hint: increase the system open file limit."
+        "\x1b[2m2026-11-23T09:08:43.534631Z\x1b[0m \x1b[33m WARN\x1b[0m app-0 ThreadId(02) "
+        "\x1b[2mzenoh_link_tls::unicast\x1b[0m\x1b[2m:\x1b[0m peer sent no certificates. "
+        "Hint: increase the system open file limit."
     )
 
     assert meaning(line, config) == "a link was refused: peer sent no certificates"
