@@ -7,13 +7,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from plant.dynamics import Dynamics, Inverter, PlantError
+from plant.dynamics import Dynamics, PlantError
 from plant.dynamics.start.at_rest import require_within_limits
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
 from plant.feeder.current_limits import CurrentLimits
 from plant.feeder.hunting import hunting_event
 from plant.feeder.in_service import InService
+from plant.feeder.installed_inverters import installed_inverters
 from plant.feeder.islands import Islands
 from plant.feeder.load_board import LoadBoard
 from plant.feeder.load_limits import LoadLimits
@@ -95,20 +96,7 @@ class Plant:
         connected = [not unit.spare for unit in network.inverters]
         self._dynamics = Dynamics(
             self._circuits.of(self._switches.closed),
-            tuple(
-                Inverter(
-                    name=unit.name,
-                    kind=unit.kind,
-                    phases=unit.phases,
-                    S_b=unit.P_rated,
-                    V_b=unit.V_nom,
-                    m_p=unit.m_p,
-                    m_q=unit.m_q,
-                    parameters=network.feeder.parameters_of(unit, settings.gfm, settings.gfl),
-                    f_nom=network.feeder.f_nom,
-                )
-                for unit in network.inverters
-            ),
+            installed_inverters(network, settings),
             settings.h,
             connected=connected,
             method=settings.method,

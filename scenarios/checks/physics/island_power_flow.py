@@ -12,11 +12,12 @@ from typing import NamedTuple
 import numpy as np
 
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.inverters import Inverter, Inverters
+from plant.dynamics.inverters import Inverters
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.start.power_flow import PowerFlow
 from plant.equipment import Feeder
 from plant.feeder.circuits import circuit_of
+from plant.feeder.installed_inverters import installed_inverters
 from plant.network import Network
 from plant.plant_config import PlantSettings
 from scenarios.results.history import Flags, Floats
@@ -53,20 +54,7 @@ class IslandPowerFlow:
         spares = [row.name for row in feeder.spares if row.name in names]
         self.network = Network(feeder, spares=spares)
         self._at = [names.index(unit.name) for unit in self.network.inverters]
-        self._units = tuple(
-            Inverter(
-                name=unit.name,
-                kind=unit.kind,
-                phases=unit.phases,
-                S_b=unit.P_rated,
-                V_b=unit.V_nom,
-                m_p=unit.m_p,
-                m_q=unit.m_q,
-                parameters=feeder.parameters_of(unit, settings.gfm, settings.gfl),
-                f_nom=feeder.f_nom,
-            )
-            for unit in self.network.inverters
-        )
+        self._units = installed_inverters(self.network, settings)
         self._loads = self.network.loads()
         self._circuits: dict[frozenset[str], Circuit] = {}
         self._flows: dict[tuple[frozenset[str], bytes], tuple[PowerFlow, Inverters]] = {}
