@@ -57,8 +57,10 @@ _SHOWN = 3
 _AFTER_RUN = (
     *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
     *("scenarios.results.report", "scenarios.results.plots.drawing", "scenarios.checks.judging"),
+    *("scenarios.checks.physics.balance_check", "scenarios.checks.communication.record_content"),
 )
-"""Modules that are used after a run, with numpy, and imported while it goes on: this process has little to do then."""
+"""Modules that are used after a run, with numpy and scipy, and imported while it goes on: this process has little to do
+then."""
 
 _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
 
