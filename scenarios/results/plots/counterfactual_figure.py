@@ -12,7 +12,7 @@ from scenarios.results.history import Floats
 from scenarios.results.island_membership import worst
 from scenarios.results.plots.case_figures import MEASURES
 from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import mark_events, note_above
+from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import (
     OTHER_STYLES,
     PAGE,
@@ -23,9 +23,13 @@ from scenarios.results.plots.style import (
     time_axis,
 )
 
-FAINT: dict[str, Any] = {"alpha": 0.35, "linewidth": 2.6, "linestyle": "-"}
-STRONG: dict[str, Any] = {"alpha": 1.0, "linewidth": 1.1, "linestyle": "-"}
+FAINT: dict[str, Any] = {"linewidth": 2.6, "linestyle": "-"}
+STRONG: dict[str, Any] = {"linewidth": 1.1, "linestyle": "-"}
 """Lines of what was, below, and of what would have been, on top: where they coincide, both are seen."""
+
+PALE = 0.65
+"""Part of white in the colour of a faint line. It is no transparency: lines of several inverters on top of each other
+would be strong again."""
 
 BLUE, GREEN = OTHER_STYLES[0][0], OTHER_STYLES[2][0]
 
@@ -50,12 +54,12 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
         both = ((was, FAINT, "what was"), (would_be, STRONG, f"what would have been: {words}"))
         for drawing, line, label in both:
-            top.plot(*_measured(drawing, "frequency"), color=BLUE, label=label, **line)
+            top.plot(*_measured(drawing, "frequency"), color=_shade(BLUE, line), label=label, **line)
             _powers(middle, drawing, line)
         indices = []
         for drawing, line, _ in both:
             t, index = _measured(drawing, "MPSI")
-            bottom.plot(t, index, color=BLUE, **line)
+            bottom.plot(t, index, color=_shade(BLUE, line), **line)
             indices.append(index)
         from_zero(bottom, indices, MEASURES["MPSI"].bounds)  # type: ignore[arg-type]  # this one has bounds
         nominal_line(top, was.f_nom)
@@ -72,7 +76,17 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
             if panel is not bottom:
                 panel.set_xlabel("")
         if since > 0.0:
-            note_above(middle, "changed from here on", since, "data", "left", colour="#d55e00")
+            late = since > 0.7 * float(top.get_xlim()[1])
+            top.annotate(
+                "changed",
+                (since, 0.04),
+                xycoords=top.get_xaxis_transform(),
+                xytext=(-4.0 if late else 4.0, 0.0),
+                textcoords="offset points",
+                ha="right" if late else "left",
+                color="#d55e00",
+                fontsize="small",
+            )
         legend_below(figure, top)
     return figure
 
@@ -89,5 +103,13 @@ def _measured(drawing: Drawing, name: str) -> tuple[Floats, Floats]:
 def _powers(axes: Axes, drawing: Drawing, line: dict[str, Any]) -> None:
     ((_, history),) = drawing.histories.items()
     for i in range(len(history.inverters)):
-        colour = KINDS[bool(drawing.nameplates.GFM[i])]
+        colour = _shade(KINDS[bool(drawing.nameplates.GFM[i])], line)
         axes.plot(history.t, history.P[:, i] / drawing.nameplates.s[i], color=colour, **line)
+
+
+def _shade(colour: str, line: dict[str, Any]) -> tuple[float, float, float]:
+    """Return the colour as a line of this kind has it."""
+    red, green, blue = mpl.colors.to_rgb(colour)
+    if line is STRONG:
+        return red, green, blue
+    return tuple(PALE + (1.0 - PALE) * part for part in (red, green, blue))  # type: ignore[return-value]  # of three
