@@ -302,6 +302,7 @@ class LockstepPlant(PlantNode):
         for measurement in self._measurements():
             self._publish(self._measurement_keys[measurement.to], encode(measurement))
         if self.tick == 0:
+            self._note_node_faults()
             self._report(final=False)
 
     def _measurements(self) -> Iterator[Measurement]:
@@ -324,6 +325,7 @@ class LockstepPlant(PlantNode):
             return
         self.tick += 1
         self._reporter.collect()
+        self._note_node_faults()
         if self.tick == self._end_tick:
             self._close("end of the scenario", now)
         elif self.tick % TELEMETRY_TICKS == 0:

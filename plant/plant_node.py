@@ -162,6 +162,11 @@ class PlantNode(Node):
 
     # ---------------------------------------------------------------- events and reports
 
+    def _note_node_faults(self) -> None:
+        """Note among the events which agents began or ended to lie by the plant's time."""
+        for name, text in () if self._links is None else self._links.node_events(self.t):
+            self._note_event("link", name, text)
+
     def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
         """Note an event at the plant's time."""
         self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))

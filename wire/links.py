@@ -85,6 +85,10 @@ class Links(Protocol):
         """
         ...
 
+    def node_events(self, t: float) -> Sequence[tuple[str, str]]:
+        """Take out what nodes with faults began or ended by t (s of run time): the agent and a sentence each."""
+        ...
+
     def impaired(self, t: float) -> tuple[str, ...]:
         """Return the senders whose links have a fault at t (s of run time)."""
         ...

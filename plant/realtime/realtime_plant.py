@@ -233,6 +233,7 @@ class RealtimePlant(LivePlantNode):
         for name, text in self._silence.take(now):
             self._note(name, text)
         self._reporter.collect()
+        self._note_node_faults()
         if self.tick % self._telemetry_ticks == 0 or self.tick == 1 or self._event_is_due(now):
             self._report(final=False)
             self._report_journal()

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from netem.liar import HeardFrom, LiveHearing, lies_about
+from netem.models import INSTANT
+from netem.models.lie import lie_in_words
 from netem.receiver import Receiver
 from netem.schema.change import schedule_of
 from netem.schema.node_fault import NodeFault
@@ -47,6 +50,10 @@ class EmulatedLinks:
         self.clear: set[str] = set()
         """Senders whose messages `offer` is known not to take."""
         self._dropped_before = 0
+        self._liars: dict[str, LiveHearing] = {}
+        """Senders about whom lies are told here at some time."""
+        self._node_events: list[tuple[float, str, str]] = []
+        """Beginnings and ends of lies that are to come: run time (s), agent, sentence."""
         self._begin()
         self._intervals: dict[str, list[_Interval]] = {}
         for node in config.netem.nodes:
@@ -56,7 +63,8 @@ class EmulatedLinks:
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""
         src, t = message.sender, message.t
-        if not (src in self._intervals or self._name in self._intervals or self._receiver.touched(src)):
+        known = src in self._intervals or self._name in self._intervals or src in self._liars
+        if not (known or self._receiver.touched(src)):
             self.clear.add(src)
             return False
         for interval in self._intervals.get(src, ()):
@@ -67,6 +75,8 @@ class EmulatedLinks:
         for interval in self._intervals.get(self._name, ()):
             if interval.holds(t) and math.isinf(interval.slow):
                 at += interval.until - t
+        if src in self._liars and type(message) is State:
+            message = self._liars[src].told(message)
         self._receiver.offer(src, message.seq, t, at, payload, message)
         return True
 
@@ -137,6 +147,18 @@ class EmulatedLinks:
         config = self._config
         self.clear.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
+        self._liars = {
+            src: LiveHearing(HeardFrom(config.netem.seed, src, self._name, lies))
+            for src in self._senders
+            if (lies := lies_about(config.netem, src, self._name))
+        }
+        self._node_events = _events_of(config.netem.nodes)
+
+    def node_events(self, t: float) -> tuple[tuple[str, str], ...]:
+        """Take out what liars began or ended by t (s of run time): the agent and a sentence each."""
+        due = [event for event in self._node_events if event[0] <= t + INSTANT]
+        del self._node_events[: len(due)]
+        return tuple((name, text) for _, name, text in due)
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out what the links did since the last report, as encoded `LinkReportData`; the last is never empty."""
@@ -148,6 +170,16 @@ class EmulatedLinks:
 
 def _interval(node: NodeFault) -> _Interval:
     return _Interval(node.from_s, math.inf if node.to_s is None else node.to_s, math.inf if node.pause else node.slow_s)
+
+
+def _events_of(nodes: Sequence[NodeFault]) -> list[tuple[float, str, str]]:
+    found = []
+    for node in nodes:
+        if node.lies is not None:
+            found.append((node.from_s, node.name, f"{node.name} begins to lie: {lie_in_words(node.lies)}"))
+            if node.to_s is not None:
+                found.append((node.to_s, node.name, f"{node.name} tells the truth again"))
+    return sorted(found)
 
 
 def links_of(name: str, tree: Mapping[str, Any]) -> EmulatedLinks | None:

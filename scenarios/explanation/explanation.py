@@ -118,7 +118,7 @@ def _accounts(
     seen = {each.name: each for each in decision.neighbours_used}
     accounts = []
     for each in decision.neighbours:
-        why = reason(decision, each)
+        why = "; ".join(filter(None, (reason(decision, each), each.lie)))
         if any(each is other for other in old):
             why = "; ".join(filter(None, (why, missed(record, decision, each, fates, rejected))))
         accounts.append(NeighbourAccount(name=each.name, input=each, seen=seen.get(each.name), why=why))

@@ -14,6 +14,8 @@ from agents.agent_config import AgentConfig
 from agents.graphs import GraphError
 from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
+from netem.liar import HeardFrom
+from scenarios.record.heard_lies import StatesInRecord, hearing_of
 from scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
 from scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
 from wire.journal import Decision, Heard, Received
@@ -37,6 +39,8 @@ class DecisionReader:
         self._nameplates = {config.name: nameplate_of(config) for config in index.info.agents}
         self._forms = lru_cache(maxsize=None)(self._read_forms)
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
+        self._hearing = lru_cache(maxsize=None)(self._heard_from)
+        self._true_states = StatesInRecord(index)
 
     def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
         """Yield the decisions of an agent; see `RunRecord.decisions`."""
@@ -98,7 +102,7 @@ class DecisionReader:
             number = None if lag is None else tick - lag
             heard = None if number is None else self._index.state(neighbour, number, time_of(number, self._info.T_c))
             since = None if number is None else t - (time_of(number, self._info.T_c) if heard is None else heard.t)
-            neighbours.append(self._input(form, i, heard, number, since))
+            neighbours.append(self._input(name, form, i, heard, number, since))
         return self._decision(config, state, measured, tuple(neighbours), form, age=age)
 
     # ---------------------------------------------------------------- wall-clock time
@@ -118,15 +122,18 @@ class DecisionReader:
                     number, age = entry.states[i], entry.ages[i] if i < len(entry.ages) else None
                     at = measured.t - (age or 0.0)
                     heard = None if number is None else self._index.state(neighbour, number, at)
-                    neighbours.append(self._input(entry, i, heard, number, age))
+                    neighbours.append(self._input(name, entry, i, heard, number, age))
                 yield self._decision(config, state, measured, tuple(neighbours), entry)
 
     # ---------------------------------------------------------------- both
 
     def _input(
-        self, form: Decision, i: int, state: State | None, number: int | None, age: float | None
+        self, agent: str, form: Decision, i: int, state: State | None, number: int | None, age: float | None
     ) -> NeighbourInput:
-        name = form.neighbours[i]
+        name, lie = form.neighbours[i], ""
+        if state is not None and (heard := self._hearing(agent, name)) is not None:
+            lie = heard.in_words(state.t)
+            state = heard.told(state, self._true_states.before(state))
         unused = form.unused[i] if i < len(form.unused) else ""
         weight = form.weights[i] if i < len(form.weights) else 1.0
         return NeighbourInput(
@@ -136,7 +143,12 @@ class DecisionReader:
             age=age,
             weight=0.0 if unused else weight,
             unused=unused,
+            lie=lie,
         )
+
+    def _heard_from(self, agent: str, sender: str) -> HeardFrom | None:
+        config = self._info.agent(agent)
+        return None if config is None else hearing_of(config.links, sender, agent)
 
     def _nameplate(self, name: str, state: State | None) -> Nameplate:
         known = self._nameplates.get(name)

@@ -25,7 +25,7 @@ class NeighbourInput:
     nameplate: Nameplate
     """Its nameplate."""
     state: State | None
-    """Its last state that the agent had heard; None if there was none, or the record does not have it."""
+    """Its last state as the agent had heard it; None if there was none, or the record does not have it."""
     number: int | None
     """Number of that state, also if the record does not have it; None if there was none."""
     age: float | None
@@ -34,6 +34,8 @@ class NeighbourInput:
     """Weight from 0 to 1 of that state in the sums; 0 if it was left out."""
     unused: str
     """Why it was left out: "silent", "stale" or "island" (`wire.journal.UNUSED`); empty if it was used."""
+    lie: str = ""
+    """The lie that `state` is, in words; empty if it is as its sender decided it."""
 
     @property
     def name(self) -> str:

@@ -22,6 +22,8 @@ from wire.schema.table_schema import NO_KEY, Problem, fields_of
 LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
 """Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""
 
+_KEPT_OUT = 'certificates keep it out, and this scenario has security = "mtls"; leave one of them out'
+
 
 def netem_of(scenario: ScenarioModel, case: str) -> Netem:
     """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
@@ -88,6 +90,12 @@ def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Proble
 
     def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
         nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
+        if scenario.security == "mtls":
+            nodes += [
+                Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT)
+                for i, node in enumerate(netem.nodes)
+                if node.lies is not None and node.lies.in_name_of
+            ]
         return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
 
     problems.extend(wrong_in(scenario.netem, _noted("", problems)))

@@ -114,6 +114,8 @@ def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
         inner = get_args(kind)[0]
         if inner in (int, float):
             return "a list of numbers"
+        if get_origin(inner) is Literal:
+            return f"a list with {_word(inner, kinds)}"
         pairs = get_origin(inner) is tuple and Ellipsis not in get_args(inner)
         return "a list of pairs" if pairs else "a list of lists" if get_origin(inner) is tuple else "a list"
     return _KIND_WORDS.get(origin or kind, getattr(kind, "__name__", str(kind)))

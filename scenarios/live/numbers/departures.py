@@ -97,7 +97,7 @@ def compare(
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     switched = tuple(_switched(scenario, feeder, events))
-    commands = (event for event in events if event.kind == "link")
+    commands = (event for event in events if event.kind == "link" and event.subject == "links")
     departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
     first = departures[0].t if departures else ended
     live = live_events(switched)

@@ -10,6 +10,7 @@ from typing import get_args
 import msgspec
 
 from netem.models.delay import AnyDelay
+from netem.models.lie import AnyLie
 from netem.models.loss import AnyLoss
 from netem.schema.fault import KINDS
 from netem.schema.netem import Netem
@@ -27,14 +28,20 @@ def test_the_example_is_a_scenario_without_a_problem() -> None:
 
     assert not form
     assert not netem.problems(list(MICROGRIDS), MICROGRIDS, 10.0)
-    assert (len(netem.links), len(netem.partitions), len(netem.nodes)) == (2, 1, 1)
+    assert (len(netem.links), len(netem.partitions), len(netem.nodes)) == (2, 1, 2)
 
 
 def test_every_model_with_its_keys_every_kind_and_every_profile_is_told_of() -> None:
     """Nothing that a scenario may say is missing from the tables."""
-    for model in (*get_args(AnyDelay), *get_args(AnyLoss)):
+    for model in (*get_args(AnyDelay), *get_args(AnyLoss), *get_args(AnyLie)):
         (row,) = re.findall(rf"^\| `{model.__struct_config__.tag}` \|.*$", TEXT, flags=re.M)
-        keys = {field.encode_name for field in msgspec.structs.fields(model)} - {"fifo", "correlation", "delays_s"}
+        keys = {field.encode_name for field in msgspec.structs.fields(model)} - {
+            "fifo",
+            "correlation",
+            "delays_s",
+            "in_name_of",
+            "plant",
+        }
         assert {key for key in keys if f"`{key}`" not in row} == set()
     assert all(f"`{kind}`" in TEXT for kind in KINDS)
     assert all(f"| `{name}` |" in TEXT for name in PROFILES)

@@ -32,6 +32,23 @@ def problems_of(text: str, end_s: float = 10.0) -> list[str]:
     return [": ".join(problem) for problem in form + netem.problems(NAMES, MICROGRIDS, end_s, noted)]
 
 
+def _lying(keys: str, number: int = 3) -> str:
+    return f'[[node]]\nname = "inv{number}"\nlies = {{{keys}}}'
+
+
+def test_all_problems_of_liars_come_at_once() -> None:
+    """A liar that does not exist, an impossible value and another's name that does not exist are told together."""
+    text = '[[node]]\nname = "inv30"\nfrom_s = 99\nlies = {model = "freeze", in_name_of = "inv40"}\n'
+    text += _lying('model = "offset", Q_var = inf')
+
+    assert sorted(found.partition(":")[0] for found in problems_of(text)) == [
+        "node[0].from_s",
+        "node[0].lies.in_name_of",
+        "node[0].name",
+        "node[1].lies.Q_var",
+    ]
+
+
 def test_a_scenarios_entries_are_read_as_written() -> None:
     """Shorthands, models, profiles with a key of their own, partitions and nodes come out as structs."""
     text = """
@@ -115,6 +132,22 @@ def test_a_scenarios_entries_are_read_as_written() -> None:
         ('[[node]]\nname = "inv3"\nskew = {factor = 50}', "node[0].skew.factor", ["1.00005 (50 ppm)"]),
         ('[[node]]\nname = "inv3"\nslow_s = 20', "node[0].slow_s", ["0.02 (20 ms)"]),
         ('[[node]]\nname = "inv3"', "node[0]", ["does nothing"]),
+        (_lying('model = "ofset", P_set_W = 1'), "node[0].lies.model", ['"offset"?']),
+        (_lying('model = "offset"'), "node[0].lies", ["is no lie", "P_set_W"]),
+        (_lying('model = "offset", P_set_W = nan'), "node[0].lies.P_set_W", ["finite"]),
+        (_lying('model = "scale", Q = 1e9'), "node[0].lies.Q", ["-1e+06 to 1e+06"]),
+        (_lying('model = "replay", delay_s = 2000'), "node[0].lies.delay_s", ["2 (2000 ms)"]),
+        (_lying('model = "freeze", of = ["f"]'), "node[0].lies.of", ['a list with one of "P_set", "V_set", "Q"']),
+        (_lying('model = "freeze", of = []'), "node[0].lies.of", ["names nothing"]),
+        (_lying('model = "random", Q_var = -1'), "node[0].lies.Q_var", ["negative"]),
+        (_lying('model = "freeze", in_name_of = "inv77"'), "node[0].lies.in_name_of", ['did you mean "inv7"?']),
+        (_lying('model = "freeze", in_name_of = "inv3"'), "node[0].lies.in_name_of", ["own name"]),
+        (_lying('model = "freeze"') + "\nkill = true", "node[0].lies", ["says nothing"]),
+        (
+            _lying('model = "freeze", in_name_of = "inv1"') + "\n" + _lying('model = "freeze", in_name_of = "inv1"', 4),
+            "node[1].lies.in_name_of",
+            ["node[0]"],
+        ),
         ("link = 3", "link", ["[[link]]"]),
     ],
 )
