@@ -1,6 +1,7 @@
 """Lies of an agent: what others hear in place of its state. Pure.
 
-Every lie is a valid message, within the bounds of its fields. It keeps the number, the time and the island of the true state, so that no check of form, order or age stops it.
+Every lie is a valid message, within the bounds of its fields. It keeps the number, the time and the island of the true
+state, so that no check of form, order or age stops it.
 """
 
 from __future__ import annotations
