@@ -7,7 +7,7 @@ state, so that no check of form, order or age stops it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
 from msgspec.structs import replace
@@ -29,7 +29,7 @@ QUANTITIES: tuple[Quantity, ...] = ("P_set", "V_set", "Q")
 """All of them."""
 
 _BOUNDS: dict[str, tuple[float, float]] = {
-    name: (kind.__metadata__[0].ge, kind.__metadata__[0].le)
+    name: (get_args(kind)[1].ge, get_args(kind)[1].le)
     for name, kind in (("P_set", Power), ("V_set", Voltage), ("Q", Power))
 }
 """Least and greatest value that a message may have (W, V, var)."""
