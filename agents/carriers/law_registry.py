@@ -35,6 +35,7 @@ LAWS: Registry[type[Law]] = Registry(
         "event-triggered": "agents.laws.event_triggered:EventTriggered",
         "finite-time": "agents.laws.finite_time:FiniteTime",
         "centralised": "agents.laws.centralised:Centralised",
+        "resilient": "agents.laws.resilient:Resilient",
     },
 )
 """Laws by name; those of gridpeers come first."""

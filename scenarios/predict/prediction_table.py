@@ -6,11 +6,14 @@ import math
 import textwrap
 from collections.abc import Sequence
 
+import numpy as np
+
 from scenarios.predict.case_prediction import CasePrediction
 from scenarios.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
 from scenarios.predict.inverter_group import InverterGroup
 from scenarios.predict.linear_model import Loop
 from scenarios.predict.load_steps import IslandStep
+from scenarios.predict.robustness import robustness
 from scenarios.predict.times import Times
 from scenarios.predict.var_response import var_delay_limit, var_spectral_radius
 
@@ -64,6 +67,7 @@ def _rows(case: CasePrediction) -> list[TextRow]:
         ("links", f"{found.links}", "", "undirected, among those that run the law"),
         ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
         ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
+        ("robustness", *_robustness(inverters)),
         ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
         ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
         ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
@@ -76,6 +80,13 @@ def _rows(case: CasePrediction) -> list[TextRow]:
         ("loss 50 %", "", _s(equivalent_delay(inverters.T_c, 0.5), ""), "held: as so much more delay on the links"),
         ("loss 90 %", "", _s(equivalent_delay(inverters.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
     ]
+
+
+def _robustness(inverters: InverterGroup) -> tuple[str, str, str]:
+    """Return the r-robustness of the graph of those that run the law, and the liars that it bears."""
+    found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
+    r = f"r {found.least}" if found.least == found.most else f"r {found.least}..{found.most}"
+    return r, "", f"of the graph; W-MSR bears F = {found.F} liars around each agent"
 
 
 def _event(step: IslandStep) -> str:

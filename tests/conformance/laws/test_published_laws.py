@@ -7,7 +7,7 @@ import pytest
 import gridpeers as gp
 from tests.conformance.laws.law_runs import islanding, written
 
-LAWS = ("consensus", "dapi", "event-triggered", "finite-time", "centralised")
+LAWS = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 
 
 @pytest.mark.parametrize("law", LAWS)

@@ -13,7 +13,7 @@ from agents.carriers.time_limit import TimeLimited
 from agents.laws.call import decide
 from agents.laws.law import Law, Neighbour, Own, SetPoints
 
-NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised")
+NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 
 VARIANTS: dict[str, tuple[dict[str, float | str], ...]] = {
     "consensus": ({}, {"kappa_c": 12.0}, {"alpha_min": 0.1, "V_full": 0.02}, {"P_set_max": 0.6, "V_set_max": 1.01}),
@@ -21,6 +21,7 @@ VARIANTS: dict[str, tuple[dict[str, float | str], ...]] = {
     "event-triggered": ({}, {"P_set_max": 0.6}, {"c_0": 0.01, "q_0": 0.01}),
     "finite-time": ({}, {"gamma": 0.9, "P_set_max": 0.6}),
     "centralised": ({}, {"centre": "inv2"}, {"P_set_max": 0.6, "V_set_max": 1.01}),
+    "resilient": ({}, {"F": 2, "tolerance": 0.2, "T_out": 0.1}, {"F": 0, "rate": 0.5, "T_out": 0.1, "tolerance": 0.1}),
 }
 """Parameters of each law."""
 

@@ -1,0 +1,140 @@
+r"""The paper's law among liars: trimmed means (W-MSR), plausibility, rate limits, and distrust. Pure.
+
+H. J. LeBlanc, H. Zhang, X. Koutsoukos, S. Sundaram, "Resilient Asymptotic Consensus in Robust Networks", IEEE J. Sel.
+Areas Commun. 31(4), 2013: each agent leaves out the F largest of the neighbours' values above its own (all, if there
+are fewer), and the F smallest below it, and averages over the rest. Here that holds for m_p P_set in (12), (13) and for
+m_q q in (14), (15), each by itself. The leaders' own errors stay as they are: nobody can lie about them.
+
+**Claim of the paper.** With at most F liars among the neighbours of each honest agent, consensus never leaves the range
+of the honest agents' values, on any graph. They agree if the graph is (2F + 1)-robust; `gridpeers predict` has r.
+
+Before the trimming come three defences of ours, each of them off at 0:
+
+- `tolerance`: a state is implausible that no inverter can have. All inverters of an island see one frequency, so a
+  neighbour on its droop delivers p_j = P_set,j - e/m_p,j, e being the own frequency error. P_set,j and p_j must be
+  within P_set_min and P_set_max, and q_j within -1 and 1, each give or take the tolerance (pu).
+- `rate`: what counts of a neighbour's P_set and Q moves by at most this much a second (pu/s).
+- `T_out`: whoever is implausible does not count at that tick, and is trusted less: its weight falls to 1/e in T_out.
+  It comes back ten times as slowly, so that one who lies at every other tick stays out as well.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from math import exp
+from typing import Annotated, Any, NamedTuple
+
+from agents.laws.consensus import Consensus
+from agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
+from wire.schema.plausible import Range, Unit
+
+SLOWER = 10.0
+"""How much slower trust comes back than it goes."""
+
+
+class _Memory(NamedTuple):
+    """What is remembered of a neighbour."""
+
+    t: float
+    """Run time (s) of the last step with it."""
+    P_set: float
+    """What counted of its P_set (pu)."""
+    Q: float
+    """What counted of its Q (pu)."""
+    trust: float
+    """From 0 to 1."""
+
+
+class Resilient(Consensus):
+    """The paper's law with W-MSR and checks of plausibility, for neighbours that may lie."""
+
+    source = "LeBlanc et al., IEEE J. Sel. Areas Commun. 31(4), 2013"
+
+    F: Annotated[int, Range(0, 100), "Liars among the neighbours of an agent that are borne; 0 trims nothing."] = 1
+    tolerance: Annotated[float, Unit("pu"), Range(0, 100), "Beyond what an inverter can do: implausible. 0: off."] = 0.0
+    rate: Annotated[float, Unit("pu/s"), Range(0, 1e6), "Fastest change of what counts of a neighbour. 0: any."] = 0.0
+    T_out: Annotated[float, Unit("s"), Range(0, 1e3), "Time in which an implausible one is distrusted. 0: none."] = 0.0
+
+    def __init__(self, **parameters: Any) -> None:
+        super().__init__(**parameters)
+        self._memory: dict[str, _Memory] = {}
+
+    def start(self, own: Own) -> None:
+        """Trust everybody again."""
+        self._memory = {}
+
+    def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+        """Decide the set-points of one control period from the neighbours that remain."""
+        believed, self._memory = self._believed(own, neighbours, T)
+        of_P, of_V = self._values(own)
+        P_set = super().step(own, self._trimmed(believed, *of_P), T).P_set
+        return SetPoints(P_set, super().step(own, self._trimmed(believed, *of_V), T).V_set)
+
+    def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
+        """Return the paper's terms of the neighbours that remain; those left out have a term of 0 that says why."""
+        believed, _ = self._believed(own, neighbours, T)
+        distrusted = [n.name for n in neighbours if n.name not in {other.name for other in believed}]
+        both = []
+        for of in self._values(own):
+            rest = self._trimmed(believed, *of)
+            names = {other.name for other in rest}
+            zeros = [Term("trimmed", 0.0, other.name) for other in believed if other.name not in names]
+            zeros += [Term("implausible", 0.0, name) for name in distrusted]
+            both.append((super().terms(own, rest, T), zeros))
+        (P, no_P), (V, no_V) = both
+        return Terms((*P.P_set, *no_P), (*V.V_set, *no_V))
+
+    @staticmethod
+    def _values(own: Own) -> tuple[tuple[float, Callable[[Neighbour], float]], ...]:
+        """Return the own value, and how a neighbour's is found, of what is shared: m_p P_set and m_q q (pu)."""
+        return (own.m_p * own.P_set, lambda n: n.m_p * n.P_set), (own.z, lambda n: n.m_q * n.Q)
+
+    def _trimmed(
+        self, neighbours: Sequence[Neighbour], own: float, value: Callable[[Neighbour], float]
+    ) -> list[Neighbour]:
+        """Return the neighbours without the F largest values above the own one and the F smallest below it."""
+        if not self.F:
+            return list(neighbours)
+        order = sorted(range(len(neighbours)), key=lambda i: value(neighbours[i]))
+        below = [i for i in order if value(neighbours[i]) < own][: self.F]
+        above = [i for i in order if value(neighbours[i]) > own][-self.F :]
+        out = {*below, *above}
+        return [other for i, other in enumerate(neighbours) if i not in out]
+
+    def _believed(
+        self, own: Own, neighbours: Sequence[Neighbour], T: float
+    ) -> tuple[list[Neighbour], dict[str, _Memory]]:
+        """Return the neighbours that are plausible, as far as they are believed, and what to remember of all."""
+        if not (self.tolerance or self.rate):
+            return list(neighbours), self._memory
+        believed, memory = [], dict(self._memory)
+        for n in neighbours:
+            plausible = self._is_plausible(own, n)
+            last = self._memory.get(n.name)
+            trust = 1.0 if last is None else last.trust
+            if self.T_out:
+                trust = (
+                    1.0 - (1.0 - trust) * exp(-T / (SLOWER * self.T_out)) if plausible else trust * exp(-T / self.T_out)
+                )
+            if not plausible:
+                if last is not None:
+                    memory[n.name] = last._replace(trust=trust)
+                elif self.T_out:
+                    memory[n.name] = _Memory(own.t, own.P_set, own.Q, trust)
+                continue
+            P_set, Q = n.P_set, n.Q
+            if self.rate and last is not None:
+                most = self.rate * max(T, own.t - last.t)
+                P_set = min(max(P_set, last.P_set - most), last.P_set + most)
+                Q = min(max(Q, last.Q - most), last.Q + most)
+            memory[n.name] = _Memory(own.t, P_set, Q, trust)
+            believed.append(n._replace(P_set=P_set, Q=Q, weight=n.weight * trust))
+        return believed, memory
+
+    def _is_plausible(self, own: Own, n: Neighbour) -> bool:
+        """Return whether an inverter in the own island can be as a neighbour says."""
+        if not self.tolerance:
+            return True
+        low, high = self.P_set_min - self.tolerance, self.P_set_max + self.tolerance
+        P = n.P_set - own.e / n.m_p
+        return low <= n.P_set <= high and low <= P <= high and abs(n.Q) <= 1.0 + self.tolerance

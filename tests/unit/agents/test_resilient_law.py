@@ -1,0 +1,152 @@
+"""The law `resilient` among liars: what W-MSR guarantees, by r-robustness, and what the other defences do."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from agents.laws.consensus import Consensus
+from agents.laws.law import Neighbour, Own
+from agents.laws.resilient import Resilient
+from scenarios.predict.robustness import robustness
+
+T = 0.02
+
+
+def own(P_set: float = 0.5, Q: float = 0.0, *, t: float = 1.0, e: float = 0.0, name: str = "inv1") -> Own:
+    """A follower."""
+    return Own(name, False, t, P_set, Q, 1.0, e, 0.05 * Q, P_set, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+
+
+def neighbour(name: str, P_set: float = 0.5, Q: float = 0.0) -> Neighbour:
+    """A neighbour with these values."""
+    return Neighbour(name, False, T, 1.0, P_set, 1.0, Q, 0.01, 0.05, 6e5)
+
+
+def graph_of(rng: np.random.Generator, n: int, links: float) -> np.ndarray:
+    """A random undirected graph."""
+    A = np.triu(rng.random((n, n)) < links, 1).astype(float)
+    return np.asarray(A + A.T)
+
+
+def spread_after(A: np.ndarray, start: np.ndarray, liars: set[int], F: int, said: np.ndarray) -> list[np.ndarray]:
+    """Return P_set of all honest agents, step by step; liar i says said[k, i, j] to agent j at step k."""
+    n = len(A)
+    laws = [Resilient(F=F) for _ in range(n)]
+    P = start.copy()
+    honest = [i for i in range(n) if i not in liars]
+    steps = [P[honest].copy()]
+    for row in said:
+        new = P.copy()
+        for i in honest:
+            heard = [neighbour(f"n{j}", row[j, i] if j in liars else P[j]) for j in range(n) if A[i, j]]
+            new[i] = laws[i].step(own(P[i]), heard, T).P_set
+        P = new
+        steps.append(P[honest].copy())
+    return steps
+
+
+@settings(max_examples=25, deadline=None)
+@given(seed=st.integers(0, 10_000), n=st.integers(4, 9), F=st.integers(0, 2), links=st.floats(0.3, 1.0))
+def test_w_msr_never_leaves_the_range_of_the_honest_and_they_agree_where_the_graph_is_robust(
+    seed: int, n: int, F: int, links: float
+) -> None:
+    """On any graph with F two-faced liars the range never widens; on a (2F + 1)-robust one it closes."""
+    rng = np.random.default_rng(seed)
+    A = graph_of(rng, n, links)
+    liars = set(rng.choice(n, size=min(F, n - 2), replace=False).tolist())
+    said = rng.choice([0.0, 1.0, -1e5, 1e5, 0.4], size=(400, n, n))
+    steps = spread_after(A, rng.random(n), liars, F, said)
+    lows, highs = [row.min() for row in steps], [row.max() for row in steps]
+
+    assert all(b >= a - 1e-12 for a, b in itertools.pairwise(lows))
+    assert all(b <= a + 1e-12 for a, b in itertools.pairwise(highs))
+    if robustness(A).least >= 2 * F + 1:
+        assert highs[-1] - lows[-1] < 1e-3
+
+
+def test_where_robustness_is_missing_the_honest_may_never_agree() -> None:
+    """Two cliques of three linked one to one are 1-robust, enough for F = 0 alone: with F = 1 each keeps its own."""
+    A = np.kron(np.eye(2), np.ones((3, 3)) - np.eye(3)) + np.kron(np.array([[0, 1], [1, 0]]), np.eye(3))
+    start = np.array([0.2, 0.2, 0.2, 0.8, 0.8, 0.8])
+    nobody = np.zeros((400, 6, 6))
+
+    assert robustness(A).F == 0
+    assert np.ptp(spread_after(A, start, set(), 1, nobody)[-1]) == pytest.approx(0.6)
+    assert np.ptp(spread_after(A, start, set(), 0, nobody)[-1]) < 1e-3
+
+
+def test_more_liars_than_F_take_the_honest_wherever_they_want() -> None:
+    """Two liars where one is borne: in a full graph of seven all honest agents end at the liars' value."""
+    A = np.ones((7, 7)) - np.eye(7)
+    steps = spread_after(A, np.full(7, 0.5), {5, 6}, 1, np.full((600, 7, 7), 0.9))
+
+    assert steps[-1].min() > 0.89
+
+
+def test_without_defences_it_is_the_paper_s_law() -> None:
+    """F = 0 and nothing else gives the paper's step, bit by bit."""
+    around = [neighbour("a", 0.9, 0.3), neighbour("b", 0.1, -0.2)]
+
+    assert Resilient(F=0).step(own(0.4, 0.1), around, T) == Consensus().step(own(0.4, 0.1), around, T)
+
+
+def test_a_state_that_no_inverter_can_have_does_not_count() -> None:
+    """Beyond the limits of P_set, of what droop makes of it at the own frequency, or of vars, give or take 0.1 pu."""
+    law = Resilient(F=0, tolerance=0.1)
+
+    def counts(n: Neighbour, e: float = 0.0) -> bool:
+        terms = law.terms(own(e=e), [n], T)
+        return "implausible" not in {term.name for term in terms.P_set}
+
+    assert counts(neighbour("a", 1.05))
+    assert not counts(neighbour("a", 1.15))
+    assert not counts(neighbour("a", -0.15))
+    assert counts(neighbour("a", 0.9))
+    assert not counts(neighbour("a", 0.9), e=-0.004)  # it would deliver 1.3 pu
+    assert counts(neighbour("a", 0.5, 1.05))
+    assert not counts(neighbour("a", 0.5, -1.15))
+
+
+def test_a_rate_limit_holds_back_what_jumps() -> None:
+    """A neighbour that jumps by 0.4 pu counts as having moved by 0.01 pu a step at 0.5 pu/s."""
+    law = Resilient(F=0, rate=0.5)
+    law.step(own(0.5, t=1.0), [neighbour("a", 0.5)], T)
+    slow, fast = (Resilient(F=0).step(own(0.5), [neighbour("a", P)], T).P_set for P in (0.51, 0.9))
+
+    assert law.step(own(0.5, t=1.02), [neighbour("a", 0.9)], T).P_set == pytest.approx(slow, abs=1e-12)
+    assert fast > slow
+
+
+def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
+    """After three times T_out its weight is e^-3; a start forgets it."""
+    law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2
+    steps = round(3 * T_out / T)
+    for k in range(steps):
+        law.step(own(t=k * T), [neighbour("a", 5.0)], T)
+    full = Resilient(F=0).step(own(), [neighbour("a", 0.6)], T).P_set - 0.5
+    trust = 1.0 - (1.0 - math.exp(-3.0)) * math.exp(-T / (10.0 * T_out))
+    weighed = Resilient(F=0).step(own(), [neighbour("a", 0.6)._replace(weight=trust)], T).P_set - 0.5
+
+    assert law.step(own(t=steps * T), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(weighed)
+    assert weighed < 0.1 * full
+    law.start(own())
+    assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
+
+
+def test_why_names_the_trimmed_and_the_implausible() -> None:
+    """They have terms of 0 with their names; the others have the paper's."""
+    around = [neighbour("low", 0.1), neighbour("mid", 0.55), neighbour("high", 0.9), neighbour("mad", 50.0)]
+    terms = Resilient(F=1, tolerance=0.1).terms(own(0.5), around, T)
+
+    assert [(term.name, term.neighbour) for term in terms.P_set] == [
+        ("power sharing", "mid"),
+        ("trimmed", "low"),
+        ("trimmed", "high"),
+        ("implausible", "mad"),
+    ]
