@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
@@ -247,7 +248,9 @@ class DecisionReader:
                     message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
                 else:
                     continue
-                t = journal.t if message.rejected or message.t < 0.0 else message.t  # a rejected one may say any time
+                if message.rejected:  # it may say any time
+                    message = dataclasses.replace(message, t=journal.t)
+                t = journal.t if message.t < 0.0 else message.t
                 if since - 1e-9 <= t <= until + 1e-9:
                     yield message
 

@@ -20,7 +20,8 @@ from wire.messages import PLANT, AnyMessage, Journal, Measurement, State
 M = TypeVar("M", bound=AnyMessage)
 
 LATE = 2.0
-"""Longest time (s of run time) after which an entry of a journal may come into the record."""
+"""Longest time (s of run time; of wall time in wall-clock runs) after which an entry of a journal may come into the
+record."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +41,7 @@ class MessageOnWire:
     number: int
     """Its number; -1 if it cannot be read."""
     t: float
-    """Run time that it says (s); -1 if it cannot be read."""
+    """Run time that it says (s); -1 if it cannot be read. Of one that was rejected, about when that was."""
     at: float | None
     """When it was sent, or heard, on the clock of that process (s, monotonic); None in simulated time."""
     rejected: str = ""
@@ -74,6 +75,7 @@ class MessageIndex:
         self.file, self.info = file, file.info
         self.damage: list[str] = []
         """Sentences on what could not be read."""
+        self._speed = max(1.0, self.info.plant.speed) if self.info.clock == "wall" else 1.0
         self._ends: list[float] = []
         """Last run time (s) of each part."""
         self._note_parts()
@@ -120,7 +122,7 @@ class MessageIndex:
     def near(self, since: float, until: float) -> range:
         """Return the parts that may have what happened between two run times (s)."""
         first = bisect_left(self._ends, since - 1e-9)
-        last = bisect_left(self._ends, until + LATE) + 1 if until < inf else len(self._ends)
+        last = bisect_left(self._ends, until + LATE * self._speed) + 1 if until < inf else len(self._ends)
         return range(first, min(last, len(self._ends)))
 
     def entries_in(self, journal: Journal) -> Iterator[Entry]:
@@ -148,15 +150,20 @@ class MessageIndex:
 
         Of several that restarted processes numbered alike, it is the one of this epoch, or the nearest in time.
         """
-        parts = (self.part(i).states for i in self.near(t - 1.0 - reach, t + reach))
+        parts = (self.part(i).states for i in self._about(t, reach))
         return _nearest((each for part in parts for each in part.get((sender, number), ())), t, epoch)
 
     def measurement(
         self, to: str, number: int, t: float, epoch: int | None = None, reach: float = 0.0
     ) -> Measurement | None:
         """Return a measurement of about run time t (s), as `state` does."""
-        parts = (self.part(i).measurements for i in self.near(t - 1.0 - reach, t + reach))
+        parts = (self.part(i).measurements for i in self._about(t, reach))
         return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
+
+    def _about(self, t: float, reach: float) -> range:
+        """Return the parts that may have a message of about run time t (s): a journal tells of the last second."""
+        further = max(reach, 2.0 * (self._speed - 1.0))
+        return self.near(t - 1.0 - further, t + further)
 
     def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:
         """Yield messages as they were sent; see `RunRecord.messages`."""

@@ -103,13 +103,15 @@ def _replay(record: RunRecord) -> bool:
     done = replay_record(record)
     for part in done.parts:
         of = "rows" if part.name == "plant" else "states"
-        verdict = "the same" if part.difference is None else f"then {part.difference}"
+        verdict = f"then {part.difference}" if part.difference else "the same" if part.count else "nothing to compare"
         typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
     for note in done.notes:
         typer.echo(f"NOTE  {note}")
     if done.difference is not None:
         typer.echo(f"The first difference: {done.difference}")
         return True
+    if not any(part.count for part in done.parts):
+        fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
     typer.echo("The replay gives what was recorded, within 1e-9.")
     return False
 

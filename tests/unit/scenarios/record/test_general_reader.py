@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import struct
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO
@@ -131,7 +132,7 @@ def test_a_record_that_is_cut_off_is_read_as_a_stream(path: Path) -> None:
         try:
             for record in StreamReader(BytesIO(data[:length])).records:
                 found += isinstance(record, Message)
-        except EndOfFile:
+        except (EndOfFile, struct.error):  # also cut within the length of a part
             pass
         return found
 
