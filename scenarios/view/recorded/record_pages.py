@@ -146,7 +146,11 @@ class RecordPages:
             return
         try:
             view = self._run.view(page.case)
-            t = _time_of(question, view)
+        except RecordFileError as error:  # its folder is gone
+            yield as_json({"problem": str(error)})
+            return
+        t = _time_of(question, view)
+        try:
             ok, text = True, view.decision(question.agent, t)
         except RecordFileError as error:
             ok, text = False, str(error).removeprefix(f"{view.record.path}: ")

@@ -80,7 +80,8 @@ class RecordedRun:
         """
         files = self._files()
         if not files:
-            raise RecordFileError(f"{self.path}: nothing is recorded yet")
+            known = self._views and not self.path.exists()
+            raise RecordFileError(f"{self.path}: {'the folder is gone' if known else 'nothing is recorded yet'}")
         case = case or list(files)[-1]
         if case not in files:
             raise RecordFileError(f"{self.path}: no record of case {case}; there are {', '.join(files)}")
