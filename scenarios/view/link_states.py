@@ -14,7 +14,7 @@ State = Literal["used", "old", "apart", "unused"]
 """In the receiver's sums; older than it uses; of another island; left out for another reason."""
 
 AGE_STEP = 0.05
-"""Step of shown ages (s)."""
+"""Step of the ages of a live run (s): what hardly changes is not sent again."""
 
 
 class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -23,7 +23,7 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     src: str
     state: State
     age: float
-    """Age (s) of the sender's last state at the receiver, in steps of `AGE_STEP`; -1 if none was heard."""
+    """Age (s) of the sender's last state at the receiver, in steps; -1 if none was heard."""
     rate: float = 0.0
     """Messages per s of wall time that come over it: what the sender sends, less what an emulated link drops."""
     holds: tuple[str, ...] = ()
@@ -34,9 +34,16 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class LinkStates:
-    """Collect what is known of the links of a run."""
+    """Collect what is known of the links of a run.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    age_step : float
+        Step of ages (s).
+    """
+
+    def __init__(self, age_step: float = AGE_STEP) -> None:
+        self._age_step = age_step
         self._sent: dict[str, tuple[float, int, float]] = {}
         """Of each sender: when its last status came (s), its count of sent states, messages per s."""
         self._status: dict[str, AgentStatus] = {}
@@ -45,7 +52,7 @@ class LinkStates:
 
     def clear(self) -> None:
         """Forget all: another run has begun."""
-        self.__init__()  # type: ignore[misc]
+        self.__init__(self._age_step)  # type: ignore[misc]
 
     def status(self, message: AgentStatus, now: float) -> None:
         """Take an agent's status; `now` is the client's clock (s)."""
@@ -57,6 +64,12 @@ class LinkStates:
         else:
             self._sent[message.sender] = at, sent, rate
         self._status[message.sender] = message
+
+    def rates(self, rates: Mapping[str, float], now: float) -> None:
+        """Take the messages per s of each sender, where they are known; `now` is the client's clock (s)."""
+        for name, rate in rates.items():
+            sent = self._status[name].sent if name in self._status else 0
+            self._sent[name] = now, sent, _two_digits(rate)
 
     def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
         """Take the states of the emulated links into a receiver, by sender."""
@@ -109,7 +122,7 @@ class LinkStates:
         return LinkView(
             src=src,
             state=state,
-            age=-1.0 if age < 0.0 else round(round(age / AGE_STEP) * AGE_STEP, 2),
+            age=-1.0 if age < 0.0 else round(round(age / self._age_step) * self._age_step, 3),
             rate=0.0 if cut or state == "old" else _two_digits(rate * (1.0 - lost)),
             holds=holds,
             cut=cut,

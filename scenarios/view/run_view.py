@@ -16,7 +16,7 @@ from scenarios.emulation.link_reports import LinkStatus
 from scenarios.live.feeder_map import FeederMap
 from scenarios.live.show.run_monitor import SILENT, PlantStatus, RunMonitor
 from scenarios.live.show.snapshot import InverterStatus
-from scenarios.view.link_states import LinkStates, LinkView
+from scenarios.view.link_states import AGE_STEP, LinkStates, LinkView
 from scenarios.view.liveness import Liveness, LivenessView
 from scenarios.view.strips import Point, Strips
 from wire.messages import AgentStatus, PlantEvent, Telemetry
@@ -84,15 +84,17 @@ class RunView:
     ----------
     run : str
         Name of the run.
+    age_step : float
+        Step of the ages of links (s).
     """
 
-    def __init__(self, run: str) -> None:
+    def __init__(self, run: str, age_step: float = AGE_STEP) -> None:
         self._monitor = RunMonitor(run)
         self.feeder_map: FeederMap | None = None
         """The one-line diagram; None until it has come."""
         self.wants_status = True
         """Whether to ask the plant for its status: at first, after a change of switches or loads, after a restart."""
-        self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates()
+        self._liveness, self._strips, self._links = Liveness(), Strips(), LinkStates(age_step)
         self._configs: dict[str, AgentConfig] = {}
         self._names: tuple[str, ...] = ()
         self._run = 0
@@ -150,11 +152,16 @@ class RunView:
 
     def status(self, message: AgentStatus, now: float) -> None:
         """Take the status of an agent."""
-        self._monitor.status(message, now)
-        self._status_at[message.sender] = now
-        self._islands[message.sender] = message.island
-        self._links.status(message, now)
+        self._note_status(message, now)
         self._renew_links(message.sender)
+
+    def statuses(self, messages: Collection[AgentStatus], rates: Mapping[str, float], now: float) -> None:
+        """Take the statuses of all agents at one moment, and the messages per s that each of them sends."""
+        for message in messages:
+            self._note_status(message, now)
+        self._links.rates(rates, now)
+        for message in messages:  # a link needs what its sender says as well
+            self._renew_links(message.sender)
 
     def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
         """Take the states of the emulated links into a receiver."""
@@ -227,6 +234,12 @@ class RunView:
             self._count += 1
             self._events.append(EventView(self._count, event.t, event.kind, event.subject, event.text))
             self.wants_status |= event.kind in ("switch", "load") and not old
+
+    def _note_status(self, message: AgentStatus, now: float) -> None:
+        self._monitor.status(message, now)
+        self._status_at[message.sender] = now
+        self._islands[message.sender] = message.island
+        self._links.status(message, now)
 
     def _renew_links(self, receiver: str) -> None:
         config = self._configs.get(receiver)

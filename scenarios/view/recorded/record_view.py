@@ -7,7 +7,6 @@ one time to the next but what speeds it up, so a time has the same frame whichev
 from __future__ import annotations
 
 import dataclasses
-from collections import Counter
 from collections.abc import Iterator, Mapping
 
 from msgspec.structs import replace
@@ -29,6 +28,9 @@ from wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
 WINDOW = 1.0
 """Time (s) before a moment over which messages are counted."""
+
+AGE_STEP = 0.001
+"""Step of the ages of links (s)."""
 
 _STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
 
@@ -87,7 +89,7 @@ class RecordView:
     def frame(self, t: float, since: float = -1.0) -> Frame:
         """Return what the page shows at a run time (s); its strips only have points after `since` (s)."""
         agents = self._moments.at(t)
-        view = RunView(self.record.info.run)
+        view = RunView(self.record.info.run, AGE_STEP)
         for config in self._configs.values():
             view.config(config)
         view.presence(plant=True, agents=self._present(t, agents), now=t)
@@ -177,16 +179,16 @@ class RecordView:
         return row[0]
 
     def _feed_links(self, view: RunView, agents: Mapping[str, AgentMoment], t: float) -> None:
-        """Feed the status of each agent and the accounts of its links, as of a second before and of now."""
+        """Feed what each agent says, what it sent in the second before, and the accounts of its links."""
         sent, faults = self._moments.sent(t - WINDOW, t), self._faults.into(t, WINDOW)
-        span = min(WINDOW, max(t, 1e-3))
-        for at, counts in ((t - span, Counter[str]()), (t, sent)):
-            for name, agent in agents.items():
-                impaired = faults.get(name, {})
-                view.status(_status(agent, counts[name], tuple(impaired)), at)
-                if impaired:
-                    before = {src: replace(link, counts=NOTHING) for src, link in impaired.items()}
-                    view.accounts(name, impaired if at == t else before)
+        T_c = self.record.info.T_c
+        span = min(WINDOW, T_c * (int(t / T_c + 1e-6) + 1))  # in the first second: the periods that have begun
+        statuses = [_status(agent, sent[name], tuple(faults.get(name, ()))) for name, agent in agents.items()]
+        view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
+        for name in agents:
+            if impaired := faults.get(name):
+                view.accounts(name, {src: replace(link, counts=NOTHING) for src, link in impaired.items()})
+                view.accounts(name, impaired)
 
     def _noted(self, one: InverterStatus, agents: Mapping[str, AgentMoment]) -> InverterStatus:
         """Return the status of an inverter without what a record does not have."""

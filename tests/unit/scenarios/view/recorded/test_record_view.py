@@ -96,8 +96,30 @@ def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: Recor
             for name, link in links.items():
                 age = inputs[name].age
                 assert age is not None
-                assert link.age == pytest.approx(age, abs=0.026)
+                assert link.age == pytest.approx(age, abs=0.0006)
                 assert (link.state == "used") == (inputs[name].unused == "")
+
+
+def test_all_links_of_a_healthy_record_carry_what_is_sent(tmp_path: Path) -> None:
+    """Both ways of each link, whichever agent comes first, from the first second on; ages are those of `why`."""
+    from scenarios.explanation.explanation import explain
+
+    scenario = ISLANDED.partition("[[link]]")[0]
+    (tmp_path / "it.toml").write_text(scenario, encoding="utf-8")
+    record = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case")
+    view = RecordView(record)
+    for t in (0.1, 0.31, 1.5):
+        frame = view.frame(t)
+        links = {(link.src, agent): link for agent, into in frame.links.items() for link in into}
+        table = {one.name: one.ages for one in frame.inverters}
+
+        assert len(links) == 72
+        assert {link.rate for link in links.values()} == {50.0}
+        for agent in record.agents:
+            for each in explain(record, agent, t).neighbours:
+                assert each.input is not None
+                assert each.input.age is not None
+                assert links[each.name, agent].age == table[agent][each.name] == round(each.input.age, 9) == 0.02
 
 
 def test_faults_of_links_are_those_of_the_time(view: RecordView) -> None:
