@@ -59,6 +59,7 @@ def counterfactual(
     *,
     without: str | Iterable[str] = (),
     without_loss: bool = False,
+    without_link_commands: bool = False,
     law: Any = "",
     replace: Mapping[str, Any] | None = None,
     since: float = 0.0,
@@ -74,6 +75,8 @@ def counterfactual(
         Links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2".
     without_loss : bool, optional
         Whether no message is lost by chance.
+    without_link_commands : bool, optional
+        Whether the commands that people gave to emulated links are left out.
     law : optional
         Another law: its name, `module:Class`, or a class.
     replace : Mapping[str, Any], optional
@@ -96,6 +99,7 @@ def counterfactual(
         changes = Changes(
             without=(without,) if isinstance(without, str) else tuple(without),
             without_loss=without_loss,
+            without_link_commands=without_link_commands,
             law=law if isinstance(law, str) else plain(law),
             keys=keys,
             since=float(since),
@@ -121,6 +125,13 @@ def _record(run: RecordSource) -> RunRecord:
     if isinstance(run, RunRecord):
         return run
     return run.run_record if isinstance(run, Result) else RunRecord.open(run)
+
+
+MISSING = (
+    "-: no number: not steady at the end of the window, or never restored (f, and MPSI where it counts); metrics.json "
+    "has the reasons"
+)
+"""Line below a table in which numbers are missing."""
 
 
 class Counterfactual:
@@ -161,7 +172,7 @@ class Counterfactual:
     def __str__(self) -> str:
         """Return the table as text."""
         text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
-        return text
+        return f"{text}\n{MISSING}" if self.table.isna().any(axis=None) else text
 
     def __repr__(self) -> str:
         return f"<Counterfactual of {self.was.spec.name} {self.was.case}: {self.changes}>"

@@ -115,11 +115,16 @@ class ChangedProcesses:
 
     def command(self, message: Message) -> Message | None:
         """Return a command to links as it is under the change; None if nothing is left of it."""
-        if self._rule is None or not (self.changed and self._rule.changes.without_loss):
+        if self._rule is None or not self.changed:
+            return message
+        changes = self._rule.changes
+        if not (changes.without_loss or changes.without_link_commands):
             return message
         decoded = decode(message.payload)
         if not isinstance(decoded, LinkRequest | Command) or not decoded.link_command:
             return message
+        if changes.without_link_commands:
+            return None
         try:
             command = LinkCommand.of_tree(decoded.link_command)
         except ValueError:  # the links refused it too

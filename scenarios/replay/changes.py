@@ -46,6 +46,8 @@ class Changes:
     """Links that are cut, as patterns: "inv4 -> inv7"."""
     without_loss: bool = False
     """Whether no message is lost by chance."""
+    without_link_commands: bool = False
+    """Whether the commands that people gave to emulated links are left out."""
     law: str = ""
     """Another law; "" keeps that of the record."""
     keys: Mapping[str, Any] = field(default_factory=dict)
@@ -54,7 +56,7 @@ class Changes:
     """From when on (s of run time)."""
 
     def __bool__(self) -> bool:
-        return bool(self.without or self.without_loss or self.law or self.keys)
+        return bool(self.without or self.without_loss or self.without_link_commands or self.law or self.keys)
 
     def __str__(self) -> str:
         """Return them in words.
@@ -65,7 +67,8 @@ class Changes:
         without inv4 -> inv7, gains.k_p = 0.001, from 2 s on
         """
         parts = [f"without {pattern}" for pattern in self.without]
-        parts += ["without loss"] * self.without_loss + [f"law {self.law}"] * bool(self.law)
+        parts += ["without loss"] * self.without_loss + ["without link commands"] * self.without_link_commands
+        parts += [f"law {self.law}"] * bool(self.law)
         parts += [f"{key} = {value}" for key, value in self.keys.items()]
         if not parts:
             return "nothing changed"

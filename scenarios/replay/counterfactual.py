@@ -17,6 +17,7 @@ from scenarios.record.record_reader import RunRecord
 from scenarios.replay.changes import ChangedRule, Changes, changed_rule
 from scenarios.replay.closed_loop import ClosedLoop
 from scenarios.replay.difference import Difference
+from scenarios.replay.no_difference import no_difference
 from scenarios.replay.recorded_process import require_arrivals
 from scenarios.replay.replay import ComparedRows
 from scenarios.replay.replay_error import ReplayError
@@ -41,7 +42,7 @@ class CounterfactualRun:
     t_end: float
     """Run time of its last row (s)."""
     notes: tuple[str, ...]
-    """Sentences on what it leaves out."""
+    """Sentences on what it leaves out, and why the change made no difference if it made none."""
 
 
 def run_counterfactual(
@@ -75,17 +76,20 @@ def run_counterfactual(
             "which cannot be closed into a loop again; what would have been needs our own plant"
         )
     rule = changed_rule(record, changes)
-    rows = ComparedRows(record, changes.since if changes else inf)
+    rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
     run = _in_ticks if record.info.clock == "simulated" else _live
     try:
         with Recorder(would_be / rule.case, gaps=True) as recorder:
 
             def take(message: Telemetry | LinkReport) -> None:
                 rows.take(message)
+                effect.take(message)
                 recorder(message)
 
             notes = run(record, rule, take, make_plant)
             recorded = recorder.finish(recorder.ended, recorder.record_step)
+        if changes and effect.difference is None:
+            notes = [*notes, no_difference(record, rule, effect.t)]
         _write(record, rule, rule.scenario, would_be, recorded, figures=True)
         _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), figures=False)
     except RecordError as error:

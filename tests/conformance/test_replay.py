@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import gridpeers as gp
 from gridpeers.runs.result import Result
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.replay_error import ReplayError
+from scenarios.results.record import QUANTITIES
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 from wire.journal import RecordLevel
+from wire.messages import Telemetry
 
 SHORT = """
 seed = 7
@@ -100,6 +105,7 @@ def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhe
         (("--set", "gains.k_p=much"), "gains.k_p: must be a number"),
         (("--without", "inv4 -> inv7", "--from", "7"), "from 7 s: is outside of the record, which has 0 to 1.00 s"),
         (("--from", "0.5"), "nothing is changed from then on"),
+        (("--out", "new"), "--out new: a replay without a change writes no folder"),
         (("--law", "dapi", "--from", "0.5"), "in simulated time"),
     ],
 )
@@ -154,8 +160,6 @@ def test_a_record_that_is_cut_off_is_replayed_up_to_there(run: Result, tmp_path:
 
 def test_a_difference_is_named(run: Result, tmp_path: Path) -> None:
     """With another seed other messages are lost: the first row that differs is told."""
-    from msgspec.structs import replace
-
     record = RunRecord.open(run.folder / "IV")
     agents = tuple(
         replace(agent, control=replace(agent.control, gains=replace(agent.control.gains, k_p=0.001)))
@@ -169,3 +173,58 @@ def test_a_difference_is_named(run: Result, tmp_path: Path) -> None:
     assert found.quantity == "P_set"
     assert not np.isclose(found.recorded, found.replayed, rtol=0.0, atol=1e-9)
     assert str(found).endswith(" W in the replay")
+
+
+def test_a_row_that_was_tampered_with_is_named(run: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The physics is compared too: a power 1 W too high in the record is told with inverter, quantity and unit."""
+    record = RunRecord.open(run.folder / "IV")
+    monkeypatch.setattr(record, "telemetry", partial(with_more_power, list(record.telemetry()), 0.5))
+
+    plant, *agents = gp.replay(record).parts
+
+    assert plant.difference is not None
+    assert plant.difference[:3] == ("inv1", 0.5, "P")
+    assert plant.difference.unit == "W"
+    assert plant.difference.recorded - plant.difference.replayed == pytest.approx(1.0, abs=1e-6)
+    assert [part.difference for part in agents] == [None] * 9
+
+
+def with_more_power(messages: list[Telemetry], t: float) -> Iterator[Telemetry]:
+    """Yield telemetry whose row at a time (s) has 1 W more at the first inverter."""
+    at = 1 + QUANTITIES.index("P_W")
+    for message in messages:
+        rows = tuple(
+            (*row[:at], row[at] + 1.0, *row[at + 1 :]) if abs(row[0] - t) < 1e-9 else row for row in message.rows
+        )
+        yield replace(message, rows=rows)
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("--set", "link=[]", "--from", "0.99"), ""),
+        (("--set", "link[0].loss=0.2"), "; agents and links had these values already"),
+        (("--without-link-commands",), "; nobody commanded the links in that time"),
+    ],
+)
+def test_a_change_without_effect_is_told(words: tuple[str, ...], why: str, run: Result, elsewhere: Path) -> None:
+    """A table of zeros has a note below it, with the reason where one is known."""
+    code, text = invoke("replay", str(run.folder), *words, "--out", "would")
+
+    assert code == 0, text
+    assert f"NOTE  the change made no difference: every row up to 1.00 s is as recorded{why}\n" in text
+
+
+def test_a_change_with_an_effect_has_no_such_note(run: Result) -> None:
+    """Rows that differ are difference enough."""
+    assert gp.counterfactual(run, replace={"gains.k_p": 0.002}).notes == ()
+
+
+def test_what_is_missing_in_the_table_is_explained(run: Result) -> None:
+    """A "-" has a line below the table, and a table without one has not."""
+    done = gp.counterfactual(run, replace={"gains.k_p": 0.002})
+
+    assert done.table.isna().any(axis=None)
+    assert str(done).splitlines()[-1].startswith("-: no number")
+    done.table.fillna(0.0, inplace=True)
+    assert "-: no number" not in str(done)

@@ -25,6 +25,9 @@ def replay(
         typer.Option(metavar="LINKS", help='Cut links: "inv4 -> inv7", "inv4 <-> inv7"; can be repeated.'),
     ] = None,
     without_loss: Annotated[bool, typer.Option("--without-loss", help="Lose no message by chance.")] = False,
+    without_link_commands: Annotated[
+        bool, typer.Option("--without-link-commands", help="Leave out what people commanded the emulated links.")
+    ] = False,
     law: Annotated[str, typer.Option(metavar="KEY", help="Another law: a name, or module:Class.")] = "",
     values: Annotated[
         list[str] | None,
@@ -62,15 +65,19 @@ def replay(
         changes = Changes(
             without=tuple(without or ()),
             without_loss=without_loss,
+            without_link_commands=without_link_commands,
             law=law,
             keys=dict(map(_key_and_value, values or ())),
             since=since,
         )
-        if changes or out is not None:
+        if changes:
             differs = _counterfactual(record, changes, out)
         else:
             if since:
                 fail([f"--from {since:g}: nothing is changed from then on; give --without, --law or --set"], BAD_INPUT)
+            if out is not None:
+                text = "a replay without a change writes no folder; leave it out, or give --without, --law or --set"
+                fail([f"--out {out}: {text}"], BAD_INPUT)
             differs = _replay(record)
     except ReplayError as error:
         fail(list(error.problems), BAD_INPUT)

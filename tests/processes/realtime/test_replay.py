@@ -204,6 +204,32 @@ def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     assert {part.name for part in done.parts} == {"plant", *(f"inv{k}" for k in range(1, 10))}
 
 
+def test_a_link_that_people_cut_stays_cut_unless_commands_are_left_out(desk: Desk) -> None:
+    """No key of a scenario undoes a link command, which a note tells; without link commands the messages pass."""
+    plant = desk.open_bare(
+        "plant", "calm.toml", "--run", "lab", "--listen", desk.options[-1], "--wait", "20", "--out", "out"
+    )
+    agents = desk.open("agent", *(f"inv{k}" for k in range(1, 10)))
+    plant.expect("t = 0; speed")
+    assert desk.type("link", "cut", "inv4", "inv7")[0] == 0
+    plant.expect("link command 1")
+    assert desk.type("link", "show")[0] == 0
+    desk.type("down")
+    assert (agents.end(), plant.end()) == (0, 0)
+
+    record = RunRecord.open(desk.folder / "out")
+    stays = gp.counterfactual(record, replace={"link": []})
+    passes = gp.counterfactual(record, without_link_commands=True)
+
+    (note,) = stays.notes
+    assert "the change made no difference" in note
+    assert "link commands of people, the first from t = " in note
+    assert stays.would_be.links["fate"].eq("cut").any()
+    assert passes.difference is None
+    assert not passes.would_be.links["fate"].eq("cut").any()
+    assert "link command 1" not in (passes.folder / "IV" / "events.csv").read_text()
+
+
 def with_gain(agent: Any) -> Any:
     """Return a configuration with another gain."""
     gains = replaced(agent.control.gains, k_p=2.0 * agent.control.gains.k_p)
