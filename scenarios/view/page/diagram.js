@@ -96,6 +96,8 @@ export class Diagram {
 
   hear(element, kind, subject) {
     this.keys.add(element, kind, subject);
+    // a click takes no focus, so that the keys of the time go on; the tab key does
+    element.addEventListener("mousedown", event => { event.preventDefault(); document.activeElement?.blur?.(); });
     element.addEventListener("click", () => this.on(kind, subject));
     element.addEventListener("pointermove", event => this.look(event, kind, subject));
     element.addEventListener("pointerleave", event => this.look(event, "", ""));

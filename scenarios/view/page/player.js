@@ -4,14 +4,15 @@ const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10], LISTED = 2000, MARKED = 300;
 export class Player {
   // send(question): asks the server for a time; latest(): time of the last point that the page has; chosen(): agent whose decision is shown
   constructor($, send, latest, chosen) {
-    Object.assign(this, { $, send, latest, chosen, record: null, news: null, events: [], t: 0, speed: 1, playing: false, following: true, busy: false, due: false, decided: 0, case: "" });
+    Object.assign(this, { $, send, latest, chosen, record: null, news: null, events: [], t: 0, speed: 1, playing: false, following: true, busy: false, due: false, decided: 0, case: "", shown: 0, wish: null });
+    this.readAddress(); addEventListener("hashchange", () => { if (location.hash !== this.address) { this.readAddress(); this.resume(); } });
     const speed = $("speed");
     speed.replaceChildren(...SPEEDS.map(value => new Option(`${value}×`, value, value === 1, value === 1)));
     speed.addEventListener("change", () => { this.speed = Number(speed.value); });
     $("slider").addEventListener("input", () => this.go(this.tick(Math.round(Number($("slider").value) / this.record.T_c))));
     for (const [id, act] of Object.entries({ "to-start": () => this.go(0), back: () => this.step(-1), play: () => this.toggle(), forward: () => this.step(1), "to-end": () => this.toEnd() })) $(id).addEventListener("click", act);
-    $("case").addEventListener("change", () => { this.case = $("case").value; this.following = true; this.ask(); });
-    $("goto-form").addEventListener("submit", event => { event.preventDefault(); const t = Number($("goto").value); if (Number.isFinite(t)) this.go(t); });
+    $("case").addEventListener("change", () => { this.stop(); this.case = $("case").value; this.wish = this.following ? null : this.t; this.ask(); });
+    $("goto-form").addEventListener("submit", event => { event.preventDefault(); this.goTo($("goto").valueAsNumber); });
     document.addEventListener("keydown", event => this.key(event));
   }
   get end() { return this.news ? this.news.t_end : 0; }
@@ -19,7 +20,8 @@ export class Player {
 
   // ---- what the server says
   open(record) {
-    this.record = record; this.news = null; this.events = []; this.busy = false; this.due = false; this.playing = false; this.following = true; this.t = 0;
+    this.record = record; this.news = null; this.events = []; this.busy = false; this.due = false; this.playing = false;
+    this.following = this.wish === null; this.t = this.wish ?? 0; this.shown = this.t;
     this.$("event-list").replaceChildren(); this.$("marks").replaceChildren();
   }
   take(news) {
@@ -30,13 +32,15 @@ export class Player {
     select.parentElement.hidden = news.cases.length < 2;
     const notes = [...(news.notes || [])], holder = this.$("notes");
     if (holder.textContent !== notes.join("")) holder.replaceChildren(...notes.map(text => { const line = document.createElement("li"); line.textContent = text; return line; }));
-    if (grown && this.following) this.ask();
+    if (this.case && !news.cases.includes(this.case)) this.case = "";
+    if (first || grown && this.following) this.ask();
+    if (!this.case || this.case === news.case) this.wish = null;
     this.show();
   }
   answered(frame) {
     this.busy = false;
     if (this.following) this.t = frame.t;
-    this.mark(frame.t); this.show();
+    this.shown = frame.t; this.mark(frame.t); this.show();
     if (this.due) this.ask();
   }
   failed() { this.busy = false; }
@@ -44,6 +48,11 @@ export class Player {
   // ---- what people do
   tick(k) { return Math.round(k * this.record.T_c * 1e9) / 1e9; }
   go(t) { if (!this.record) return; this.following = false; this.t = Math.min(Math.max(0, t), this.end); this.ask(); this.show(); }
+  goTo(t) {
+    const beyond = t > this.end + 1e-9;
+    this.$("goto-note").textContent = beyond ? `the record ends at ${this.end.toFixed(2)} s` : "";
+    if (t >= 0 && !beyond) { this.stop(); this.go(t); }  // nothing was typed: NaN
+  }
   step(n) {
     if (!this.record) return;
     const k = this.t / this.record.T_c;
@@ -67,6 +76,7 @@ export class Player {
   }
   faster(by) { const at = Math.min(Math.max(0, SPEEDS.indexOf(this.speed) + by), SPEEDS.length - 1); this.speed = SPEEDS[at]; this.$("speed").value = String(this.speed); }
   key(event) {
+    if (event.defaultPrevented) return;  // an item of the diagram has taken it
     const at = event.target, scrolls = at.classList?.contains("scroll");
     if (!this.record || event.ctrlKey || event.altKey || event.metaKey || ["SELECT", "TEXTAREA"].includes(at.tagName) || at.tagName === "INPUT" && at.type !== "range") return;
     const acts = { ArrowLeft: () => this.step(event.shiftKey ? -10 : -1), ArrowRight: () => this.step(event.shiftKey ? 10 : 1), "-": () => this.faster(-1), "+": () => this.faster(1) };
@@ -89,13 +99,31 @@ export class Player {
   show() {
     const { $ } = this;
     if (!this.record) return;
-    const slider = $("slider"), text = `${this.t.toFixed(2)} s of ${this.end.toFixed(2)} s`;
+    const slider = $("slider"), text = `${this.shown.toFixed(2)} s of ${this.end.toFixed(2)} s`;
     slider.max = String(this.end); slider.value = String(this.t); slider.setAttribute("aria-valuetext", text);
     if ($("at").textContent !== text) $("at").textContent = text;
     const word = this.playing ? "Pause" : "Play";
     if ($("play").textContent !== word) $("play").textContent = word;
     $("to-end").setAttribute("aria-pressed", String(this.following && this.grows));
+    this.writeAddress();
     for (const mark of $("marks").children) mark.style.left = `${100 * mark.dataset.t / (this.end || 1)}%`;
+  }
+  // case and time are in the address: a page that is loaded again, or a link to it, shows the same
+  readAddress() {
+    const has = new URLSearchParams(location.hash.slice(1)), t = parseFloat(has.get("t"));
+    this.case = has.get("case") || ""; this.wish = t >= 0 ? t : null;
+  }
+  resume() { if (!this.record) return; this.stop(); this.following = this.wish === null; if (!this.following) this.t = Math.min(this.wish, this.end); this.ask(); }
+  writeAddress() {
+    clearTimeout(this.writing);
+    this.writing = setTimeout(() => {
+      if (this.playing || this.wish !== null) return;
+      const has = new URLSearchParams();
+      if (this.case) has.set("case", this.case);
+      if (!this.following) has.set("t", String(Math.round(this.t * 1e6) / 1e6));
+      this.address = String(has) ? `#${has}` : "";
+      if (this.address !== location.hash) history.replaceState(null, "", this.address || location.pathname + location.search);
+    }, 150);
   }
   list(events) {
     const list = this.$("event-list"), marks = this.$("marks");

@@ -39,8 +39,16 @@ function lineColours() {
     return `color-mix(in oklab, ${colourOf(name)} ${n === 1 ? 100 : Math.round(100 - 45 * k / (n - 1))}%, ${matchMedia("(prefers-color-scheme: dark)").matches ? "white" : "black"})`;
   });
 }
+function legend() {
+  document.querySelectorAll(".key .microgrid").forEach(item => item.remove());
+  const rows = (S.map?.inverters || []).filter(row => row.microgrid), named = new Map(rows.map(row => [row.microgrid, row.name]));
+  for (const [microgrid, one] of named) {
+    const item = document.createElement("li"), mark = document.createElement("i"); item.className = "microgrid"; mark.className = "m";
+    mark.style.background = colourOf(one); item.append(mark, microgrid); document.querySelector(".key").append(item);
+  }
+}
 let colours = [];
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { recolour(); render(); });
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => { recolour(); legend(); render(); });
 function recolour() { colours = lineColours(); if (S.map) diagram.setMap(S.map, colourOf); document.querySelectorAll(".dot").forEach(dot => { dot.style.background = colourOf(dot.dataset.name); }); }
 
 // ---- the connection
@@ -54,7 +62,7 @@ function take(message) {
   if (message.hello) {
     S.hello = message.hello; $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
     $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; strips.end = null; strips.length = 30; put($("strips-title"), "Last 30 s");
-    $("rights").textContent = S.hello.record ? `${S.hello.where}: a record, which only looks` : S.hello.control ? "" : "looks only; start it with --control to act";
+    $("rights").textContent = S.hello.record ? `${S.hello.where}: a record: nothing can be changed` : S.hello.control ? "" : "nothing can be changed; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
     diagram.keys.setRoles(kind => S.hello.control || S.hello.record && kind === "agent" ? "button" : "img");
     clear();
@@ -63,7 +71,7 @@ function take(message) {
   else if (message.decision) { takeDecision(message.decision); }
   else if (message.problem) { player.failed(); put($("live-text"), message.problem); }
   else if (message.map) {
-    S.map = message.map; recolour(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
+    S.map = message.map; recolour(); legend(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
     fill($("load"), (S.map.loads || []).map(load => [load.name, load.name])); $("load-choice").hidden = !S.map.loads?.length;
   } else if (message.done) { done(message.done); }
   else if (message.frame) { takeFrame(message.frame); }
@@ -85,7 +93,7 @@ function takeFrame(frame) {
     line.append(time, text); $("event-list").prepend(line);
   }
   while (!S.hello.record && S.events.length > 200) { S.events.shift(); $("event-list").lastChild.remove(); }
-  if (S.hello.record) { strips.end = frame.t; strips.length = Math.min(30, Math.max(1, player.end)); put($("strips-title"), `${Math.round(strips.length * 10) / 10} s up to then`); player.answered(frame); }
+  if (S.hello.record) { strips.length = Math.min(30, Math.max(1, frame.t)); strips.end = Math.max(frame.t, strips.length); put($("strips-title"), frame.t < 30 ? "From the start" : "30 s up to then"); player.answered(frame); }
   render();
 }
 
@@ -175,12 +183,14 @@ function takeRecord(record) {
 }
 function choose(name) {
   S.chosen = name; put($("decision-of"), name ? `of ${name}` : ""); $("decision-text").hidden = $("decision-command").hidden = $("decision-close").hidden = !name; $("decision-hint").hidden = !!name;
-  if (name) { put($("decision-text"), "..."); put($("decision-command"), ""); player.decided = 0; player.ask(); }
+  if (name) { put($("decision-text"), "..."); put($("decision-command"), ""); S.reveal = true; reveal(); player.decided = 0; player.ask(); }
   render();
 }
+function reveal() { $("decision").scrollIntoView({ block: "nearest" }); }
 function takeDecision(decision) {
   if (decision.agent !== S.chosen) return;
   put($("decision-text"), decision.text); put($("decision-command"), decision.command); $("decision-text").classList.toggle("bad", !decision.ok);
+  if (S.reveal) { S.reveal = false; reveal(); }
 }
 $("decision-close").addEventListener("click", () => choose(""));
 
@@ -203,7 +213,7 @@ function tipText(kind, subject) {
   }
   const pair = S.pairs?.get(subject);
   if (!pair) return "";
-  const lines = pair.ways.map(way => `${way.src} → ${way.dst}: ${way.holds ? way.holds.join(", ") : way.state}, ${way.age < 0 ? "never heard" : `age ${way.age.toFixed(2)} s`}, ${way.rate || 0} msg/s${way.lost ? `, lost ${Math.round(100 * way.lost)} %` : ""}`);
+  const lines = pair.ways.map(way => `${way.src} → ${way.dst}: ${way.holds ? way.holds.join(", ") : way.state}, ${way.age < 0 ? "never heard" : `age ${(S.inverters.get(way.dst)?.ages[way.src] ?? way.age).toFixed(2)} s`}, ${way.rate || 0} msg/s${way.lost ? `, lost ${Math.round(100 * way.lost)} %` : ""}`);
   const tool = document.querySelector("input[name=tool]:checked").value;
   return lines.join("\n") + (tool === "look" ? "" : does(tool === "cut" ? (pair.kind === "cut" || pair.kind === "impaired" ? "heal it" : "cut it") : tool === "delay" ? `delay it by ${$("delay").value} s` : `lose ${100 * $("loss").value} %`));
 }

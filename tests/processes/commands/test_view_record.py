@@ -194,3 +194,54 @@ def test_bad_input_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     ):
         assert invoke(*words) == (2, f"gridpeers: {complaint}\n")
     assert not (tmp_path / "runs").exists()
+
+
+def test_a_click_leaves_the_keys_with_the_time_and_the_address_keeps_it(
+    desk: Desk, browser: Browser, tmp_path: Path
+) -> None:
+    """One key does one thing; the decision goes with the time and is seen; case and time outlive a reload."""
+    second = '[case.two]\nsecondary = "all"\ngraph = "full"\n'
+    (tmp_path / "it.toml").write_text(ISLANDED.format(end=1.0) + second, encoding="utf-8")
+    for case in ("one", "two"):
+        recorded_run(tmp_path / "it.toml", case, tmp_path / "run" / case)
+    view = desk.open_bare("view", "run", "--port", "0")
+    page = page_of(browser, view.expect(r"open (http://\S+) in a browser")[1])
+    page.set_default_timeout(15_000)
+    page.set_viewport_size({"width": 1400, "height": 900})
+    shows(page, 1.0)
+
+    page.locator("#goto").fill("0.44")
+    page.keyboard.press("Enter")
+    shows(page, 0.44)
+    page.locator("#goto").fill("")
+    page.keyboard.press("Enter")
+    page.locator("#goto").fill("7")
+    page.keyboard.press("Enter")
+    assert page.locator("#goto-note").inner_text() == "the record ends at 1.00 s"
+    shows(page, 0.44)
+    page.locator('[data-agent="inv4"] .body').click()
+    page.locator("#decision-text", has_text="inv4 at t = 0.44 s").wait_for()
+    seen = page.locator("#decision-text").bounding_box()
+    assert seen is not None
+    assert seen["y"] + 200 < 900, "the explanation is on the screen"
+    page.keyboard.press("ArrowRight")
+    page.locator("#decision-text", has_text="inv4 at t = 0.46 s").wait_for()
+    shows(page, 0.46)
+    assert page.evaluate("() => document.activeElement === document.body"), "the focus has not moved"
+    page.locator('[data-agent="inv4"]').focus()
+    page.keyboard.press("ArrowRight")
+    assert page.evaluate("() => document.activeElement.dataset.agent") == "inv5"
+    page.keyboard.press("ArrowLeft")
+    page.keyboard.press(" ")
+    page.locator("#decision-hint").wait_for()
+    assert page.locator("#play").inner_text() == "Play"
+    shows(page, 0.46)
+
+    page.get_by_label("case", exact=True).select_option("one")
+    page.wait_for_function("() => document.getElementById('run').textContent === 'islanded, case one'")
+    shows(page, 0.46)
+    page.wait_for_url("**/#case=one&t=0.46")
+    page.reload()
+    page.wait_for_function("() => document.getElementById('run').textContent === 'islanded, case one'")
+    shows(page, 0.46)
+    assert page.locator(".key .microgrid").first.inner_text() == "MG1"
