@@ -8,6 +8,7 @@ can share one board with the last state of each, instead of a message, its check
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from agents.agent import Agent
@@ -55,7 +56,8 @@ class AgentGroup:
         """Number of in-neighbours of each agent."""
         self._all_told = False
         """Whether all agents had a state for their neighbours at the last tick."""
-        self._parts = 0
+        self._parts: Counter[str] = Counter()
+        """Number of parts of each agent's journal that were taken."""
         self._changed: list[State] = []
         """States whose decisions were noted since the journals were taken."""
         if any(config.record != "physics" for config in configs):
@@ -105,9 +107,10 @@ class AgentGroup:
         changed, self._changed = self._changed, []
         journals = []
         for state in changed:
-            for data in self._journals[state.sender].journal.take_parts():
-                journals.append(Journal(sender=state.sender, epoch=state.epoch, seq=self._parts, t=state.t, data=data))
-        self._parts += 1
+            name = state.sender
+            for data in self._journals[name].journal.take_parts():
+                journals.append(Journal(sender=name, epoch=state.epoch, seq=self._parts[name], t=state.t, data=data))
+                self._parts[name] += 1
         return tuple(journals)
 
     def _note_decisions(self, states: Sequence[State]) -> None:

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
 from math import inf
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -24,6 +25,23 @@ from wire.messages import OFF, PLANT, Measurement, Nameplate, State
 from wire.timing.clock import time_of
 
 _NOTHING = Decision(0, 0, [], [], [], [])
+
+
+class _Forms(NamedTuple):
+    """How an agent decides in simulated time."""
+
+    ticks: list[int]
+    """The ticks from which on the entries hold, in their order."""
+    entries: list[Decision]
+    covered: float
+    """Run time (s) up to which the journal is there."""
+    holes: list[tuple[float, float]]
+    """Run times (s) between which entries may be lost: the first one excluded, the last one included."""
+
+
+def inside(holes: list[tuple[float, float]], t: float) -> bool:
+    """Whether a run time (s) is in one of `DecisionReader.holes`."""
+    return any(since < t <= until for since, until in holes)
 
 
 class DecisionReader:
@@ -56,32 +74,46 @@ class DecisionReader:
 
     # ---------------------------------------------------------------- simulated time
 
-    def _read_forms(self, agent: str) -> tuple[list[int], list[Decision], float]:
-        """Return the entries on how an agent decides, the tick of each, and the run time (s) up to which they hold."""
+    def holes(self, agent: str) -> list[tuple[float, float]]:
+        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there.
+
+        The first one is excluded, the last one included. In wall-clock time each decision tells all by itself.
+        """
+        return self._forms(agent).holes if self._info.clock == "simulated" else []
+
+    def _read_forms(self, agent: str) -> _Forms:
+        """Return how an agent decides, and since when."""
         found: dict[int, Decision] = {}
-        until = inf
-        linked = bool((config := self._info.agent(agent)) and config.links)
-        latest = -1.0
+        holes: list[tuple[float, float]] = []
+        times: list[float] = []
+        last: tuple[int, int] | None = None
         for journal in self._index.journals(agent):
-            latest = max(latest, journal.t)
+            following = (0 if last is None or last[0] != journal.epoch else last[1] + 1) == journal.seq
+            if not following:  # a part of the journal is lost
+                holes.append((times[-1] if times else -1.0, journal.t))
+            last = journal.epoch, journal.seq
+            times.append(journal.t)
             for entry in self._index.entries_in(journal):
                 if isinstance(entry, Decision):
                     found[entry.tick] = entry
-        if linked:  # its journal comes in parts: of what is behind the last one nothing is known
-            until = latest
+        for since, _ in self._index.file.holes:  # the entries that were lost there hold up to the next ones
+            holes.append((since, next((t for t in times if t > since), inf)))
+        linked = bool((config := self._info.agent(agent)) and config.links)
         ticks = sorted(found)
-        return ticks, [found[tick] for tick in ticks], until
+        # the journal of one with links comes in parts: of what is behind the last one nothing is known
+        covered = max(times, default=-1.0) if linked else inf
+        return _Forms(ticks, [found[tick] for tick in ticks], covered, holes)
 
     def _in_ticks(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name, T_c = config.name, self._info.T_c
-        ticks, forms, covered = self._forms(name)
+        ticks, forms, covered, holes = self._forms(name)
         for index in self._index.near(since, until):
             own = [
                 each for (sender, _), all_ in self._index.part(index).states.items() if sender == name for each in all_
             ]
             for state in sorted(own, key=lambda each: each.seq):
                 t = time_of(state.seq, T_c)
-                if not since - 1e-9 <= t <= until + 1e-9 or t > covered:
+                if not since - 1e-9 <= t <= until + 1e-9 or t > covered or inside(holes, t):
                     continue
                 at = bisect_right(ticks, state.seq) - 1
                 decision = self._at_tick(config, state, t, forms[at] if at >= 0 else _NOTHING)

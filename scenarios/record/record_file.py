@@ -83,6 +83,8 @@ class RecordFile:
         self.complete = False
         """Whether the file was closed properly: everything that was recorded is in it."""
         self._damage: list[str] = []
+        self.holes: list[tuple[float, float]] = []
+        """Run times (s) of the first and the last message of each chunk that turned out to be damaged."""
         self._end = ""
         """How the file ends, in a sentence, if that is not its proper end."""
         self._offset = 0
@@ -231,6 +233,7 @@ class RecordFile:
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
+            self.holes.append((place.since / 1e9, place.until / 1e9))
             self._damage.append(
                 f"a chunk is damaged, from t = {place.since / 1e9:.2f} s to {place.until / 1e9:.2f} s: "
                 f"{str(error)[:100] or type(error).__name__}"

@@ -15,7 +15,7 @@ from typing import TypeVar
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.emulation.link_reports import data_of
-from scenarios.record.decision_reader import DecisionReader
+from scenarios.record.decision_reader import DecisionReader, inside
 from scenarios.record.message_index import MessageIndex, MessageOnWire
 from scenarios.record.record_file import RecordFile, RecordFileError
 from scenarios.record.record_info import FILE
@@ -220,18 +220,29 @@ class RunRecord:
             raise RecordFileError(f'{self.path}: it has no decisions: the run was recorded with record = "physics"')
         return self._decisions.decisions(agent, since, until)
 
+    def holes(self, agent: str) -> list[tuple[float, float]]:
+        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there.
+
+        The first one is excluded, the last one included.
+        """
+        self._require(agent)
+        return self._decisions.holes(agent)
+
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
 
         Raises
         ------
         RecordFileError
-            If there was no such agent, the time is outside of the record, or the agent had not decided by then.
+            If there was no such agent, the time is outside of the record, the agent had not decided by then, or the
+            record lacks what it decided.
         """
         if not 0.0 <= t <= self.t_end + self.info.T_c:
             raise RecordFileError(
                 f"{self.path}: t = {t:g} s is outside of the record, which has 0 to {self.t_end:.2f} s"
             )
+        if inside(self.holes(agent), t):
+            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self.damage[0]}")
         back = 1.0
         while True:
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
@@ -245,6 +256,8 @@ class RunRecord:
 
     def _first(self, agent: str) -> str:
         first = next(self.decisions(agent), None)
+        if first is None and self.damage:
+            return f", as far as the record has it: {self.damage[0]}"
         return "" if first is None else f"; its first decision is of t = {first.t:.2f} s"
 
     def _require(self, agent: str) -> None:

@@ -298,8 +298,11 @@ def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
 def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
     """Make the decisions of an agent again, each from what the record says that it had heard."""
     count, t = 0, 0.0
+    hole = min((since for since, _ in record.holes(agent)), default=inf)
     try:
         for each in recomputed(record, agent):
+            if each.decision.t > hole:  # its law may have a memory, of which nothing is known behind a hole
+                break
             difference = message_difference(each.decision.state, each.state)
             if difference is not None:
                 return ReplayedPart(name=agent, count=count, t_end=t, difference=difference)
@@ -308,4 +311,7 @@ def _decisions(record: RunRecord, agent: str) -> ReplayedPart:
         raise
     except ValueError as error:
         raise ReplayError(f"{agent}: its law cannot be made here: {error}") from None
-    return ReplayedPart(name=agent, count=count, t_end=t, difference=None)
+    note = ""
+    if record.damage and t < record.t_end - 1.5 * record.info.T_c:
+        note = "the record lacks later decisions of some agents, so that these were not compared"
+    return ReplayedPart(name=agent, count=count, t_end=t, difference=None, note=note)

@@ -18,6 +18,7 @@ import numpy as np
 from scenarios.record.record_reader import RunRecord
 from scenarios.results.history import Nameplates
 from scenarios.results.metrics import MPSI
+from scenarios.results.run_files import write_whole
 from scenarios.short_names import in_order
 from scenarios.trace.flows import Flow, flows
 from wire.messages import PLANT
@@ -77,13 +78,12 @@ class PerfettoTrace:
             event.double_counter_value = value
 
     def write(self, path: Path) -> None:
-        """Write the file; raise OSError if that fails."""
+        """Write the file, at once or not at all; raise OSError if that fails."""
         self._packets.sort(key=lambda item: item[:2])
         if self._packets:
             self._packets[0][2].sequence_flags = self._protos.TracePacket.SEQ_INCREMENTAL_STATE_CLEARED
-        with path.open("wb") as file:
-            for _, _, packet in self._packets:
-                file.write(self._protos.Trace(packet=[packet]).SerializeToString())
+        parts = (self._protos.Trace(packet=[packet]).SerializeToString() for _, _, packet in self._packets)
+        write_whole(path, b"".join(parts))
 
     def _packet(self, t: float, order: int) -> Any:
         packet = self._protos.TracePacket(timestamp=round(t * _NANO), trusted_packet_sequence_id=_SEQUENCE)
