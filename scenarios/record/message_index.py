@@ -15,6 +15,7 @@ from scenarios.record.record_channels import Topic
 from scenarios.record.record_file import RecordFile, RecordMessage
 from wire.codec import encode
 from wire.journal import Entry, Exchange, Heard, Received, Sent
+from wire.links import REPORT_TICKS
 from wire.messages import PLANT, AnyMessage, Journal, Measurement, State
 
 M = TypeVar("M", bound=AnyMessage)
@@ -75,7 +76,10 @@ class MessageIndex:
         self.file, self.info = file, file.info
         self.damage: list[str] = []
         """Sentences on what could not be read."""
-        self._speed = max(1.0, self.info.plant.speed) if self.info.clock == "wall" else 1.0
+        wall = self.info.clock == "wall"
+        self._speed = max(1.0, self.info.plant.speed) if wall else 1.0
+        self._late = LATE * self._speed if wall else max(LATE, REPORT_TICKS * self.info.T_c)
+        """As `LATE`, of run time: in simulated time reports come every so many ticks."""
         self._ends: list[float] = []
         """Last run time (s) of each part."""
         self._note_parts()
@@ -122,7 +126,7 @@ class MessageIndex:
     def near(self, since: float, until: float) -> range:
         """Return the parts that may have what happened between two run times (s)."""
         first = bisect_left(self._ends, since - 1e-9)
-        last = bisect_left(self._ends, until + LATE * self._speed) + 1 if until < inf else len(self._ends)
+        last = bisect_left(self._ends, until + self._late) + 1 if until < inf else len(self._ends)
         return range(first, min(last, len(self._ends)))
 
     def entries_in(self, journal: Journal) -> Iterator[Entry]:

@@ -12,7 +12,7 @@ from wire.journal import Decision
 from wire.messages import PLANT, Measurement, State
 
 GONE = 0.5
-"""Wall-clock: time (s) without a decision after which an agent counts as not there."""
+"""Wall-clock: time (s) without a decision after which an agent counts as not there, if that is 2.5 control periods."""
 
 
 class AgentMoment(NamedTuple):
@@ -122,7 +122,7 @@ class AgentMoments:
     # ---------------------------------------------------------------- wall-clock time
 
     def _live(self, t: float) -> list[AgentMoment]:
-        gone = GONE * max(1.0, self._info.plant.speed)
+        gone = max(GONE * max(1.0, self._info.plant.speed), 2.5 * self._info.T_c)
         last: dict[str, tuple[Measurement, Decision]] = {}
         for part in self._index.near(t - gone, t):
             for journal, entry in self._index.part(part).entries:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from agents.agent_config import AgentConfig
 from scenarios.record.record_reader import RunRecord
+from scenarios.view.liveness import FROZEN
 from scenarios.view.strips import LENGTH, Point, next_due, point_of
 from wire.messages import Telemetry
 
@@ -38,13 +39,16 @@ class PlantRows:
 
     def __init__(self, record: RunRecord, configs: Mapping[str, AgentConfig]) -> None:
         self._record, self._index, self._configs = record, record.index, configs
+        plant = record.info.plant
+        self.longest_gap = max(FROZEN * max(1.0, plant.speed), 1.5 * plant.record_step)
+        """Run time (s) after a row behind which the next one is missing; of a frozen plant, in real time."""
         self._rows_in = lru_cache(maxsize=8)(self._read_rows)
         self._points_in = lru_cache(maxsize=KEPT)(self._read_points)
 
     def last(self, t: float) -> tuple[tuple[str, ...], tuple[float, ...]] | None:
-        """Return the inverters and the last row up to a run time (s); None if there is none within a second before."""
+        """Return the inverters and the last row up to a run time (s); None if there is none shortly before."""
         found = None
-        for part in self._index.near(t - 1.0, t):
+        for part in self._index.near(t - max(1.0, self.longest_gap), t):
             inverters, times, rows = self._rows_in(part)
             at = bisect_right(times, t + 1e-9) - 1
             if at >= 0 and (found is None or rows[at][0] > found[1][0]):

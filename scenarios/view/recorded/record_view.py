@@ -17,7 +17,7 @@ from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.live.show.snapshot import InverterStatus
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.link_states import LinkView
-from scenarios.view.liveness import FROZEN, LivenessView
+from scenarios.view.liveness import LivenessView
 from scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
 from scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
 from scenarios.view.recorded.link_faults import NOTHING, LinkFaults
@@ -101,7 +101,7 @@ class RecordView:
         self._feed_links(view, agents, t)
         frame, _ = view.frame(Cursor(), t)
         links: dict[str, tuple[LinkView, ...]] = dict.fromkeys(self._configs, ()) | frame.links
-        stale = row is None or t - row > FROZEN
+        stale = row is None or t - row > self._rows.longest_gap
         text = "There are no rows of this time in the record." if stale else "record"
         points = tuple(self._rows.points(max(since, t - LENGTH), t))
         return replace(
@@ -175,7 +175,8 @@ class RecordView:
             outcome="",
             reproducible=False,
         )
-        view.telemetry(message, row[0])
+        # a row holds until the next one: what the page takes for silence is a time of the wall clock
+        view.telemetry(message, t if t - row[0] <= self._rows.longest_gap else row[0])
         return row[0]
 
     def _feed_links(self, view: RunView, agents: Mapping[str, AgentMoment], t: float) -> None:

@@ -206,3 +206,22 @@ def test_agents_that_join_and_leave(tmp_path: Path) -> None:
         return {one.name for one in view.frame(t).inverters if one.note == "no agent"}
 
     assert [absent(t) for t in (0.38, 0.42, 0.58, 0.62)] == [set(), {"inv3"}, {"inv3"}, set()]
+
+
+@pytest.mark.parametrize("chunk", [1, 1_000_000])
+def test_long_steps_leave_no_gaps(chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With a second and more between two rows, every time in between has the row before, and the agents."""
+    monkeypatch.setattr("scenarios.record.record_writer.CHUNK", chunk)
+    (tmp_path / "it.toml").write_text(
+        '[time]\nT_c_s = 2.0\nrecord_s = 2.0\nend_s = 8.0\n[case.case]\nsecondary = "all"\ngraph = "ring"\n',
+        encoding="utf-8",
+    )
+    record = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case")
+    view, history = RecordView(record), record.physics()
+    for t in (0.5, 1.8, 3.99, 4.0, 5.7, 7.9):
+        frame = view.frame(t)
+        row = [k for k, at in enumerate(history.t) if at <= t + 1e-9][-1]
+
+        assert frame.live.text == "record"
+        assert [one.P for one in frame.inverters] == list(history.P[row] / 1e3)
+        assert {one.note for one in frame.inverters} == {""}
