@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import socket
 
 HERE, PORT = "127.0.0.1", 8123
-"""Where the page is opened: on this host alone."""
+"""Where a page is opened if nothing else is said: on this host alone."""
 
 
 def page_socket(port: int | None) -> socket.socket:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from itertools import chain
 from typing import Literal
 
@@ -20,6 +19,7 @@ from scenarios.live.run_address import ENDPOINT, RUN, RunAddress, UsageError, ch
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.run_requests import ask
 from wire.bounds import Text
+from wire.driver.command_line import command_line as typed_command
 
 Verb = Literal["open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"]
 
@@ -64,12 +64,12 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             case "start":
                 return ["agent", self.subject]
             case "delay" | "loss":
-                return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.verb}", f"{self.value:g}"]
+                return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.verb}", _exact(self.value)]
             case "heal all":
                 return ["link", "heal"]
             case "load":
                 given = {"--factor": self.factor, "--P": self.P_kW, "--Q": self.Q_kvar}
-                options = [(name, f"{value:.12g}") for name, value in given.items() if value is not None]
+                options = [(name, _exact(value)) for name, value in given.items() if value is not None]
                 return ["load", self.subject, *chain.from_iterable(options)]
         return ["link", self.verb, self.subject, self.other]
 
@@ -87,7 +87,7 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
 
 def command_line(words: list[str], where: RunAddress) -> str:
-    """Return a command as it can be typed in a shell.
+    """Return a command as it can be typed in the terminal in which the page's was.
 
     Examples
     --------
@@ -96,7 +96,12 @@ def command_line(words: list[str], where: RunAddress) -> str:
     >>> command_line(["stop", "inv4"], RunAddress(run="lab", connect=("tcp/10.0.0.1:7447",)))
     'gridpeers stop inv4 --run lab --connect tcp/10.0.0.1:7447'
     """
-    return shlex.join(["gridpeers", *words, *address_options(where)])
+    return typed_command(*words, *address_options(where))
+
+
+def _exact(value: float) -> str:
+    """Return the shortest number that is read back as the same one."""
+    return repr(value).removesuffix(".0")
 
 
 def address_options(where: RunAddress) -> list[str]:

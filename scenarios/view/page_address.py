@@ -9,9 +9,6 @@ import socket
 
 from scenarios.live.run_address import UsageError
 
-ADDRESS, PORT = "127.0.0.1", 8123
-"""Where it listens by default."""
-
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this host's loopback in the address of a page."""
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
+from gridpeers.cli.page_beside import HERE, PORT
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
 from scenarios.live.access import Access
 from wire.driver.output import watch_readers
@@ -39,8 +40,8 @@ def view(
     ] = False,
     address: Annotated[
         str, typer.Option("--address", metavar="HOST", help="Where the page listens; any other asks for a token.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", metavar="N", help="Port of the page; 0 takes any free one.")] = 8123,
+    ] = HERE,
+    port: Annotated[int, typer.Option("--port", metavar="N", help="Port of the page; 0 takes any free one.")] = PORT,
     token: Annotated[
         str, typer.Option("--token", metavar="TEXT", help="What a page must know; made up for other addresses.")
     ] = "",

@@ -5,9 +5,10 @@ from __future__ import annotations
 import shlex
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 from time import monotonic
 from types import SimpleNamespace
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 import msgspec
 import pytest
@@ -174,6 +175,29 @@ def test_the_command_that_is_shown_makes_the_same_request(
     assert code == 0, output
     clicked, again = commands
     assert effect(again) == effect(clicked)
+
+
+@pytest.mark.parametrize("value", [0.123456789, 1.0 / 3.0, 1e-7])
+@pytest.mark.parametrize("verb", ["delay", "loss"])
+def test_the_number_that_is_shown_is_the_one_that_is_done(
+    verb: Literal["delay", "loss"], value: float, commands: list[Command]
+) -> None:
+    """It is not rounded: the command that is copied does exactly the same."""
+    action = PageAction(verb=verb, subject="inv1", other="inv4", value=value)
+    ActionClient(WHERE).perform(action)
+    invoke(*action.words())
+
+    clicked, again = commands
+    assert effect(again) == effect(clicked)
+
+
+def test_the_command_is_written_as_the_page_was_called(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A program that is not on the path is shown with its own."""
+    program = tmp_path / "gridpeers"
+    program.touch()
+    monkeypatch.setattr("sys.argv", [str(program), "view"])
+
+    assert command_line(["stop", "inv4"], WHERE) == f"{program} stop inv4"
 
 
 def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -> None:
