@@ -24,6 +24,8 @@ export class Player {
     this.following = this.wish === null; this.t = this.wish ?? 0; this.shown = this.t;
     this.$("event-list").replaceChildren(); this.$("marks").replaceChildren();
   }
+  // a connection that was lost comes back with the record anew
+  keepTime() { if (this.record && !this.following) this.wish = this.t; }
   take(news) {
     const first = !this.news || this.news.case !== news.case, grown = first || news.t_end > this.news.t_end || news.growth !== this.news.growth;
     this.news = news; this.list(news.events || []);

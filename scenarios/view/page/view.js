@@ -60,7 +60,7 @@ function connect() {
 }
 function take(message) {
   if (message.hello) {
-    S.hello = message.hello; $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
+    S.hello = message.hello; player.keepTime(); $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
     $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; strips.end = null; strips.length = 30; put($("strips-title"), "Last 30 s");
     $("rights").textContent = S.hello.record ? `${S.hello.where}: a record: nothing can be changed` : S.hello.control ? "" : "nothing can be changed; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();

@@ -245,3 +245,6 @@ def test_a_click_leaves_the_keys_with_the_time_and_the_address_keeps_it(
     page.wait_for_function("() => document.getElementById('run').textContent === 'islanded, case one'")
     shows(page, 0.46)
     assert page.locator(".key .microgrid").first.inner_text() == "MG1"
+    page.evaluate("() => { gridpeersView.frame = null; gridpeersView.socket.close(); }")
+    shows(page, 0.46)
+    assert page.locator("#run").inner_text() == "islanded, case one"
