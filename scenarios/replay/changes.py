@@ -20,12 +20,14 @@ from netem.schema.pattern import objections
 from plant.equipment import Feeder
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changed_scenario import with_links, with_title
 from scenarios.replay.replay_error import ReplayError
 from scenarios.schema.configs import configs
 from scenarios.schema.loading import check_tables
 from scenarios.schema.netem_tables import netem_of, setup_of
 from scenarios.schema.scenario_errors import Problems, ScenarioError
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
+from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import PathError, Tree, put, steps
 from wire.schema.suggestion import suggestion
 
@@ -82,7 +84,9 @@ class ChangedRule:
     recorded: ScenarioModel
     """The scenario of the record, with its case alone."""
     scenario: ScenarioModel
-    """The scenario as changed."""
+    """The scenario as changed, links too; the title of its case says what is changed."""
+    links_written: bool
+    """Whether it has the changes of links, as far as a scenario can say them."""
     feeder: Feeder
     """Its feeder."""
     case: str
@@ -128,9 +132,12 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
             "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
             "out, or take a record of a run in wall-clock time; links can change at any time"
         )
+    written = after if netem == netem_before else _written(record, with_links(after, case, netem))
+    title = f"what would have been, {changes}" if changes else after.cases[case].title
     return ChangedRule(
         recorded=before,
-        scenario=after,
+        scenario=with_title(written or after, case, title),
+        links_written=written is not None,
         feeder=feeder,
         case=case,
         control=None if control == as_it_was else control,
@@ -164,6 +171,15 @@ def _checked(record: RunRecord, tables: Tree, changed: frozenset[str]) -> tuple[
         raise ReplayError(*(text.removeprefix("replace: ") for text in error.problems)) from None
     assert feeder is not None
     return scenario, feeder
+
+
+def _written(record: RunRecord, scenario: ScenarioModel) -> ScenarioModel | None:
+    """Return a scenario if its file can be read again; None if its entries contradict each other."""
+    try:
+        _checked(record, tomllib.loads(to_toml(scenario, {})), frozenset())
+    except ReplayError:
+        return None
+    return scenario
 
 
 def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:

@@ -14,6 +14,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.live_folders import LIVE
 from scenarios.live.numbers.live_report import write_report
 from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changed_scenario import unwritten
 from scenarios.replay.changes import ChangedRule, Changes, changed_rule
 from scenarios.replay.closed_loop import ClosedLoop
 from scenarios.replay.difference import Difference
@@ -90,8 +91,8 @@ def run_counterfactual(
             recorded = recorder.finish(recorder.ended, recorder.record_step)
         if changes and effect.difference is None:
             notes = [*notes, no_difference(record, rule, effect.t)]
-        _write(record, rule, rule.scenario, would_be, recorded, figures=True)
-        _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), figures=False)
+        _write(record, rule, rule.scenario, would_be, recorded, would_be=True)
+        _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), would_be=False)
     except RecordError as error:
         set_broken(would_be, str(error))
         raise ReplayError(f"{record.path}: {error}") from None
@@ -142,19 +143,21 @@ def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
 
 
 def _write(
-    record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, folder: Path, recorded: Recorded, *, figures: bool
+    record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, folder: Path, recorded: Recorded, *, would_be: bool
 ) -> None:
     """Write what a run folder has beside the files of its case."""
     info = record.info
-    as_run = {"driver": LIVE, "replayed": str(record.path), "changes": str(rule.changes) if figures else ""}
-    write_whole(folder / "scenario.toml", to_toml(scenario, as_run | versions()))
+    made = {"replayed": str(record.path.resolve()), "changes": str(rule.changes) if would_be else ""}
+    as_run = {"driver": info.driver, "clock": info.clock, **made}
+    remarks = unwritten(record, rule) if would_be else ()
+    write_whole(folder / "scenario.toml", to_toml(scenario, as_run | versions(), remarks))
     metrics = RunMetrics(
         scenario=scenario,
         feeder=rule.feeder,
-        driver=LIVE,
+        driver=LIVE,  # its windows are those of what happened
         folder=folder,
         clock=info.clock,
         speed=info.plant.speed,
     )
-    write_report(metrics, recorded, None, figures=figures)
+    write_report(metrics, recorded, None, figures=would_be)
     set_status(folder, "complete")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import msgspec
@@ -12,7 +12,7 @@ from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
 
-def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
+def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = ()) -> str:
     """Every key of a scenario, defaults included, and a table about the run.
 
     Defaults are written out because they may differ in a later version; the text can be run again as it is, and the
@@ -24,10 +24,13 @@ def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any]) -> str:
         As run, so with the seed and the cases of the command line.
     as_run : Mapping[str, Any]
         Driver, versions and the like.
+    remarks : Iterable[str], optional
+        Sentences on what the scenario does not say of the run, for the head of the file.
     """
     keys, tables = _lines(scenario, "", scenario)
     lines = [
         "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
+        *(f"# {remark}" for remark in remarks),
         *keys,
         *tables,
         "",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -228,3 +229,26 @@ def test_what_is_missing_in_the_table_is_explained(run: Result) -> None:
     assert str(done).splitlines()[-1].startswith("-: no number")
     done.table.fillna(0.0, inplace=True)
     assert "-: no number" not in str(done)
+
+
+def test_the_file_of_what_would_have_been_gives_it_again(run: Result, tmp_path: Path) -> None:
+    """Cuts, losses and their times are in its scenario: run in simulated time, it is the same to the byte."""
+    done = gp.counterfactual(run, without_loss=True, without="inv4 <-> inv7", since=0.5, folder=tmp_path / "would")
+
+    again = gp.load(tmp_path / "would" / "scenario.toml").run("IV")
+
+    assert again.sha256 == done.would_be.sha256 != run.sha256
+    assert again.links["fate"].eq("cut").any()
+
+
+def test_a_folder_of_what_would_have_been_says_so(run: Result, tmp_path: Path) -> None:
+    """The change is in the title of report and figures; the record's own path, driver and clock are in `[as_run]`."""
+    (tmp_path / "latest").symlink_to(run.folder)
+
+    gp.counterfactual(tmp_path / "latest", without="* <-> *", since=0.5, folder=tmp_path / "would")
+
+    assert "IV what would have been, without * <-> *, from 0.5 s on" in (tmp_path / "would" / "report.txt").read_text()
+    as_run = tomllib.loads((tmp_path / "would" / "scenario.toml").read_text())["as_run"]
+    assert as_run["replayed"] == str((run.folder / "IV" / "run.mcap").resolve())
+    assert (as_run["driver"], as_run["clock"]) == ("inprocess", "simulated")
+    assert as_run["changes"] == "without * <-> *, from 0.5 s on"

@@ -129,6 +129,9 @@ def test_other_gains_and_another_law_decide_otherwise(run_of: Callable[[str], Re
     other = gp.counterfactual(run, law="dapi")
 
     assert slow.difference is None
+    head = (slow.folder / "scenario.toml").read_text().splitlines()[:3]
+    assert head[1].startswith("# Law, gains and graph hold from the start here; in what would have been, from 1 s on.")
+    assert head[2].startswith("# Not in this file: delays and losses on the wire, and what people did")
     changed = np.abs(np.diff(slow.would_be.record.P_set, axis=0)).max(axis=1)
     as_it_was = np.abs(np.diff(run.record.P_set, axis=0)).max(axis=1)
     assert changed[run.record.t[1:] > 1.05].max() < as_it_was[run.record.t[1:] > 1.05].max()
