@@ -26,6 +26,8 @@ from scenarios.replay.replay_error import ReplayError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from scenarios.run import Progress
+
 RecordSource = Result | RunRecord | str | Path
 """A result, its record, or the folder of a case or its run.mcap."""
 
@@ -110,10 +112,12 @@ def counterfactual(
     return counterfactual_in(record, changes, home, temporary=folder is None)
 
 
-def counterfactual_in(record: RunRecord, changes: Changes, folder: Path, *, temporary: bool = False) -> Counterfactual:
+def counterfactual_in(
+    record: RunRecord, changes: Changes, folder: Path, *, temporary: bool = False, tell: Progress | None = None
+) -> Counterfactual:
     """Run a counterfactual into an empty folder, which goes with it if it is temporary; see `counterfactual`."""
     would_be, was = RunFolder(folder, temporary=temporary), RunFolder(_temporary(), temporary=True)
-    done = run_counterfactual(record, changes, was.path, would_be.path)
+    done = run_counterfactual(record, changes, was.path, would_be.path, tell=tell)
     return Counterfactual(was, would_be, changes, done)
 
 

@@ -26,7 +26,7 @@ from scenarios.replay.replayed_process import MakePlant, start_plant_of
 from scenarios.results.metrics_file import RunMetrics
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import set_broken, set_status, write_whole
-from scenarios.run import versions
+from scenarios.run import Progress, versions
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 from wire.messages import LinkReport, Telemetry
@@ -47,7 +47,12 @@ class CounterfactualRun:
 
 
 def run_counterfactual(
-    record: RunRecord, changes: Changes, was: Path, would_be: Path, make_plant: MakePlant = start_plant
+    record: RunRecord,
+    changes: Changes,
+    was: Path,
+    would_be: Path,
+    make_plant: MakePlant = start_plant,
+    tell: Progress | None = None,
 ) -> CounterfactualRun:
     """Run a counterfactual, and write two run folders.
 
@@ -61,6 +66,8 @@ def run_counterfactual(
         Empty folders: for what was, without figures, and for what would have been.
     make_plant : MakePlant, optional
         Starts the plant.
+    tell : Progress, optional
+        Takes the progress.
 
     Raises
     ------
@@ -86,7 +93,11 @@ def run_counterfactual(
                 rows.take(message)
                 effect.take(message)
                 recorder(message)
+                if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
+                    tell(rule.case, message.rows[-1][0], record.t_end)
 
+            if tell is not None:
+                tell(rule.case, 0.0, record.t_end)
             notes = run(record, rule, take, make_plant)
             recorded = recorder.finish(recorder.ended, recorder.record_step)
         if changes and effect.difference is None:

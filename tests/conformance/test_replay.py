@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 from collections.abc import Iterator
 from functools import partial
@@ -86,6 +87,7 @@ def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhe
     assert code == 0, text
     assert "short, case IV, in simulated time: gains.k_p = 0.002" in text
     assert "would be" in text
+    assert re.search(r"^case IV: 1 s simulated in [\d.]+ s$", text, re.MULTILINE), text
     assert isinstance(gp.read("would"), Result)
     for name in ("IV/history.csv", "metrics.json", "plots/counterfactual.png", "comparison.txt"):
         assert (elsewhere / "would" / name).stat().st_size > 100

@@ -78,7 +78,11 @@ def replay(
             if out is not None:
                 text = "a replay without a change writes no folder; leave it out, or give --without, --law or --set"
                 fail([f"--out {out}: {text}"], BAD_INPUT)
-            differs = _replay(record)
+            from gridpeers.cli.progress import explained_work
+
+            span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
+            with explained_work(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
+                differs = _replay(record)
     except ReplayError as error:
         fail(list(error.problems), BAD_INPUT)
     except (RecordFileError, FolderError) as error:
@@ -129,6 +133,9 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from datetime import datetime
 
+    from rich.console import Console
+
+    from gridpeers.cli.progress import progress
     from gridpeers.studies.replaying import counterfactual_in
     from scenarios.replay.changes import changed_rule
     from scenarios.results.plots.style import save
@@ -138,7 +145,8 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     typer.echo(f"{_about(record)}: {changes}")
     folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
-    done = counterfactual_in(record, changes, folder)
+    with progress(Console(), (record.info.case,)) as tell:
+        done = counterfactual_in(record, changes, folder, tell=tell)
     typer.echo(str(done))
     write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
     (figure,) = save(done.plot(), folder / "plots", "counterfactual")
