@@ -13,7 +13,7 @@ import msgspec
 from scenarios.live.run_address import RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, command_line
-from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json
+from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json, texts
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
 
@@ -96,7 +96,7 @@ class LivePages:
     async def _receive(self, socket: WebSocket) -> None:
         """Carry out what a page asks for, one after another."""
         loop = asyncio.get_running_loop()
-        async for text in socket.iter_text():
+        async for text in texts(socket):
             await socket.send_text(as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
 
     def _do(self, text: str) -> dict[str, Any]:

@@ -229,6 +229,13 @@ def _answer(text: str, status: int = 200, kind: str = "text/html", **headers: st
     return Response(text, status, HEADERS | headers, kind)
 
 
+async def texts(socket: WebSocket) -> AsyncIterator[str]:
+    """Yield the texts that a page sends until it goes; what is no text is nobody's question."""
+    while (message := await socket.receive())["type"] != "websocket.disconnect":
+        if (text := message.get("text")) is not None:
+            yield text
+
+
 def as_json(value: Any) -> str:
     """Return a message to a page."""
     return msgspec.json.encode(value).decode()

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from scenarios.record.record_reader import RecordFileError
 from scenarios.view.link_states import LinkView
-from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json
+from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json, texts
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.recorded.recorded_run import RecordedRun
 from wire.bounds import Text
@@ -102,7 +102,7 @@ class RecordPages:
             await socket.send_text(text)
 
     async def _receive(self, socket: WebSocket, page: RecordPage) -> None:
-        async for text in socket.iter_text():
+        async for text in texts(socket):
             with contextlib.suppress(msgspec.DecodeError):
                 await page.questions.put(msgspec.json.decode(text, type=RecordQuestion))
 
