@@ -105,7 +105,7 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
         ("never publishes", "t = 0 s: no value yet of grid/inv3/V", 30.0),
         ("text", "t = 0 s: grid/inv1/f is not a finite number", 30.0),
         ("not a number", "t = 0.1 s: grid/inv3/V is not a finite number", 30.0),
-        ("leaves", " s: strange left the federation before the end", 30.0),  # a step later if the broker is slow to tell
+        ("leaves", " s: strange left the federation before the end", 30.0),  # when, the broker decides
         ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0),
         ("hangs", "strange did not let time go on to 0.1 s within 4 s: strange stands at t = 0.1 s", 4.0),
         ("dies", "strange did not let time go on to 0.1 s within 4 s", 4.0),
