@@ -116,11 +116,12 @@ def assert_usable(left: Left, *, complete: bool = False) -> None:
     assert record.complete == complete
     assert complete or any("cut off" in text for text in record.damage)
     assert left.lost <= 1.0, f"{left.lost:.2f} s lost: history to {left.history:.2f} s, record to {record.t_end:.2f} s"
-    assert left.history < 1.0 or len(record.physics().t) > 1
+    begun = record.t_end > 0.5  # in one process a second of run time passes before the first chunk: `lost` judges that
+    assert not begun or len(record.physics().t) > 1
     for agent in record.agents[:2]:
         again = list(recomputed(record, agent))
         assert all(each.agrees for each in again)
-        assert left.history < 1.0 or again
+        assert not begun or again
 
 
 def main() -> None:
