@@ -50,7 +50,7 @@ BEGIN, END = "<!-- python -m bench.recorder -->", "<!-- end -->"
 
 
 class Case(NamedTuple):
-    """What is run."""
+    """A case of a scenario, and how it is run."""
 
     scenario: str
     case: str

@@ -1,4 +1,4 @@
-"""What one receiver hears of an agent that lies, or in whose name another lies. Pure."""
+"""False states at one receiver: from an agent that lies, or from another that lies in its name. Pure."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class LieTime(NamedTuple):
     until: float
     """Until when (s); that instant is not included."""
     liar: str
-    """Who lies."""
+    """Name of the agent that lies."""
     lie: Lie
     """How."""
 

@@ -33,7 +33,7 @@ SLOWER = 10.0
 
 
 class _Memory(NamedTuple):
-    """What is remembered of a neighbour."""
+    """Memory of one neighbour, from the last step."""
 
     t: float
     """Run time (s) of the last step with it."""

@@ -139,7 +139,7 @@ MISSING = (
 
 
 class Counterfactual:
-    """What was beside what would have been; `gridpeers.counterfactual` makes it."""
+    """A recorded run and the run under changes, side by side; `gridpeers.counterfactual` makes it."""
 
     def __init__(
         self,
@@ -151,7 +151,7 @@ class Counterfactual:
         self._folders = was, would_be  # they go with this
         self.was, self.would_be = _result(was.path), _result(would_be.path)
         self.changes = changes
-        """What is changed."""
+        """The changes."""
         self.difference, self.compared, self.notes = done.difference, done.compared, done.notes
         """First difference from the record before the change, None if there is none; rows compared; what is left."""
 

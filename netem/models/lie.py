@@ -23,7 +23,7 @@ LONGEST_REPLAY = 60.0
 """Longest time (s) by which a replay is old; each receiver keeps the states of that time."""
 
 Quantity = Literal["P_set", "V_set", "Q"]
-"""What a lie can be about."""
+"""Quantities of a state that a lie can change."""
 
 QUANTITIES: tuple[Quantity, ...] = ("P_set", "V_set", "Q")
 """All of them."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
 from msgspec.structs import replace
 
 from scenarios.drivers.inprocess import run_inprocess
@@ -52,3 +53,12 @@ def recorded_run(
         recorder.finish(model.time.end_s, model.time.record_s)
     assert recorder.record_failure == ""
     return RunRecord.open(folder)
+
+
+def recorded_in_chunks(text: str, folder: Path, case: str = "case", *, chunk: int = 20_000) -> RunRecord:
+    """Run a case of a scenario file with this text in one process; a chunk of its record has about so many bytes."""
+    file = folder / "scenario.toml"
+    file.write_text(text, encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("scenarios.record.record_writer.CHUNK", chunk)
+        return recorded_run(file, case, folder / case)

@@ -17,7 +17,7 @@ from mcap.reader import McapReader, make_reader
 from mcap.records import Message
 from mcap.stream_reader import StreamReader
 
-from tests.record.recorded_runs import recorded_run
+from tests.record.recorded_runs import recorded_in_chunks
 
 LOSSY = """
 seed = 7
@@ -48,11 +48,7 @@ TOPICS = {
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record with an islanding and a lossy link, in several chunks."""
-    folder = tmp_path_factory.mktemp("general")
-    (folder / "lossy.toml").write_text(LOSSY, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
-        return recorded_run(folder / "lossy.toml", "case", folder / "case").path
+    return recorded_in_chunks(LOSSY, tmp_path_factory.mktemp("general")).path
 
 
 def opened(file: BinaryIO) -> McapReader:

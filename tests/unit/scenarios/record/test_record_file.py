@@ -11,7 +11,7 @@ from mcap.writer import Writer
 from scenarios.record.record_file import RecordFileError
 from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
 from scenarios.record.record_reader import RunRecord
-from tests.record.recorded_runs import recorded_run
+from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 CALM = '[time]\nend_s = 1.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
 
@@ -19,11 +19,7 @@ CALM = '[time]\nend_s = 1.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record of 1 s, in several chunks."""
-    folder = tmp_path_factory.mktemp("record")
-    (folder / "calm.toml").write_text(CALM, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
-        return recorded_run(folder / "calm.toml", "calm", folder / "calm").path
+    return recorded_in_chunks(CALM, tmp_path_factory.mktemp("record"), "calm").path
 
 
 def read_all(path: Path) -> tuple[RunRecord, int]:

@@ -11,7 +11,7 @@ import pytest
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.run_view import Frame
-from tests.record.recorded_runs import recorded_run
+from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 ISLANDED = """
 [time]
@@ -37,11 +37,7 @@ loss = 0.5
 @pytest.fixture(scope="module")
 def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
     """The record of such a run, in many parts."""
-    folder = tmp_path_factory.mktemp("run")
-    (folder / "it.toml").write_text(ISLANDED, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 60_000)
-        return recorded_run(folder / "it.toml", "case", folder / "case")
+    return recorded_in_chunks(ISLANDED, tmp_path_factory.mktemp("run"), chunk=60_000)
 
 
 @pytest.fixture
@@ -209,14 +205,10 @@ def test_agents_that_join_and_leave(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("chunk", [1, 1_000_000])
-def test_long_steps_leave_no_gaps(chunk: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_steps_leave_no_gaps(chunk: int, tmp_path: Path) -> None:
     """With a second and more between two rows, every time in between has the row before, and the agents."""
-    monkeypatch.setattr("scenarios.record.record_writer.CHUNK", chunk)
-    (tmp_path / "it.toml").write_text(
-        '[time]\nT_c_s = 2.0\nrecord_s = 2.0\nend_s = 8.0\n[case.case]\nsecondary = "all"\ngraph = "ring"\n',
-        encoding="utf-8",
-    )
-    record = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case")
+    text = '[time]\nT_c_s = 2.0\nrecord_s = 2.0\nend_s = 8.0\n[case.case]\nsecondary = "all"\ngraph = "ring"\n'
+    record = recorded_in_chunks(text, tmp_path, chunk=chunk)
     view, history = RecordView(record), record.physics()
     for t in (0.5, 1.8, 3.99, 4.0, 5.7, 7.9):
         frame = view.frame(t)

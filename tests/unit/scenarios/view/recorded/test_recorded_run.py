@@ -16,7 +16,7 @@ from scenarios.record.record_info import FILE
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
 from scenarios.view.recorded.recorded_run import STILL, RecordedRun
-from tests.record.recorded_runs import recorded_run
+from tests.record.recorded_runs import recorded_in_chunks
 
 ISLANDED = """
 [time]
@@ -34,11 +34,7 @@ graph = "ring"
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A record of 1 s, in several chunks."""
-    folder = tmp_path_factory.mktemp("record")
-    (folder / "it.toml").write_text(ISLANDED, encoding="utf-8")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
-        return recorded_run(folder / "it.toml", "case", folder / "case").path
+    return recorded_in_chunks(ISLANDED, tmp_path_factory.mktemp("record")).path
 
 
 def grown_old(file: Path) -> None:
@@ -88,11 +84,10 @@ def test_a_record_that_is_cut_off_says_so(whole: Path, tmp_path: Path) -> None:
     assert run.view().frame(news.t_end).inverters[0].P is not None
 
 
-def test_rows_without_messages_leave_nobody_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_without_messages_leave_nobody_out(tmp_path: Path) -> None:
     """Journals come after the rows: at the end of a cut record agents are unknown, not gone; its page opens before."""
-    (tmp_path / "it.toml").write_text(ISLANDED.replace("end_s = 1.0", "end_s = 4.0"), encoding="utf-8")
-    monkeypatch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
-    data, file = recorded_run(tmp_path / "it.toml", "case", tmp_path / "case").path.read_bytes(), tmp_path / FILE
+    longer = ISLANDED.replace("end_s = 1.0", "end_s = 4.0")
+    data, file = recorded_in_chunks(longer, tmp_path).path.read_bytes(), tmp_path / FILE
     behind = 0
     for length in range(len(data) // 2, len(data), len(data) // 17):
         file.write_bytes(data[:length])
