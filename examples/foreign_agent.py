@@ -127,7 +127,7 @@ class ForeignAgent:
             if key[1] == "agent" and not self.alive[who]:  # ask who it is; we have subscribed before
                 again = threading.Timer(0.1, self.inbox.put, [(f"{self.root}asked/{who[0]}/{who[1]}", None)]).start
                 answer = zenoh.handlers.Callback(lambda r: r.ok and self.enqueue(r.ok), again)  # again: once it is over
-                self.session.get(f"{self.root}nameplate/{who[0]}/{who[1]}", answer)
+                self.session.get(f"{self.root}nameplate/{who[0]}/{who[1]}", answer, timeout=1.0)
         elif key[0] in ("alive", "asked"):
             self.alive.pop(who, None)
             if who[0] == "plant":

@@ -6,6 +6,7 @@ fills it under way: down to a little room, which the run's other files get, or t
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -82,10 +83,11 @@ def has_namespaces() -> bool:
 
 
 def fill(folder: Path, room: int) -> None:
-    """Write a file that takes all room of a disk but some."""
-    free = shutil.disk_usage(folder).free
+    """Write a file that takes all room of a disk but some, while the run takes of it too."""
     with (folder / "ballast").open("wb") as file:
-        os.posix_fallocate(file.fileno(), 0, free - room)
+        while (free := shutil.disk_usage(folder).free - room) > 0:
+            with contextlib.suppress(OSError):  # the run was faster: what is free is looked up again
+                os.posix_fallocate(file.fileno(), os.fstat(file.fileno()).st_size, free)
 
 
 def filled(kind: Kind, disk: Path, kept: Path) -> str:

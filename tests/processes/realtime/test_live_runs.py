@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
@@ -14,7 +15,7 @@ import pytest
 
 from tests.command_line import invoke
 from tests.processes.commands.test_run_command import command
-from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of
+from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of, wait_for
 
 EVENTS = """
 [time]
@@ -36,6 +37,14 @@ degraded_communication = { max_age_s = 60.0 }
 
 A busy machine may leave an agent out for longer than the usual greatest age of 0.25 s, which is a departure of the run.
 """
+
+SETTLED = 2.0
+"""Run time (s) after which an event has left the rows that follow each other nearly equal."""
+
+
+def wait_for_second(history: Path, t: float) -> None:
+    """Wait until a history that is being written has rows of the next whole second (s)."""
+    wait_for(history, f"\n{math.ceil(t)}.")
 
 
 def plant_of(desk: Desk, *words: str, wait: float = 0.0) -> Terminal:
@@ -102,11 +111,13 @@ def test_a_load_is_set_while_the_run_goes_on(desk: Desk) -> None:
     """The answer has the power or why not; events and the record have it as an event, and the inverters carry it."""
     plant = plant_of(desk, "--out", "here")
     assert desk.type("event", "open", "13-152")[0] == 0
-    plant.expect("13-152 opened")
+    history = desk.folder / "here" / "IV" / "history.partial.csv"
+    wait_for_second(history, float(plant.expect(r"([0-9.]+) s .*13-152 opened")[1]) + SETTLED)
 
     code, text = desk.type("load", "48", "--P", "0", "--Q", "0")
     assert (code, text.partition(", at t")[0]) == (0, "load 48: 0 kW and 0 kvar at nominal voltage, 0 times its table")
     off = float(plant.expect(r"([0-9.]+) s  load 48 set to 0 kW and 0 kvar at nominal voltage")[1])
+    wait_for_second(history, off + SETTLED)
     code, text = desk.type("load", "48x", "--factor", "2")
     assert (code, text) == (2, 'gridpeers: load "48x": no such load; did you mean "48"?\n')
     code, text = desk.type("load", "48", "--P", "315000")
@@ -123,10 +134,10 @@ def test_a_load_is_set_while_the_run_goes_on(desk: Desk) -> None:
 
     folder = desk.folder / "here" / "IV"
     assert re.search(r",load,48,", (folder / "events.csv").read_text())
-    history = pandas.read_csv(folder / "history.csv")
-    P = history.filter(regex="_P_W$").sum(axis=1) / 1e3
-    rows = [(P[history["t_s"] < t + 1e-6].iloc[-1], P[history["t_s"] > t + 1e-6].iloc[0]) for t in (off, on)]
-    drop, rise = (float(after - before) for before, after in rows)
+    rows = pandas.read_csv(folder / "history.csv")
+    P = rows.filter(regex="_P_W$").sum(axis=1) / 1e3
+    steps = [(P[rows["t_s"] < t + 1e-6].iloc[-1], P[rows["t_s"] > t + 1e-6].iloc[0]) for t in (off, on)]
+    drop, rise = (float(after - before) for before, after in steps)
     assert -210.0 < drop < -130.0, "kW: 210 of constant impedance, less what the others take at the higher voltage"
     assert rise == pytest.approx(-1.5 * drop, rel=0.1)
 
