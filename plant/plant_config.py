@@ -12,6 +12,7 @@ from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
 from plant.simulator import Simulator
 from wire.journal import RecordLevel
+from wire.messages import LoadSetting
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.table_schema import Example
 from wire.trust.credentials import Credentials
@@ -58,6 +59,17 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     action: Literal["open", "close"]
     synchronised: bool = False
     """Whether a switch that would join two live islands waits until they are in step."""
+
+
+class LoadEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Another power of a load from a scheduled time on."""
+
+    t: float
+    """Time (s), a multiple of h."""
+    load: str
+    """Name of the load, or of its bus."""
+    setting: LoadSetting
+    """Its power at nominal voltage; what is None stays as it is."""
 
 
 class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -142,6 +154,8 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     sync_check: SyncCheck = SyncCheck()
     limits: tuple[PowerLimit, ...] = ()
     """Scheduled changes of available power."""
+    loads: tuple[LoadEvent, ...] = ()
+    """Scheduled changes of loads."""
     changes: FeederChanges = FeederChanges()
     """Changes to the feeder's tables."""
     spares: tuple[str, ...] = ()

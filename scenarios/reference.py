@@ -27,7 +27,16 @@ from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table,
 from scenarios.results.evaluation import claims, metric
 from scenarios.results.evaluation.benchmark_registry import CLAIMS
 from scenarios.results.evaluation.metric import METRICS
-from scenarios.schema.scenario_model import Case, Event, InverterTable, PlantTable, Processes, ScenarioModel, Time
+from scenarios.schema.scenario_model import (
+    Case,
+    Event,
+    InverterTable,
+    LoadChange,
+    PlantTable,
+    Processes,
+    ScenarioModel,
+    Time,
+)
 from wire import bounds, keys, messages
 from wire.bounds import LIMIT
 from wire.codec import KINDS
@@ -74,6 +83,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[degraded_communication]", DegradedCommunication),
     ("[processes]", Processes),
     ("[[event]]", Event),
+    ("[[event]], load.NAME", LoadChange),
     ("[case.NAME]", Case),
     ("[[link]], [[case.NAME.link]]", Fault),
     ("[[partition]], [[case.NAME.partition]]", Partition),

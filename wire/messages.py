@@ -254,7 +254,7 @@ class LinkAcknowledgement(Message, frozen=True, tag=True, forbid_unknown_fields=
 
 
 class LoadSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A power that a person gives a load: a factor, or real and reactive power; what is nil stays as it is."""
+    """A power that a person or a scenario gives a load: a factor, or real and reactive power; what is nil stays."""
 
     factor: Factor | None = None
     """Factor on the real and the reactive power of its table; the plant takes what makes sense of it."""

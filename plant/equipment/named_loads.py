@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment.equipment import Feeder, Load
+from plant.equipment.equipment import Feeder
 from wire.schema.plausible import Plausible
 from wire.schema.suggestion import first_of, suggestion
 
@@ -91,11 +91,6 @@ def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
             replace(part, S=next(of[part.name])) if part.name in of else part for part in feeder.load_parts
         ),
     )
-
-
-def _with_next(load: Load, powers: Iterator[complex] | None) -> Load:
-    """Return a row with the next three powers (VA), if there are any."""
-    return load if powers is None else replace(load, S=(next(powers), next(powers), next(powers)))
 
 
 def _shared(branches: Sequence[complex], total: complex) -> list[complex]:

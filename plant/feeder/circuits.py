@@ -9,9 +9,12 @@ from plant.dynamics import Circuit, PlantError
 from plant.network import Network
 from plant.network.loads import LoadBranches
 
+KEPT = 64
+"""Number of circuits to keep: enough for all scheduled ones, and a bound for many changes of loads."""
+
 
 class Circuits:
-    """A feeder's circuits; each is made at the first call for its switches and then kept.
+    """A feeder's circuits; each is made at the first call for its switches and loads, and then kept.
 
     Parameters
     ----------
@@ -20,25 +23,37 @@ class Circuits:
     """
 
     def __init__(self, network: Network) -> None:
-        self._network, self._loads = network, network.loads()
-        self._made: dict[frozenset[str], Circuit] = {}
+        self._network = network
+        self._loads = {network: network.loads()}
+        """Load branches of each network of which circuits are kept: one for each state of the loads."""
+        self._made: dict[tuple[Network, frozenset[str]], Circuit] = {}
 
     def change_loads(self, network: Network) -> None:
-        """Go on with the same network with other loads; circuits are made anew as they are needed."""
-        self._network, self._loads = network, network.loads()
-        self._made.clear()
+        """Go on with the same network with other loads."""
+        self._network = network
 
-    def of(self, closed: frozenset[str]) -> Circuit:
-        """Return the circuit with these switches closed.
+    def of(self, closed: frozenset[str], network: Network | None = None) -> Circuit:
+        """Return the circuit with these switches closed, with the present loads or with those of another network.
 
         Raises
         ------
         PlantError
             If ideal devices tie an inverter to another: their sharing would be undetermined.
         """
-        if closed not in self._made:
-            self._made[closed] = circuit_of(self._network, closed, self._loads)
-        return self._made[closed]
+        key = (self._network if network is None else network), closed
+        if key not in self._made:
+            if len(self._made) == KEPT:
+                del self._made[next(iter(self._made))]
+            self._made[key] = circuit_of(key[0], closed, self._loads_of(key[0]))
+        return self._made[key]
+
+    def _loads_of(self, network: Network) -> LoadBranches:
+        """Return the load branches of a network."""
+        if network not in self._loads:
+            still = {used for used, _ in self._made} | {self._network}
+            self._loads = {used: loads for used, loads in self._loads.items() if used in still}
+            self._loads[network] = network.loads()
+        return self._loads[network]
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:

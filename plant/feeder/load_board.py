@@ -1,31 +1,48 @@
-"""The loads of a feeder as people set them while a run goes on."""
+"""The loads of a feeder as a scenario, and people while a run goes on, set them."""
 
 from __future__ import annotations
 
-from plant.equipment.named_loads import FACTOR, load_name, named_loads, with_powers
-from plant.network import Network
-from wire.messages import LoadSetting, PlantEvent
-from wire.schema.plausible import Plausible
+from collections.abc import Collection, Iterable, Iterator
 
-MOST = 10.0
-"""Greatest power of one load, as a multiple of all loads of the feeder, or of its inverters' ratings if more."""
+from plant.equipment.load_powers import LoadPowers
+from plant.equipment.named_loads import with_powers
+from plant.network import Network
+from plant.plant_config import LoadEvent
+from wire.messages import LoadSetting, PlantEvent
+from wire.timing.clock import time_of
 
 
 class LoadBoard:
-    """The powers of a feeder's loads at nominal voltage, and those that they are to have from the next step on.
+    """The powers of a feeder's loads at nominal voltage, and those that they are to have.
 
     Parameters
     ----------
     network
         The feeder's network as the run began.
+    events
+        Changes on schedule, in the order of time.
+    h
+        Step (s).
+
+    Raises
+    ------
+    ValueError
+        If an event names no load, or a number of it makes no sense.
     """
 
-    def __init__(self, network: Network) -> None:
-        self._network, self._loads = network, named_loads(network.feeder)
-        whole = sum(abs(load.S) for load in self._loads.values())
-        self._most = MOST * max(whole, sum(unit.P_rated for unit in network.inverters)) / 1e3
+    def __init__(self, network: Network, events: Iterable[LoadEvent] = (), h: float = 1.0) -> None:
+        self._network, self._h = network, h
+        self._powers = LoadPowers(network.feeder, sum(unit.P_rated for unit in network.inverters))
         self._set: dict[str, complex] = {}
         self._coming: dict[str, complex] = {}
+        self._at: dict[int, list[tuple[str, LoadSetting]]] = {}
+        for event in events:
+            known = self._powers.name(event.load)
+            self._at.setdefault(round(event.t / h), []).append((known, event.setting))
+        self._networks = {_key({}): network}
+        """Networks of the states of loads that are foreseen: made once, so that their circuits are, too."""
+        for _ in self.foreseen():  # makes them, and refuses what makes no sense
+            pass
 
     @property
     def changed(self) -> dict[str, complex]:
@@ -33,9 +50,18 @@ class LoadBoard:
         return dict(self._set)
 
     @property
-    def waits(self) -> bool:
-        """Whether a load is to change."""
-        return bool(self._coming)
+    def steps(self) -> Collection[int]:
+        """Steps with scheduled changes to come."""
+        return self._at.keys()
+
+    def foreseen(self) -> Iterator[tuple[int, Network]]:
+        """Yield each step with scheduled changes to come and the network from then on, in the order of time."""
+        now = dict(self._set)
+        for step in sorted(self._at):
+            for name, setting in self._at[step]:
+                self._put(now, name, self._power(name, setting, now))
+            network = self._networks[_key(now)] = self._network_with(now)
+            yield step, network
 
     def put(self, text: str, setting: LoadSetting) -> str:
         """Have a load take another power at nominal voltage from the next step on; return it in words.
@@ -52,54 +78,47 @@ class LoadBoard:
         ValueError
             If there is no such load, or a number makes no sense.
         """
-        name = load_name(self._loads, text)
-        table = self._loads[name].S
-        if (setting.factor is None) == (setting.P is None and setting.Q is None):
-            raise ValueError(f"load {name}: takes either a factor, or real or reactive power")
-        if setting.factor is not None:
-            _refuse_unless_plausible(name, FACTOR, setting.factor, "")
-            S = setting.factor * table
-        else:
-            low = 0.0 if table.real >= 0.0 else -self._most
-            before = self._coming.get(name, self._set.get(name, table))
-            P = before.real if setting.P is None else setting.P
-            Q = before.imag if setting.Q is None else setting.Q
-            _refuse_unless_plausible(name, Plausible("the real power of a load", low, self._most), P / 1e3, "kW")
-            around = Plausible("the reactive power of a load", -self._most, self._most)
-            _refuse_unless_plausible(name, around, Q / 1e3, "kvar")
-            S = complex(P, Q)
-        self._coming[name] = S
-        return f"load {name}: {_words(S)}{_beside(S, table)}"
+        name = self._powers.name(text)
+        S = self._coming[name] = self._power(name, setting, self._set | self._coming)
+        return f"load {name}: {self._powers.words(name, S)}"
 
-    def apply(self, t: float) -> tuple[Network, list[PlantEvent]]:
-        """Change the loads that are to change at t (s); return the network with them, and an event of each."""
-        events = []
+    def is_due(self, step: int) -> bool:
+        """Return whether a load changes at a step: by its schedule, or because a person has set it since the last."""
+        return bool(self._coming) or step in self._at
+
+    def apply(self, step: int) -> tuple[Network, list[PlantEvent]]:
+        """Change the loads that are due at a step; return the network with them, and an event of each.
+
+        What the schedule says of a load replaces what a person has set since the last step.
+        """
+        for name, setting in self._at.pop(step, ()):
+            self._coming[name] = self._power(name, setting, self._set | self._coming)
+        t, events = time_of(step, self._h), []
         for name, S in self._coming.items():
-            table = self._loads[name].S
-            text = f"load {name} set to {_words(S)}{_beside(S, table)}"
+            text = f"load {name} set to {self._powers.words(name, S)}"
             events.append(PlantEvent(t=t, kind="load", subject=name, text=text))
-            if table == S:
-                self._set.pop(name, None)
-            else:
-                self._set[name] = S
+            self._put(self._set, name, S)
         self._coming = {}
-        return self._network.with_loads(with_powers(self._network.feeder, self._set)), events
+        return self._network_with(self._set), events
+
+    def _power(self, name: str, setting: LoadSetting, now: dict[str, complex]) -> complex:
+        try:
+            return self._powers.power(name, setting, now.get(name, self._powers.table(name)))
+        except ValueError as error:
+            raise ValueError(f"load {name}: {error}") from None
+
+    def _put(self, powers: dict[str, complex], name: str, S: complex) -> None:
+        """Note the power of a load, if it is another one than that of the table."""
+        if self._powers.table(name) == S:
+            powers.pop(name, None)
+        else:
+            powers[name] = S
+
+    def _network_with(self, powers: dict[str, complex]) -> Network:
+        """Return the network with these powers (VA) of loads: the one that was made before, if they are foreseen."""
+        made = self._networks.get(_key(powers))
+        return self._network.with_loads(with_powers(self._network.feeder, powers)) if made is None else made
 
 
-def _refuse_unless_plausible(name: str, plausible: Plausible, value: float, unit: str) -> None:
-    if objection := plausible.objection(value, unit):
-        raise ValueError(f"load {name}: {objection}")
-
-
-def _words(S: complex) -> str:
-    return f"{S.real / 1e3:.6g} kW and {S.imag / 1e3:.6g} kvar at nominal voltage"
-
-
-def _beside(S: complex, table: complex) -> str:
-    """Return how a power is beside that of the tables, "" if that is no factor."""
-    if not table:
-        return ""
-    factor = (S / table).real
-    if abs(S - factor * table) > 1e-9 * abs(table):
-        return ""
-    return ", as in its table" if factor == 1.0 else f", {factor:.4g} times its table"
+def _key(powers: dict[str, complex]) -> frozenset[tuple[str, complex]]:
+    return frozenset(powers.items())

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import isfinite
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from plant.dynamics import Dynamics, PlantError
+from plant.dynamics import Circuit, Dynamics, PlantError
 from plant.dynamics.start.at_rest import require_within_limits
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
@@ -83,7 +84,7 @@ class Plant:
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
         self._switches = Switchboard(network, settings.events, settings.h)
         self._circuits, self._islands = Circuits(network), Islands(network)
-        self._loads = LoadBoard(network)
+        self._loads = LoadBoard(network, settings.loads, settings.h)
         self._set_points = SetPointLimits()
         self._limits: dict[int, list[PowerLimit]] = {}
         for limit in settings.limits:
@@ -126,8 +127,8 @@ class Plant:
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # scheduled networks are factored now: in wall-clock time an event must not be late
-        for closed in self._switches.foreseen():
-            self._dynamics.network.reduced(self._circuits.of(closed))
+        for circuit in self._foreseen():
+            self._dynamics.network.reduced(circuit)
 
     def load_step(self) -> None:
         """Compile or load the inner loop now; else the first `advance` does, which takes seconds in its first use."""
@@ -215,20 +216,18 @@ class Plant:
         self._in_service.connect(self._row[name], self.tick * self._steps, on=on)
 
     def advance(self) -> None:
-        """Advance to the next tick, change the loads that people have set, and operate the switches of these steps.
+        """Advance to the next tick, with the switches and loads of these steps, scheduled or set by people.
 
         An island whose network has no solution is de-energised, which is an event; the others continue. Protection
         acts at the very step at which a clearing time ends: the steps are split there.
         """
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         self._events += self._closings.check_waiting(first)
-        if self._loads.waits:
-            self._change_loads(first)
-        scheduled = sorted({s for s in (*self._switches.steps, *self._limits) if first < s < last} | {last})
+        planned = (*self._switches.steps, *self._limits, *self._loads.steps)
+        scheduled = sorted({s for s in planned if first < s < last} | {last})
         step = first
         while step < last:
-            if step in self._switches.steps:
-                self._operate(step)
+            self._change_network(step)
             for limit in self._limits.get(step, ()):
                 self._limit(limit)
             stop = min(min(s for s in scheduled if s > step), step + self._in_service.quiet)
@@ -278,13 +277,40 @@ class Plant:
 
     # ---------------------------------------------------------------- events of the schedule
 
-    def _operate(self, step: int) -> None:
-        """Operate the switches of this step, all at once, and find the islands again."""
+    def _foreseen(self) -> Iterator[Circuit]:
+        """Yield the circuit after each step with scheduled switches or loads, in the order of time."""
+        closed, network = self._switches.closed, self.network
+        switched = dict(zip(sorted(self._switches.steps), self._switches.foreseen(), strict=True))
+        loaded = dict(self._loads.foreseen())
+        for step in sorted({*switched, *loaded}):
+            closed, network = switched.get(step, closed), loaded.get(step, network)
+            yield self._circuits.of(closed, network)
+
+    def _change_network(self, step: int) -> None:
+        """Change the loads and operate the switches of this step, all at once."""
+        loads_change = self._loads.is_due(step)
+        if loads_change:
+            self.network, events = self._loads.apply(step)
+            self._events += events
+            self._circuits.change_loads(self.network)
+            self._islands.change_loads(self.network)
+        switched = step in self._switches.steps and self._operate(step)
+        if not loads_change:
+            return
+        if not switched:
+            self._dynamics.connect(self._circuits.of(self._switches.closed))
+            if self._tell_trips(step):
+                t, reduction = self._time(step), self._dynamics.network.reduction
+                self._events += self._islands.report(t, self._switches.closed, reduction)
+        self._load_limits = LoadLimits(self.network, self._dynamics.network.V_branch)
+
+    def _operate(self, step: int) -> bool:
+        """Operate the switches of this step, all at once, and find the islands again; return whether any moved."""
         t, before = self._time(step), self._switches.closed
         notes, warnings = self._closings.judge(step)
         self._events += warnings
         if not self._switches.due(step):
-            return
+            return False
         operated = self._switches.operate(step, notes)
         closed = self._switches.closed
         try:
@@ -293,23 +319,12 @@ class Plant:
             self._switches.closed = before
             names = ", ".join(event.subject for event in operated)
             self._events.append(PlantEvent(t=t, kind="warning", subject=names, text=f"{names} not operated: {error}"))
-            return
+            return False
         self._events += operated
         self._dynamics.connect(circuit)
         self._tell_trips(step)
         self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
-
-    def _change_loads(self, step: int) -> None:
-        """Take the powers of loads that people have set."""
-        t = self._time(step)
-        self.network, events = self._loads.apply(t)
-        self._events += events
-        self._circuits.change_loads(self.network)
-        self._islands.change_loads(self.network)
-        self._dynamics.connect(self._circuits.of(self._switches.closed))
-        self._load_limits = LoadLimits(self.network, self._dynamics.network.V_branch)
-        if self._tell_trips(step):
-            self._events += self._islands.report(t, self._switches.closed, self._dynamics.network.reduction)
+        return True
 
     def _settle(self, step: int, which: list[int]) -> None:
         """Read inverters again that were switched at a step, and report new islands."""

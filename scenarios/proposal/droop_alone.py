@@ -7,6 +7,7 @@ import numpy as np
 
 from plant.build import build_plant
 from plant.equipment import Feeder
+from plant.plant_config import PlantSettings
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
 from wire.messages import OFF
@@ -42,13 +43,14 @@ def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
         "its frequencies swing by 0.35 Hz, and do not calm down", or what tripped.
     """
     config, _ = configs(scenario, feeder, case)
-    early = FIRST - min((event.t for event in config.settings.events), default=FIRST)
-    events = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in config.settings.events)
-    plant = build_plant(
-        msgspec.structs.replace(config, settings=msgspec.structs.replace(config.settings, events=events))
-    )
+    settings = config.settings
+    early = FIRST - min(_times(settings), default=FIRST)
+    events = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in settings.events)
+    loads = tuple(msgspec.structs.replace(event, t=round(event.t + early, 9)) for event in settings.loads)
+    settings = msgspec.structs.replace(settings, events=events, loads=loads)
+    plant = build_plant(msgspec.structs.replace(config, settings=settings))
     forming = [row.name for row in feeder.inverters if row.kind == "GFM"]
-    last = max((event.t for event in events), default=FIRST)
+    last = max(_times(settings), default=FIRST)
     end, window = round((last + SETTLE) / config.T_c), round(WINDOW / config.T_c)
     found: list[list[float]] = []
     for _ in range(end):
@@ -63,3 +65,8 @@ def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
     if after < SWING or after < 0.5 * before:
         return ""
     return f"its frequencies swing by {after:.2g} Hz, and do not calm down"
+
+
+def _times(settings: PlantSettings) -> list[float]:
+    """Return when (s) switches are operated and loads change."""
+    return [*(event.t for event in settings.events), *(event.t for event in settings.loads)]

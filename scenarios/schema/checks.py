@@ -110,7 +110,7 @@ def check_cases(scenario: ScenarioModel, inverters: tuple[str, ...], problems: P
 def check_events(scenario: ScenarioModel, problems: Problems) -> None:
     """Note events that do nothing, and cases that name an event that there is not."""
     for i, event in enumerate(scenario.events):
-        keys = ("open", "close", "leave", "join", "P_max_kW")
+        keys = ("open", "close", "leave", "join", "P_max_kW", "load")
         if not any(getattr(event, key) for key in keys) and not problems.touch(*(f"event[{i}].{key}" for key in keys)):
             problems.add(
                 f"event[{i}]",

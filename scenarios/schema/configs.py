@@ -6,6 +6,7 @@ from agents.agent_config import MAX_AGE, AgentConfig, Control
 from plant.equipment import Feeder
 from plant.plant_config import FeederChanges, InverterChange, PlantConfig, PlantSettings, PowerLimit, SwitchEvent
 from plant.tables.feeder_changes import changed
+from scenarios.schema.load_changes import load_events
 from scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
 from scenarios.schema.participants import inverters_of, schedule_of, with_agent
 from scenarios.schema.plugin_keys import graph_of, law_of
@@ -72,6 +73,7 @@ def configs(
             events=_switch_events(scenario),
             sync_check=scenario.plant.sync_check,
             limits=limits_of(scenario, case),
+            loads=load_events(scenario),
             changes=changes_of(scenario),
             spares=tuple(row.name for row in inverters if row.spare),
         ),

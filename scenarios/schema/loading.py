@@ -25,6 +25,7 @@ from scenarios.schema.checks import (
 )
 from scenarios.schema.configs import as_in
 from scenarios.schema.gridlabd_checks import check_gridlabd
+from scenarios.schema.load_changes import check_loads
 from scenarios.schema.netem_tables import check_netem, with_delays
 from scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
 from scenarios.schema.plugin_keys import check_benchmark, check_graphs, check_laws, check_measures, with_folders
@@ -189,6 +190,7 @@ def check_tables(
         check_switches(scenario, feeder, problems)
         check_schedule(scenario, feeder, problems)
         check_limits(scenario, feeder, problems)
+        check_loads(scenario, feeder, problems)
         check_start(scenario, feeder, problems)
         check_supply(scenario, feeder, problems)
         check_gridlabd(scenario, feeder, problems)

@@ -72,7 +72,7 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note joins, leaves and methods of time stepping that other simulators lack, and wrong settings of HELICS."""
+    """Note joins, leaves, loads and methods of time stepping that other simulators lack, and wrong HELICS settings."""
     simulator = scenario.plant.simulator
     if scenario.time.method != "first-order" and simulator != "gridpeers":
         problems.add(
@@ -90,6 +90,11 @@ def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
                     f"event[{i}].{key}",
                     f'plant.simulator = "{simulator}" lets no inverter leave or join; use simulator = "gridpeers"',
                 )
+        if event.load and simulator != "gridpeers":
+            problems.add(
+                f"event[{i}].load",
+                f'plant.simulator = "{simulator}" keeps the loads of its own model; use simulator = "gridpeers"',
+            )
 
 
 def check_agentless(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:

@@ -13,6 +13,7 @@ import msgspec
 from agents.agent_config import DegradedCommunication, Gains, Secondary
 from netem.schema.netem import Netem
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.named_loads import FACTOR
 from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import Method, Protection, SyncCheck
@@ -125,6 +126,20 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant.sync_check]`: how far two islands may be apart when an event joins them `synchronised`."""
 
 
+class LoadChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """A load in the table `load` of an `[[event]]`: its power from then on, in all its phases in proportion.
+
+    It takes a factor, or one or both of P_kW and Q_kvar; of these the one that is left out stays as it is.
+    """
+
+    factor: Annotated[float | None, FACTOR] = None
+    """Factor on the real and the reactive power of the feeder's table; 1 is as in the beginning."""
+    P_kW: Annotated[float | None, Unit("kW")] = None
+    """Real power at nominal voltage (kW): from 0 to ten times all loads of the feeder."""
+    Q_kvar: Annotated[float | None, Unit("kvar")] = None
+    """Reactive power at nominal voltage (kvar), up to ten times all loads of the feeder."""
+
+
 class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """An entry of `[[event]]`: what happens at once. It opens a measuring window that lasts to the next one."""
 
@@ -146,6 +161,9 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
     P_max_kW: Annotated[dict[str, float], Example("{ inv2 = 275 }")] = {}
     """What grid-following inverters have available from then on (kW), e.g. { inv2 = 275 }; in the beginning it is
     P_max_pu of `[plant.gfl]`."""
+    load: Annotated[dict[str, LoadChange], Example("{ 48 = { factor = 1.5 } }")] = {}
+    """What loads take from then on, by the load's bus (its name in an imported feeder), e.g. { 48 = { factor = 1.5 },
+    65 = { P_kW = 0, Q_kvar = 0 } }; in a live run `gridpeers load 48 --factor 1.5` does the same."""
 
 
 class Case(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

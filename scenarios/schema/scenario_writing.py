@@ -56,7 +56,7 @@ def _lines(
         if value is None or default or common_too or NO_KEY in field.marks:
             continue
         if others := field.mark(OtherKeys):
-            keys += [f"{_key(key)} = {_inline(given)}" for key, given in map(others.write, value)]
+            keys += [f"{_key(key)} = {inline(given)}" for key, given in map(others.write, value)]
         elif INLINE in field.marks:
             inner, below = _lines(value, path, common)
             keys, tables = keys + inner, tables + below
@@ -65,11 +65,11 @@ def _lines(
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
             for item in value:
                 tables += ["", f"[[{where}]]", *_lines(item, where, common, entry=True)[0]]
-        elif isinstance(value, dict) and any(isinstance(item, msgspec.Struct) for item in value.values()):
+        elif isinstance(value, dict) and not entry and any(isinstance(it, msgspec.Struct) for it in value.values()):
             for name, item in value.items():
                 tables += _table(f"[{where}.{_key(name)}]", item, f"{where}.{_key(name)}", common)
         elif value or not isinstance(value, tuple | dict):
-            keys.append(f"{field.key} = {_inline(msgspec.to_builtins(value))}")
+            keys.append(f"{field.key} = {inline(msgspec.to_builtins(value))}")
     return keys, tables
 
 
@@ -83,12 +83,18 @@ def _key(name: str) -> str:
     return name if bare.isascii() and bare.isalnum() else _value(name)
 
 
-def _inline(value: Any) -> str:
-    """Write a value that may be a table or a list of them on one line."""
+def inline(value: Any) -> str:
+    """Write a value that may be a table or a list of them on one line.
+
+    Examples
+    --------
+    >>> inline({"48": {"factor": 1.5}, "a.b": [True, "c"]})
+    '{ 48 = { factor = 1.5 }, "a.b" = [true, "c"] }'
+    """
     if isinstance(value, dict):
-        return "{ " + ", ".join(f"{_key(key)} = {_inline(below)}" for key, below in value.items()) + " }"
+        return "{ " + ", ".join(f"{_key(key)} = {inline(below)}" for key, below in value.items()) + " }"
     if isinstance(value, tuple | list):
-        return "[" + ", ".join(map(_inline, value)) + "]"
+        return "[" + ", ".join(map(inline, value)) + "]"
     return _value(value)
 
 

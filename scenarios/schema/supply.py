@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from itertools import chain
 from typing import NamedTuple
 
 from plant.equipment import Feeder
 from plant.equipment.connectivity import Connectivity, Node
+from plant.equipment.named_loads import with_powers
+from scenarios.schema.load_changes import powers_after
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import Event, ScenarioModel
@@ -44,20 +47,22 @@ def check_supply(scenario: ScenarioModel, feeder: Feeder, problems: Problems) ->
 def supply_notes(scenario: ScenarioModel, feeder: Feeder) -> tuple[str, ...]:
     """Sentences on what each event of a checked scenario de-energises or overloads; it may be meant, so is no problem.
 
-    Switches and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where it is.
+    Switches, loads, and the leaving and joining of inverters decide. An agent that only dies leaves its inverter where
+    it is.
     """
     notes, rows = [], inverters_of(scenario, feeder)
-    for state in supply_states(scenario, feeder):
+    after = (with_powers(feeder, powers) if powers else feeder for _, powers in powers_after(scenario, feeder))
+    for state, loaded in zip(supply_states(scenario, feeder), chain([feeder], after), strict=True):
         event = state.event
         when = f'event "{event.label}" at {event.t_s:g} s' if event else "the start"
-        if event and (what := _what(state.new, state.inverters, feeder)):
+        if event and (what := _what(state.new, state.inverters, loaded)):
             notes.append(
                 f"{when} de-energises {what}: no substation and no grid-forming inverter is connected to them any more"
             )
         for part in state.islands:
             there = [row for row in rows if row.node in part]
             rated = sum(row.P_rated for row in there if row.name in state.inverters)
-            load = _load(part, feeder)
+            load = _load(part, loaded)
             if load > rated:
                 names = ", ".join(row.name for row in there if row.name in state.inverters)
                 notes.append(

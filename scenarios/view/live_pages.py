@@ -16,6 +16,7 @@ from scenarios.view.page_actions import ActionClient, PageAction, command_line
 from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json, texts
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
+from scenarios.view.scenario_form import scenario_form
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
@@ -112,6 +113,6 @@ class LivePages:
         if action.verb == "start":
             perform = lambda: self._agents.start(action.subject)  # noqa: E731
         try:
-            return {"ok": True, "command": command, "text": perform()}
+            return {"ok": True, "command": command, "text": perform(), "scenario": scenario_form(action)}
         except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
             return {"ok": False, "command": command, "text": str(error)}

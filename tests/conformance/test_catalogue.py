@@ -10,6 +10,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
 from scenarios.schema import Event, load_scenario
 from scenarios.schema.configs import configs
+from scenarios.schema.scenario_model import LoadChange
 from tests.toy.toy_runs import Rows, first_difference
 
 
@@ -18,9 +19,10 @@ from tests.toy.toy_runs import Rows, first_difference
     [("intermittency", "200kW"), ("unheard-switches", "frequency")],
 )
 def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str) -> None:
-    """Available power that changes, islands seen by frequency: the same history to the last bit."""
+    """Available power that changes, islands seen by frequency, another load: the same history to the last bit."""
     scenario, feeder = load_scenario(name)
     events: tuple[Event, ...] = tuple(replace(event, t_s=0.1 + 0.1 * i) for i, event in enumerate(scenario.events[:2]))
+    events += (Event(label="load", t_s=0.354, load={"48": LoadChange(factor=1.5), "65": LoadChange(P_kW=0.0)}),)
     short = replace(scenario, events=events, time=replace(scenario.time, end_s=0.6))
     plant, agents = configs(short, feeder, case, local_endpoint(0))
     rows: dict[str, Rows] = {"alone": [], "together": []}
@@ -29,5 +31,6 @@ def test_both_drivers_record_the_same_rows(tmp_path: Path, name: str, case: str)
 
     assert not alone.broke
     assert not together.broke
-    assert [event.kind for event in together.events] == [event.kind for event in alone.events]
+    assert together.events == alone.events
+    assert [event.subject for event in alone.events if event.kind == "load"] == ["48", "65"]
     assert first_difference(rows["alone"], rows["together"]) == ""

@@ -30,6 +30,10 @@ end_s = 1.0
 label = "islanding"
 t_s = 0.2
 open = ["13-152"]
+[[event]]
+label = "load"
+t_s = 0.6
+load = { 48 = { factor = 1.5 }, 65 = { P_kW = 0 } }
 [case.IV]
 secondary = "all"
 graph = "full"

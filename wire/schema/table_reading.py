@@ -14,6 +14,7 @@ from wire.schema.table_schema import (
     INHERITED,
     INLINE,
     NO_KEY,
+    Example,
     Field,
     OtherKeys,
     Problem,
@@ -172,7 +173,9 @@ class _Reader:
         if (inner := inner_struct(kind, dict)) is not None:
             if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
                 return {name: self.table(inner, item, f"{path}.{name}") for name, item in raw.items()}
-            self._add(path, f"must be written as tables [{path}.NAME], got {shown(raw)}")
+            example = field.mark(Example)
+            right = f"a table such as {example.text}" if example else f"written as tables [{path}.NAME]"
+            self._add(path, f"must be {right}, got {shown(raw)}")
             return {}
         try:
             value = msgspec.convert(raw, kind)

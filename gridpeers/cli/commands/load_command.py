@@ -28,7 +28,7 @@ def load(
     """Set a load of a running plant.
 
     It takes the power from the next step on, in all its phases in proportion; of --P and --Q the one that is left out
-    stays as it is.
+    stays as it is. In a scenario, load = { 48 = { factor = 1.5 } } in an [[event]] does the same at a time.
 
     Exit code: 0 it was done, 2 there is no such load, or the number makes no sense.
 

@@ -9,10 +9,11 @@ from typing import Annotated
 import numpy as np
 
 from plant.equipment import Feeder
+from plant.equipment.load_powers import set_power
 from plant.plant_config import PlantSettings
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow
+from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
 from wire.schema.plausible import Plausible, Unit
 
 _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
@@ -22,8 +23,9 @@ _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = 
 class PowerBalance:
     """In each island, generation is load plus losses: the power flow of the feeder's tables has the recorded powers.
 
-    The rows are those in the middle and at the end of each window, up to the first change of a load by hand. A row with
-    the substation cannot be judged: the record does not have the substation's power.
+    The rows are those in the middle and at the end of each window. A load that was set, by the scenario or by hand, has
+    the power that its event says. A row with the substation cannot be judged: the record does not have the substation's
+    power.
     """
 
     tolerance_percent: Annotated[float, Unit("%"), Plausible("a tolerance", 1e-6, 100.0, above_zero=True)] = 0.5
@@ -36,7 +38,7 @@ class PowerBalance:
         for row in _rows(case):
             try:
                 balances = flows.balances(
-                    _closed_at(case, float(history.t[row])),
+                    _state_at(case, float(history.t[row])),
                     history.P[row],
                     history.Q[row],
                     history.V[row],
@@ -89,10 +91,20 @@ def _rows(case: CheckedCase) -> list[int]:
     for window in case.windows:
         inside = np.flatnonzero(window.rows(t))
         found += [int(inside[inside.size // 2]), int(inside[-1])] if inside.size else []
-    changed = min((event.t for event in case.events if event.kind == "load"), default=inf)
-    if changed < inf and not any(t[row] <= changed for row in found):
-        raise NotJudgedError("loads were changed in the run, and are no longer those of the feeder's tables")
-    return [row for row in found if t[row] <= changed] or [len(t) - 1]
+    untold = min((e.t for e in case.events if e.kind == "load" and set_power(e.text) is None), default=inf)
+    if untold < inf and not any(t[row] <= untold for row in found):
+        raise NotJudgedError("loads were changed in the run, and its events do not say to which power")
+    return [row for row in found if t[row] <= untold] or [len(t) - 1]
+
+
+def _state_at(case: CheckedCase, t: float) -> NetworkState:
+    """Return switches and loads at a time (s), by the plant's events; a load takes its power after its event."""
+    powers = {
+        event.subject: S
+        for event in case.events
+        if event.kind == "load" and event.t < t - 1e-9 and (S := set_power(event.text)) is not None
+    }
+    return NetworkState(_closed_at(case, t), frozenset(powers.items()))
 
 
 def _closed_at(case: CheckedCase, t: float) -> frozenset[str]:

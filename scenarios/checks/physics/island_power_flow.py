@@ -1,13 +1,13 @@
 """The power flow of islands from what a row of a run says of their inverters: what loads and losses take.
 
 A row has P, Q and V of every inverter. One grid-forming inverter of each island keeps its internal voltage here, the
-others deliver their recorded P and Q, and the feeder's tables say what its lines and loads take. What is left for the
-one inverter is generation as it should be; the row says what it was.
+others deliver their recorded P and Q, and the feeder's tables say what its lines and loads take, but for loads that
+were set in the run. What is left for the one inverter is generation as it should be; the row says what it was.
 """
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from plant.dynamics.inverters import Inverters
 from plant.dynamics.phasors import PHASES
 from plant.dynamics.start.power_flow import PowerFlow
 from plant.equipment import Feeder
+from plant.equipment.named_loads import with_powers
 from plant.feeder.circuits import circuit_of
 from plant.feeder.installed_inverters import installed_inverters
 from plant.network import Network
@@ -24,6 +25,21 @@ from scenarios.results.history import Flags, Floats
 
 MOST_NODES = 1500
 """Nodes above which a feeder takes seconds."""
+
+KEPT = 32
+"""Number of factored networks to keep: loads of a long run may change hundreds of times."""
+
+Key = TypeVar("Key")
+Value = TypeVar("Value")
+
+
+class NetworkState(NamedTuple):
+    """Switches and loads of a feeder at a time of a run."""
+
+    closed: frozenset[str]
+    """Names of the closed switches."""
+    powers: frozenset[tuple[str, complex]] = frozenset()
+    """Loads that have another power at nominal voltage (VA) than in the tables, by name."""
 
 
 class IslandBalance(NamedTuple):
@@ -55,17 +71,16 @@ class IslandPowerFlow:
         self.network = Network(feeder, spares=spares)
         self._at = [names.index(unit.name) for unit in self.network.inverters]
         self._units = installed_inverters(self.network, settings)
-        self._loads = self.network.loads()
-        self._circuits: dict[frozenset[str], Circuit] = {}
-        self._flows: dict[tuple[frozenset[str], bytes], tuple[PowerFlow, Inverters]] = {}
+        self._circuits: dict[NetworkState, Circuit] = {}
+        self._flows: dict[tuple[NetworkState, bytes], tuple[PowerFlow, Inverters]] = {}
 
-    def balances(self, closed: frozenset[str], P: Floats, Q: Floats, V: Floats, present: Flags) -> list[IslandBalance]:
+    def balances(self, state: NetworkState, P: Floats, Q: Floats, V: Floats, present: Flags) -> list[IslandBalance]:
         """Return the balance of each island without the substation that has a three-phase grid-forming inverter.
 
         Parameters
         ----------
-        closed
-            Names of the closed switches.
+        state
+            Closed switches, and loads with another power than that of the tables.
         P, Q, V, present
             The row: powers (W, var), terminal voltages (V), and which inverters are on the network.
 
@@ -75,7 +90,7 @@ class IslandPowerFlow:
             If no state of the network has these powers (`plant.dynamics.PlantError`).
         """
         P, Q, V, online = P[self._at], Q[self._at], V[self._at], present[self._at]
-        flow, units = self._flow(closed, online)
+        flow, units = self._flow(state, online)
         reduction = flow.reduction
         swings = [
             int(of[0])
@@ -108,11 +123,22 @@ class IslandPowerFlow:
         whole: Flags = units.forming & ~units.single & online
         return whole
 
-    def _flow(self, closed: frozenset[str], online: Flags) -> tuple[PowerFlow, Inverters]:
-        key = closed, online.tobytes()
+    def _flow(self, state: NetworkState, online: Flags) -> tuple[PowerFlow, Inverters]:
+        key = state, online.tobytes()
         if key not in self._flows:
-            if closed not in self._circuits:
-                self._circuits[closed] = circuit_of(self.network, closed, self._loads)
+            if state not in self._circuits:
+                _make_room(self._circuits)
+                network = self.network
+                if state.powers:
+                    network = network.with_loads(with_powers(network.feeder, dict(state.powers)))
+                self._circuits[state] = circuit_of(network, state.closed, network.loads())
+            _make_room(self._flows)
             units = Inverters(self._units, online.tolist())
-            self._flows[key] = PowerFlow(self._circuits[closed], units, np.zeros(len(units), bool)), units
+            self._flows[key] = PowerFlow(self._circuits[state], units, np.zeros(len(units), bool)), units
         return self._flows[key]
+
+
+def _make_room(kept: dict[Key, Value]) -> None:
+    """Drop the oldest entry if there are too many."""
+    if len(kept) == KEPT:
+        del kept[next(iter(kept))]

@@ -12,6 +12,7 @@ import msgspec
 
 from plant.equipment import Feeder
 from plant.equipment.bus_islands import switch_name
+from plant.equipment.named_loads import load_name, named_loads
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
 from scenarios.live.show.snapshot import line_of
@@ -122,14 +123,18 @@ def compare(
 def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
     """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
     planned = [
-        (event.t_s, switch_name(feeder, name)) for event in scenario.events for name in (*event.open, *event.close)
+        ("switch", event.t_s, switch_name(feeder, name))
+        for event in scenario.events
+        for name in (*event.open, *event.close)
     ]
+    loads = named_loads(feeder)
+    planned += [("load", event.t_s, load_name(loads, text)) for event in scenario.events for text in event.load]
     for event in events:
-        if event.kind == "load":  # no scenario sets one
-            yield event
-        if event.kind != "switch" or event.text.endswith(" already"):
+        if event.kind not in ("switch", "load") or event.text.endswith(" already"):
             continue
-        if not any(abs(event.t - t) < NEAR and event.subject == name for t, name in planned):
+        if not any(
+            event.kind == kind and abs(event.t - t) < NEAR and event.subject == name for kind, t, name in planned
+        ):
             yield event
 
 

@@ -12,7 +12,7 @@ from scenarios.results.island_membership import IslandInterval, island_intervals
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import limits_of
 from scenarios.schema.participants import inverters_of, without_agent
-from scenarios.schema.scenario_model import Event
+from scenarios.schema.scenario_model import Event, LoadChange
 from scenarios.short_names import in_order, short
 
 
@@ -110,4 +110,22 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
     if limits:
         names, powers = short(in_order({limit.inverter for limit in limits})), {limit.P_max for limit in limits}
         parts += [f"{names}: {powers.pop() / 1e3:g} kW" if len(powers) == 1 else f"{names}: P_max by case"]
+    if event.load:
+        changes = {_power_in_short(change) for change in event.load.values()}
+        names = f"load {next(iter(event.load))}" if len(event.load) == 1 else f"{len(event.load)} loads"
+        parts += [f"{names}: {changes.pop()}" if len(changes) == 1 else f"{names} change"]
     return ", ".join(parts)
+
+
+def _power_in_short(change: LoadChange) -> str:
+    """Return a load's new power in two words.
+
+    Examples
+    --------
+    >>> _power_in_short(LoadChange(factor=1.5)), _power_in_short(LoadChange(P_kW=300, Q_kvar=90))
+    ('1.5 times', '300 kW, 90 kvar')
+    """
+    if change.factor is not None:
+        return f"{change.factor:g} times"
+    given = ((change.P_kW, "kW"), (change.Q_kvar, "kvar"))
+    return ", ".join(f"{value:g} {unit}" for value, unit in given if value is not None)

@@ -238,7 +238,9 @@ function done(result) {
   if (key && !(result.ok && (verb === "stop" || verb === "start"))) S.pending.delete(key);
   const line = document.createElement("li"), text = document.createElement("span");
   if (result.command) { const code = document.createElement("code"); code.textContent = result.command; line.append(code); }
-  text.textContent = result.text; line.append(text); line.className = result.ok ? "" : "bad"; $("command-list").prepend(line);
+  text.textContent = result.text; line.append(text);
+  if (result.scenario) { const form = document.createElement("details"), head = document.createElement("summary"), entry = document.createElement("pre"); head.textContent = "in a scenario"; entry.textContent = result.scenario; form.append(head, entry); line.append(form); }
+  line.className = result.ok ? "" : "bad"; $("command-list").prepend(line);
   while ($("command-list").children.length > 100) $("command-list").lastChild.remove();
   render();
 }

@@ -130,6 +130,7 @@ def test_a_click_on_a_load_sets_it(desk: Desk, browser: Browser) -> None:
     page.wait_for_selector("#event-list :text('load 48 set to 315 kW')")
     options = " ".join(desk.options)
     assert page.locator("#command-list code").first.inner_text() == f"gridpeers load 48 --factor 1.5 {options}"
+    assert page.locator("#command-list pre").first.text_content() == "[[event]]\nload = { 48 = { factor = 1.5 } }"
     assert "Loads set: 48 (315 kW, 225 kvar)." in other.locator("#diagram-text").inner_text()
 
     page.get_by_label("load", exact=True).select_option("48")

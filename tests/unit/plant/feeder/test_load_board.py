@@ -1,25 +1,29 @@
-"""Loads that people set while a run goes on: what the plant then has, and what it refuses."""
+"""Loads that people set while a run goes on, or a scenario: what the plant then has, and what it refuses."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from plant.dynamics import live_network
+from plant.equipment.load_powers import set_power
 from plant.equipment.named_loads import named_loads, with_powers
 from plant.feeder import Plant
 from plant.feeder.load_board import LoadBoard
 from plant.network import Network
-from plant.plant_config import PlantSettings, SwitchEvent
+from plant.plant_config import LoadEvent, PlantSettings, SwitchEvent
 from plant.tables import read_feeder
 from wire.messages import LoadSetting
 
 T_C = 0.02
 
 
-def plant(feeder: str = "microgrid123", *events: SwitchEvent) -> Plant:
+def plant(feeder: str = "microgrid123", *events: SwitchEvent, loads: tuple[LoadEvent, ...] = ()) -> Plant:
     """A plant of ours."""
-    return Plant(Network(read_feeder(feeder)), PlantSettings(feeder=feeder, events=events), T_C, T_C)
+    return Plant(Network(read_feeder(feeder)), PlantSettings(feeder=feeder, events=events, loads=loads), T_C, T_C)
 
 
 def total(p: Plant) -> float:
@@ -67,10 +71,10 @@ def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
     first = Network(read_feeder("microgrid123"))
     board = LoadBoard(first)
     board.put("48", LoadSetting(P=0.0, Q=0.0))
-    off, _ = board.apply(0.1)
-    assert not board.waits
+    off, _ = board.apply(1)
+    assert not board.is_due(1)
     board.put("48", LoadSetting(factor=1.0))
-    again, (event,) = board.apply(0.2)
+    again, (event,) = board.apply(2)
 
     assert event.text == "load 48 set to 210 kW and 150 kvar at nominal voltage, as in its table"
     assert board.changed == {}
@@ -103,7 +107,7 @@ def test_what_is_left_out_stays() -> None:
 
     assert board.put("48", LoadSetting(Q=60e3)).startswith("load 48: 210 kW and 60 kvar")
     assert board.put("48", LoadSetting(P=300e3)).startswith("load 48: 300 kW and 60 kvar at nominal voltage")
-    board.apply(0.0)
+    board.apply(0)
     assert board.put("48", LoadSetting(P=100e3)).startswith("load 48: 100 kW and 60 kvar")
 
 
@@ -126,7 +130,113 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(name: str, setting: 
 
     with pytest.raises(ValueError, match=said):
         board.put(name, setting)
-    assert not board.waits
+    assert not board.is_due(0)
+
+
+def every_load(t: float, factor: float) -> tuple[LoadEvent, ...]:
+    """A change of all loads of microgrid123."""
+    names = named_loads(read_feeder("microgrid123"))
+    return tuple(LoadEvent(t=t, load=name, setting=LoadSetting(factor=factor)) for name in names)
+
+
+def kinds(p: Plant) -> set[str]:
+    """Kinds of all events since the last call."""
+    return {event.kind for event in p.take_events()}
+
+
+def test_a_scheduled_change_is_the_one_that_a_person_makes() -> None:
+    """The same rows to the last bit, and the same event."""
+    changes = {"48": LoadSetting(factor=1.5), "65": LoadSetting(P=0.0, Q=0.0)}
+    scheduled = plant(
+        "microgrid123",
+        ISLANDED,
+        loads=tuple(LoadEvent(t=0.1, load=name, setting=setting) for name, setting in changes.items()),
+    )
+    by_hand = plant("microgrid123", ISLANDED)
+    run(scheduled, 0.3)
+    run(by_hand, 0.1)
+    for name, setting in changes.items():
+        by_hand.set_load(name, setting)
+    run(by_hand, 0.2)
+
+    assert scheduled.take_rows() == by_hand.take_rows()
+    events = scheduled.take_events()
+    assert events == by_hand.take_events()
+    assert [(event.t, event.subject) for event in events if event.kind == "load"] == [(0.1, "48"), (0.1, "65")]
+    assert scheduled.loads == by_hand.loads
+
+
+def test_a_change_between_two_ticks_comes_at_its_step() -> None:
+    """The schedule of loads has the grid of the plant's step, as that of switches has."""
+    p = plant(loads=(LoadEvent(t=0.026, load="48", setting=LoadSetting(factor=2.0)),))
+    run(p, 0.02)
+    assert not p.loads
+    run(p, 0.02)
+
+    (told,) = [event for event in p.take_events() if event.kind == "load"]
+    assert told.t == pytest.approx(0.026)
+
+
+def test_switches_and_loads_of_one_step_change_at_once() -> None:
+    """The island takes the loads that it has then, and never those of before, which it could not feed."""
+    heavy, light = every_load(0.04, 2.5), every_load(0.1, 1.0)
+    opening = SwitchEvent(t=0.1, switch="13-152", action="open")
+    together = plant("microgrid123", opening, loads=(*heavy, *light))
+    late = plant("microgrid123", opening, loads=(*heavy, *every_load(0.102, 1.0)))
+    for p in (together, late):
+        run(p, 0.12)
+
+    assert "trip" not in kinds(together)
+    assert "trip" in kinds(late)
+
+
+def test_networks_of_scheduled_loads_are_factored_before_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In wall-clock time an event must not make its step late."""
+    factored: list[int] = []
+    real = live_network.reduce_network
+
+    def counted(*arguments: Any) -> Any:
+        factored.append(p.tick)
+        return real(*arguments)
+
+    p = plant("microgrid123", ISLANDED, loads=(*every_load(0.04, 0.9), *every_load(0.08, 1.0)))
+    monkeypatch.setattr(live_network, "reduce_network", counted)
+    run(p, 0.1)
+    assert factored == []
+    p.set_load("48", LoadSetting(factor=2.0))
+    run(p, 0.02)
+    assert factored == [5]
+
+
+def test_the_schedule_comes_after_the_hand() -> None:
+    """Of a load that both set at one moment, the power is that of the scenario."""
+    p = plant(loads=(LoadEvent(t=0.02, load="48", setting=LoadSetting(factor=0.5)),))
+    run(p, 0.02)
+    p.set_load("48", LoadSetting(factor=2.0))
+    p.set_load("65", LoadSetting(factor=2.0))
+    run(p, 0.02)
+
+    loads = named_loads(read_feeder("microgrid123"))
+    assert p.loads == {"48": 0.5 * loads["48"].S, "65": 2.0 * loads["65"].S}
+
+
+def test_a_schedule_that_makes_no_sense_is_refused_at_the_start() -> None:
+    """Whoever writes settings in Python hears of it before the run, and not when the event comes."""
+    with pytest.raises(ValueError, match='load "4800": no such load'):
+        plant(loads=(LoadEvent(t=0.02, load="4800", setting=LoadSetting(factor=0.5)),))
+    with pytest.raises(ValueError, match="load 48: the real power of a load must not be negative"):
+        plant(loads=(LoadEvent(t=0.02, load="48", setting=LoadSetting(P=-1.0)),))
+
+
+def test_events_say_the_power_that_was_set() -> None:
+    """Checks take the power of a load from the plant's event, to its six digits."""
+    board = LoadBoard(Network(read_feeder("microgrid123")))
+    for S in (complex(123_456.7, -65_432.1), 0j):
+        board.put("48", LoadSetting(P=S.real, Q=S.imag))
+        _, (event,) = board.apply(0)
+
+        assert set_power(event.text) == pytest.approx(S, rel=1e-5)
+    assert set_power("load 48 set") is None
 
 
 def test_all_models_of_load_are_scaled(network: Network) -> None:

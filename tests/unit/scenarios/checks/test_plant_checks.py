@@ -224,8 +224,8 @@ def test_windows_that_are_too_short_are_not_judged(sound: CheckedCase, check: st
     assert verdict(sound, check, **{limit: 20.0}).status == "not judged"
 
 
-def test_a_load_that_was_changed_by_hand_ends_the_balance(sound: CheckedCase) -> None:
-    """The feeder's tables do not say what such a load takes: rows from then on are not judged."""
+def test_a_load_whose_new_power_is_not_told_ends_the_balance(sound: CheckedCase) -> None:
+    """Nobody knows what such a load takes: rows from then on are not judged."""
 
     def fault(of: Arrays) -> None:
         of["P"][of["t"] > 5.0, 1] *= 1.1

@@ -24,7 +24,7 @@ from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
 from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.configs import configs
-from scenarios.schema.scenario_model import Event
+from scenarios.schema.scenario_model import Event, LoadChange
 from wire.messages import PlantEvent
 
 
@@ -84,6 +84,18 @@ def test_what_the_scenario_does_not_tell_is_found(
     assert tuple(window.label for window in compared.disturbed) == disturbed
     assert len(lines) == len(said)
     assert all(words in line for words, line in zip(said, lines, strict=True))
+
+
+def test_a_load_that_the_scenario_sets_is_none_of_the_people() -> None:
+    """At its time, by its bus; the same load at another time, and another one then, are of people."""
+    scenario, feeder = one_case("islanding")
+    event = Event(label="load", t_s=5.0, load={"48": LoadChange(factor=1.5)})
+    planned = msgspec.structs.replace(scenario, events=(*scenario.events, event))
+    mine = told("load", 5.0, "48", "load 48 set to 315 kW")
+    later, other = msgspec.structs.replace(mine, t=5.5), msgspec.structs.replace(mine, subject="65")
+
+    assert compare(planned, feeder, [mine], 9.0).events == ()
+    assert compare(planned, feeder, [mine, other, later], 9.0).events == (other, later)
 
 
 def test_a_death_that_the_scenario_tells_of_is_none_of_the_people() -> None:
