@@ -27,11 +27,12 @@ from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
+from scenarios.results.broken_folder import broken_if_ended
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
 from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.run_files import no_room, refusal, set_broken, set_complete, shown, write_whole
+from scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugin_keys import checks_of, claims_of
@@ -63,10 +64,6 @@ _AFTER_RUN = (
 then."""
 
 _VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
-
-
-class TerminatedError(KeyboardInterrupt):
-    """Somebody ended the command by SIGTERM; it closes as after Ctrl-C."""
 
 
 class BrokenRunError(RuntimeError):
@@ -101,19 +98,11 @@ def run(request: Request, progress: Progress) -> RunReport:
         If a case broke. What came until then stays in the folder, and `status.txt` tells that it is not whole.
     """
     request = dataclasses.replace(request, folder=request.folder.absolute())  # a law or metric may go elsewhere
-    try:
-        return _logged(request, progress)
-    except KeyboardInterrupt as error:
-        by = "by SIGTERM" if isinstance(error, TerminatedError) else "from the keyboard"
-        set_broken(request.folder, f"interrupted {by}")
-        raise
-    except (BrokenRunError, OutputLostError) as error:
-        set_broken(request.folder, str(error))
-        raise
-    except OSError as error:  # there was no room for anything, not even for the log
-        text = refusal(request.folder, error)
-        set_broken(request.folder, text)
-        raise BrokenRunError(text) from error
+    with broken_if_ended(request.folder):
+        try:
+            return _logged(request, progress)
+        except OSError as error:  # there was no room for anything, not even for the log
+            raise BrokenRunError(refusal(request.folder, error)) from error
 
 
 def _logged(request: Request, progress: Progress) -> RunReport:

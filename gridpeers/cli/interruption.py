@@ -6,8 +6,8 @@ import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from gridpeers.cli.usage import INTERRUPTED, TERMINATED
-from scenarios.run import TerminatedError
+from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
+from scenarios.results.broken_folder import TerminatedError
 
 
 @contextmanager
@@ -31,3 +31,13 @@ def interruptible() -> Iterator[None]:
 def exit_code(error: KeyboardInterrupt) -> int:
     """Return the exit code of a command that a signal ended."""
     return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
+
+
+@contextmanager
+def ended_by_signals(left: str) -> Iterator[None]:
+    """Do the work of a command; a signal ends it with its exit code, and a line on what is left of the work."""
+    try:
+        with interruptible():
+            yield
+    except KeyboardInterrupt as error:
+        fail([f"interrupted; {left}"], exit_code(error))

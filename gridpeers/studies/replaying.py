@@ -17,7 +17,7 @@ from gridpeers.runs.showing import shown_in_notebooks
 from gridpeers.studies.comparison import Comparison
 from gridpeers.values import plain
 from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changes import Changes
+from scenarios.replay.changes import ChangedRule, Changes, changed_rule
 from scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
 from scenarios.replay.replay import Replay
 from scenarios.replay.replay import replay as replay_record
@@ -108,17 +108,18 @@ def counterfactual(
         )
     except (ValueError, TypeError) as error:
         raise ReplayError(f"a change cannot be read: {error}") from None
+    rule = changed_rule(record, changes)
     home = _temporary() if folder is None else new_home(folder)
-    return counterfactual_in(record, changes, home, temporary=folder is None)
+    return counterfactual_in(record, rule, home, temporary=folder is None)
 
 
 def counterfactual_in(
-    record: RunRecord, changes: Changes, folder: Path, *, temporary: bool = False, tell: Progress | None = None
+    record: RunRecord, rule: ChangedRule, folder: Path, *, temporary: bool = False, tell: Progress | None = None
 ) -> Counterfactual:
     """Run a counterfactual into an empty folder, which goes with it if it is temporary; see `counterfactual`."""
     would_be, was = RunFolder(folder, temporary=temporary), RunFolder(_temporary(), temporary=True)
-    done = run_counterfactual(record, changes, was.path, would_be.path, tell=tell)
-    return Counterfactual(was, would_be, changes, done)
+    done = run_counterfactual(record, rule, was.path, would_be.path, tell=tell)
+    return Counterfactual(was, would_be, rule.changes, done)
 
 
 def _temporary() -> Path:

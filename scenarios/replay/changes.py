@@ -21,6 +21,7 @@ from plant.equipment import Feeder
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.changed_scenario import with_links, with_title
+from scenarios.replay.recorded_process import require_arrivals
 from scenarios.replay.replay_error import ReplayError
 from scenarios.schema.configs import configs
 from scenarios.schema.loading import check_tables
@@ -105,8 +106,10 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     Raises
     ------
     ReplayError
-        If a link, a law, a key or a value is wrong, or the time is outside of the record.
+        If it cannot be run again, a link, a law, a key or a value is wrong, or the time is outside of the record.
     """
+    require_arrivals(record)
+    _require_own_plant(record)
     before, feeder = _checked(record, _tables(record), frozenset())
     case = record.info.case
     wrong = _wrong(record, changes, feeder)
@@ -147,6 +150,15 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
 
 
 # -------------------------------------------------------------------- the scenario
+
+
+def _require_own_plant(record: RunRecord) -> None:
+    simulator, bridged = record.info.plant.settings.simulator, record.info.plant.bridged
+    if simulator != "gridpeers" or bridged:
+        raise ReplayError(
+            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be closed "
+            "into a loop again; what would have been needs our own plant"
+        )
 
 
 def _tables(record: RunRecord) -> Tree:

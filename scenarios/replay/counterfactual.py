@@ -15,17 +15,17 @@ from scenarios.live.live_folders import LIVE
 from scenarios.live.numbers.live_report import write_report
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.changed_scenario import unwritten
-from scenarios.replay.changes import ChangedRule, Changes, changed_rule
+from scenarios.replay.changes import ChangedRule
 from scenarios.replay.closed_loop import ClosedLoop
 from scenarios.replay.difference import Difference
 from scenarios.replay.no_difference import no_difference
-from scenarios.replay.recorded_process import require_arrivals
 from scenarios.replay.replay import ComparedRows
 from scenarios.replay.replay_error import ReplayError
 from scenarios.replay.replayed_process import MakePlant, start_plant_of
+from scenarios.results.broken_folder import broken_if_ended
 from scenarios.results.metrics_file import RunMetrics
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.run_files import set_broken, set_status, write_whole
+from scenarios.results.run_files import set_status, write_whole
 from scenarios.run import Progress, versions
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
@@ -48,7 +48,7 @@ class CounterfactualRun:
 
 def run_counterfactual(
     record: RunRecord,
-    changes: Changes,
+    rule: ChangedRule,
     was: Path,
     would_be: Path,
     make_plant: MakePlant = start_plant,
@@ -60,8 +60,8 @@ def run_counterfactual(
     ----------
     record : RunRecord
         The run, of any driver.
-    changes : Changes
-        What is changed, and from when on.
+    rule : ChangedRule
+        The run under changes, as `changed_rule` gives it.
     was, would_be : Path
         Empty folders: for what was, without figures, and for what would have been.
     make_plant : MakePlant, optional
@@ -72,44 +72,41 @@ def run_counterfactual(
     Raises
     ------
     ReplayError
-        If the record cannot be replayed, or a change is wrong.
+        If the record cannot be replayed.
     RecordFileError
         If the record cannot be read.
     """
-    require_arrivals(record)
-    simulator = record.info.plant.settings.simulator
-    if simulator != "gridpeers" or record.info.plant.bridged:
-        raise ReplayError(
-            f"{record.path}: its plant was {'a federate' if record.info.plant.bridged else f'that of {simulator}'}, "
-            "which cannot be closed into a loop again; what would have been needs our own plant"
-        )
-    rule = changed_rule(record, changes)
+    with broken_if_ended(would_be):
+        try:
+            return _both(record, rule, was, would_be, make_plant, tell)
+        except RecordError as error:
+            raise ReplayError(f"{record.path}: {error}") from None
+
+
+def _both(
+    record: RunRecord, rule: ChangedRule, was: Path, would_be: Path, make_plant: MakePlant, tell: Progress | None
+) -> CounterfactualRun:
+    """Run the record under the rule; write what was and what would have been."""
+    changes = rule.changes
     rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
     run = _in_ticks if record.info.clock == "simulated" else _live
-    try:
-        with Recorder(would_be / rule.case, gaps=True) as recorder:
+    with Recorder(would_be / rule.case, gaps=True) as recorder:
 
-            def take(message: Telemetry | LinkReport) -> None:
-                rows.take(message)
-                effect.take(message)
-                recorder(message)
-                if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
-                    tell(rule.case, message.rows[-1][0], record.t_end)
+        def take(message: Telemetry | LinkReport) -> None:
+            rows.take(message)
+            effect.take(message)
+            recorder(message)
+            if tell is not None and isinstance(message, Telemetry) and message.rows and message.rows[-1][0] > 0.0:
+                tell(rule.case, message.rows[-1][0], record.t_end)
 
-            if tell is not None:
-                tell(rule.case, 0.0, record.t_end)
-            notes = run(record, rule, take, make_plant)
-            recorded = recorder.finish(recorder.ended, recorder.record_step)
-        if changes and effect.difference is None:
-            notes = [*notes, no_difference(record, rule, effect.t)]
-        _write(record, rule, rule.scenario, would_be, recorded, would_be=True)
-        _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), would_be=False)
-    except RecordError as error:
-        set_broken(would_be, str(error))
-        raise ReplayError(f"{record.path}: {error}") from None
-    except ReplayError as error:
-        set_broken(would_be, str(error))
-        raise
+        if tell is not None:
+            tell(rule.case, 0.0, record.t_end)
+        notes = run(record, rule, take, make_plant)
+        recorded = recorder.finish(recorder.ended, recorder.record_step)
+    if changes and effect.difference is None:
+        notes = [*notes, no_difference(record, rule, effect.t)]
+    _write(record, rule, rule.scenario, would_be, recorded, would_be=True)
+    _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), would_be=False)
     return CounterfactualRun(difference=rows.difference, compared=rows.count, t_end=recorded.ended, notes=tuple(notes))
 
 

@@ -49,46 +49,36 @@ def replay(
     is closed on our plant from then on. docs/replay.md explains both.
 
     Exit code: 0 all is the same, or what would have been is written, 1 something differs from the record, 2 bad usage,
-    no record, or nothing in it to be replayed.
+    no record, or nothing in it to be replayed, 130 Ctrl-C, 143 SIGTERM.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """
     require({"mcap": "the record of a run", "numba": "the plant"})
 
+    from gridpeers.cli.interruption import ended_by_signals
     from scenarios.record.record_reader import RecordFileError, RunRecord
     from scenarios.replay.changes import Changes
     from scenarios.replay.replay_error import ReplayError
     from scenarios.results.run_files import FolderError, refusal
 
-    try:
-        record = RunRecord.open(run / case if case else run)
-        changes = Changes(
-            without=tuple(without or ()),
-            without_loss=without_loss,
-            without_link_commands=without_link_commands,
-            law=law,
-            keys=dict(map(_key_and_value, values or ())),
-            since=since,
-        )
-        if changes:
-            differs = _counterfactual(record, changes, out)
-        else:
-            if since:
-                fail([f"--from {since:g}: nothing is changed from then on; give --without, --law or --set"], BAD_INPUT)
-            if out is not None:
-                text = "a replay without a change writes no folder; leave it out, or give --without, --law or --set"
-                fail([f"--out {out}: {text}"], BAD_INPUT)
-            from gridpeers.cli.progress import explained_work
-
-            span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
-            with explained_work(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
-                differs = _replay(record)
-    except ReplayError as error:
-        fail(list(error.problems), BAD_INPUT)
-    except (RecordFileError, FolderError) as error:
-        fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        fail([refusal(out or Path("runs"), error)], BAD_INPUT)
+    with ended_by_signals("nothing was written"):
+        try:
+            record = RunRecord.open(run / case if case else run)
+            changes = Changes(
+                without=tuple(without or ()),
+                without_loss=without_loss,
+                without_link_commands=without_link_commands,
+                law=law,
+                keys=dict(map(_key_and_value, values or ())),
+                since=since,
+            )
+            differs = _counterfactual(record, changes, out) if changes else _replay(record, since, out)
+        except ReplayError as error:
+            fail(list(error.problems), BAD_INPUT)
+        except (RecordFileError, FolderError) as error:
+            fail([str(error)], BAD_INPUT)
+        except OSError as error:
+            fail([refusal(out or Path("runs"), error)], BAD_INPUT)
     for damage in record.damage:
         typer.echo(f"NOTE  {damage}")
     if differs:
@@ -106,12 +96,21 @@ def _key_and_value(text: str) -> tuple[str, Any]:
         return key.strip(), value.strip()
 
 
-def _replay(record: RunRecord) -> bool:
+def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
     """Replay a record and print what came of it; return whether something differs."""
+    if since:
+        fail([f"--from {since:g}: nothing is changed from then on; give --without, --law or --set"], BAD_INPUT)
+    if out is not None:
+        text = "a replay without a change writes no folder; leave it out, or give --without, --law or --set"
+        fail([f"--out {out}: {text}"], BAD_INPUT)
+
+    from gridpeers.cli.progress import explained_work
     from scenarios.replay.replay import replay as replay_record
 
     typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
-    done = replay_record(record)
+    span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
+    with explained_work(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
+        done = replay_record(record)
     for part in done.parts:
         of = "rows" if part.name == "plant" else "states"
         verdict = f"then {part.difference}" if part.difference else "the same" if part.count else "nothing to compare"
@@ -135,21 +134,24 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from rich.console import Console
 
+    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.studies.replaying import counterfactual_in
     from scenarios.replay.changes import changed_rule
+    from scenarios.results.broken_folder import broken_if_ended
     from scenarios.results.plots.style import save
     from scenarios.results.run_files import new_folder, shown, write_whole
 
-    changed_rule(record, changes)  # whatever is wrong is told before a folder is made
+    rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
 
     typer.echo(f"{_about(record)}: {changes}")
     folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
-    with progress(Console(), (record.info.case,)) as tell:
-        done = counterfactual_in(record, changes, folder, tell=tell)
-    typer.echo(str(done))
-    write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
-    (figure,) = save(done.plot(), folder / "plots", "counterfactual")
+    with ended_by_signals(f"what came until then is in {shown(folder)}/"), broken_if_ended(folder):
+        with progress(Console(), (record.info.case,)) as tell:
+            done = counterfactual_in(record, rule, folder, tell=tell)
+        typer.echo(str(done))
+        write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
+        (figure,) = save(done.plot(), folder / "plots", "counterfactual")
     for note in done.notes:
         typer.echo(f"NOTE  {note}")
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")

@@ -166,7 +166,7 @@ def carry_out(
 
     from rich.console import Console
 
-    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import COMPILING, RESTING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.file_sizes import file_sizes, require_room
@@ -193,15 +193,13 @@ def carry_out(
     request = Request(
         scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
     )
+    left = f"what came until then is in {shown(folder)}/"
     with page_beside(folder, page, spec.name):
         try:
-            with interruptible(), progress(console, tuple(spec.cases), explanation) as tell:
+            with ended_by_signals(left), progress(console, tuple(spec.cases), explanation) as tell:
                 report = run_scenario(request, tell)
         except BrokenRunError as error:
-            kept = [f"what came until then is in {shown(folder)}/"] if folder.is_dir() else []
-            fail([f"the run broke: {error}", *kept], BROKEN)
-        except KeyboardInterrupt as error:
-            fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
+            fail([f"the run broke: {error}", *([left] if folder.is_dir() else [])], BROKEN)
         from scenarios.results.report import show
 
         show(report, console)

@@ -85,21 +85,19 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
     from rich.console import Console
 
-    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.output_folders import shown
     from papers.singhal2022.experiments.experiment_data import CaseData
 
-    scenario = gp.load(source.scenario)
+    scenario, left = gp.load(source.scenario), f"what came until then is in {shown(folder)}/"
     try:
-        with interruptible(), progress(Console(), tuple(scenario.cases)) as tell:
+        with ended_by_signals(left), progress(Console(), tuple(scenario.cases)) as tell:
             run = scenario.run(progress=tell, folder=folder)
     except gp.FolderError as error:
         fail([str(error)], BAD_INPUT)
     except gp.BrokenRunError as error:
         fail([f"the run broke: {error}"], BROKEN)
-    except KeyboardInterrupt as error:
-        fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     histories = {case: result.record for case, result in run.items()}
     return source.make(CaseData(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))
 

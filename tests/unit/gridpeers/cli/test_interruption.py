@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from gridpeers.cli import app
-from gridpeers.cli.interruption import exit_code, interruptible
+from gridpeers.cli.interruption import ended_by_signals, exit_code, interruptible
 
 
 @pytest.fixture(autouse=True)
@@ -55,3 +55,11 @@ def test_under_nohup_a_command_outlives_its_terminal() -> None:
 
     with interruptible():
         signal.raise_signal(signal.SIGHUP)
+
+
+def test_a_command_that_a_signal_ends_says_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
+    """One line on standard error, whatever the command was about to do."""
+    with pytest.raises(SystemExit) as ended, ended_by_signals("half of it is in out/"):
+        signal.raise_signal(signal.SIGTERM)
+
+    assert (ended.value.code, capsys.readouterr().err) == (143, "gridpeers: interrupted; half of it is in out/\n")
