@@ -90,7 +90,7 @@ class DecisionJournal:
         self.journal.add(Decision(tick, measurement, list(neighbours), states, unused, weights, agent.saturated))
         return True
 
-    def live(
+    def realtime_tick(
         self,
         tick: int,
         measurement: int,

@@ -40,6 +40,19 @@ class LinkTrace(msgspec.Struct, frozen=True, array_like=True):
             raise ValueError("a message was dropped for no reason that there is")
 
 
+def copies_of(outcome: Outcome) -> tuple[tuple[float, Count | None], ...]:
+    """Return delay (s) and flipped bit of each copy of a message; none if it was dropped.
+
+    Examples
+    --------
+    >>> copies_of(0.01), copies_of("loss"), copies_of(((0.01, None), (0.02, 7)))
+    (((0.01, None),), (), ((0.01, None), (0.02, 7)))
+    """
+    if isinstance(outcome, str):
+        return ()
+    return ((float(outcome), None),) if isinstance(outcome, int | float) else outcome
+
+
 class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
     """Counts of the messages of one link: sent + duplicated = delivered + dropped + in_flight."""
 

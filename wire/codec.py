@@ -109,6 +109,20 @@ def decode(payload: bytes) -> AnyMessage:
     return message
 
 
+def sound(payload: bytes) -> AnyMessage | None:
+    """Return the message of a payload; None if no receiver of this version would take it.
+
+    Examples
+    --------
+    >>> sound(b"noise") is None
+    True
+    """
+    try:
+        return decode(payload)
+    except RejectedError:
+        return None
+
+
 _WRONG_TYPE = re.compile(r"^(Expected `[^`]*`, got |Object |Invalid |\w+ value out of range)")
 """Start of msgspec's message for a wrong type; for a bound, or a message's own check, it reads otherwise."""
 

@@ -92,6 +92,8 @@ class Keys:
     def __init__(self, run: str) -> None:
         check_name("run", run)
         self._root = f"gridpeers/{run}"
+        self.prefix = f"{self._root}/"
+        """Beginning of every key of the run."""
         self.control = f"{self._root}/control"
         self.telemetry = f"{self._root}/telemetry"
         self.command = f"{self._root}/command"

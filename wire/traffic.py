@@ -7,10 +7,11 @@ from typing import Any, Protocol
 
 from msgspec.structs import astuple
 
-from wire.codec import RejectedError, decode
+from wire.codec import sound
 from wire.journal import AT_ONCE, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
+from wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
 from wire.keys import Keys
-from wire.messages import AnyMessage, Measurement, State
+from wire.messages import Measurement, State
 
 SHOWN = 4_000
 """Most bytes that are noted of a message that was rejected."""
@@ -52,7 +53,7 @@ class TickTraffic:
     """
 
     def __init__(self, keys: Keys, names: Collection[str], journal: JournalBuffer) -> None:
-        self._journal, self._cut = journal, len(keys.telemetry) - len("telemetry")
+        self._journal, self._cut = journal, len(keys.prefix)
         self._of_tick: dict[str, list[Any]] = {}
         """The list of a tick to which messages on a key belong."""
         self._measurements: list[Any] = []
@@ -133,7 +134,7 @@ class TimedTraffic:
     """
 
     def __init__(self, keys: Keys, journal: JournalBuffer, *, arrivals: bool = True, whole: bool = False) -> None:
-        self._journal, self._cut, self._arrivals = journal, len(keys.telemetry) - len("telemetry"), arrivals
+        self._journal, self._cut, self._arrivals = journal, len(keys.prefix), arrivals
         self._whole = whole
         self.now = 0.0
         """Time of the last call of the node (s, monotonic)."""
@@ -141,20 +142,22 @@ class TimedTraffic:
     def sent(self, key: str, payload: bytes) -> None:
         """Note a message that the node sends."""
         name = key[self._cut :]
-        if not name.startswith(_ELSEWHERE):
+        if kind_of(name) not in _NOT_NOTED:
             self._journal.add(Sent(self.now, name, payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         """Note a message off the wire, and the kind of its rejection, if it was rejected."""
         self.now = at
         name = key[self._cut :]
-        if not (self._arrivals or self._whole) or (name.startswith(_ELSEWHERE) and not rejected):
+        kind = kind_of(name)
+        needless = IN_TELEMETRY if self._arrivals else _NOT_NOTED
+        if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
         if (
-            name.startswith(_EACH_TICK)
+            kind in EACH_TICK
             and not self._whole
             and rejected in ("", "stale")  # any other may be of somebody who keeps no journal
-            and (message := _sound(payload)) is not None
+            and (message := sound(payload)) is not None
         ):
             self._journal.add(Heard(at, name, message.epoch, message.seq, rejected))
             return
@@ -182,15 +185,5 @@ class TimedTraffic:
         self._journal.add(Process(self.now, "line", text))
 
 
-_ELSEWHERE = ("telemetry", "journal/", "report/", "status/", "answer/")
-"""Beginnings of keys whose messages the record has anyway, or that only say how a node does."""
-
-_EACH_TICK = ("measurement/", "state/", "set_points/")
-"""Beginnings of keys with a message a tick."""
-
-
-def _sound(payload: bytes) -> AnyMessage | None:
-    try:
-        return decode(payload)
-    except RejectedError:
-        return None
+_NOT_NOTED = IN_TELEMETRY + CONDITION
+"""Kinds of keys of which a sender notes nothing."""

@@ -349,7 +349,7 @@ class RealtimeAgent(AgentNode):
         state = replace(self._agent.tick(measurement, tuple(ages), ages), seq=self.statistics.sent)
         if self._timed is not None:
             all_ages = {name: self.states.age(name, at) for name in self._neighbours}
-            self._decisions.live(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
+            self._decisions.realtime_tick(state.seq, measurement.seq, all_ages, limit, self._timed.now, before)
         self._used_neighbours = tuple(name for name in ages if self._agent.shares_island(name))
         self.statistics.ticks += 1
         self.statistics.sent += 1

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from netem.fault_schedule import GATES
-from netem.ledger import LinkTrace, Outcome
+from netem.ledger import LinkTrace, Outcome, copies_of
 from netem.models import INSTANT
 from netem.schema.fault import Span
 
@@ -62,6 +62,5 @@ def _columns(outcome: Outcome) -> tuple[str, float, int, int]:
     """Return why a message was dropped, its delay (s), its copies, and those with a flipped bit."""
     if isinstance(outcome, str):
         return outcome, math.nan, 0, 0
-    if isinstance(outcome, (int, float)):
-        return "", float(outcome), 1, 0
-    return "", float(outcome[0][0]), len(outcome), sum(bit is not None for _, bit in outcome)
+    copies = copies_of(outcome)
+    return "", float(copies[0][0]), len(copies), sum(bit is not None for _, bit in copies)

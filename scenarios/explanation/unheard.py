@@ -6,11 +6,12 @@ from collections import Counter
 from collections.abc import Mapping
 from math import inf, isfinite
 
-from netem.ledger import Outcome
+from netem.ledger import Outcome, copies_of
 from scenarios.record.message_index import MessageOnWire
 from scenarios.record.record_reader import RunRecord
 from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
 from wire.journal import Heard, Received
+from wire.journal_keys import kind_of, name_of
 from wire.messages import OFF, PlantEvent, State
 
 WORDS = {
@@ -48,9 +49,9 @@ def rejections(record: RunRecord, agent: str, since: float, until: float) -> Map
     """Return the number and the kind of each message of a neighbour that an agent rejected, by the neighbour."""
     found: dict[str, list[tuple[int, str]]] = {}
     for entry in record.entries(agent, since=since, until=until):
-        if isinstance(entry, Heard | Received) and entry.rejected and entry.key.startswith("state/"):
+        if isinstance(entry, Heard | Received) and entry.rejected and kind_of(entry.key) == "state":
             number = entry.seq if isinstance(entry, Heard) else -1
-            found.setdefault(entry.key.rpartition("/")[2], []).append((number, entry.rejected))
+            found.setdefault(name_of(entry.key), []).append((number, entry.rejected))
     return found
 
 
@@ -93,8 +94,7 @@ def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:
     outcome = judged[-1]
     if isinstance(outcome, str):
         return outcome
-    copies = ((outcome, None),) if isinstance(outcome, int | float) else outcome
-    sound = [delay for delay, bit in copies if bit is None]
+    sound = [delay for delay, bit in copies_of(outcome) if bit is None]
     if not sound:
         return "damaged"
     return "late" if isfinite(min(sound, default=inf)) else "kept"

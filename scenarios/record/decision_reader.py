@@ -269,13 +269,8 @@ class DecisionReader:
                 if journal.sender != receiver:
                     continue
                 if isinstance(entry, Heard):
-                    kind, _, name = entry.key.partition("/")
-                    found = (
-                        self._index.measurement(receiver, entry.seq, journal.t)
-                        if kind == "measurement"
-                        else self._index.state(name, entry.seq, journal.t)
-                    )
-                    message = heard_of(name, receiver, found, entry, journal.t)
+                    found = self._index.named_by(entry, journal.t)
+                    message = heard_of(receiver, found, entry, journal.t)
                 elif isinstance(entry, Received):
                     message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
                 else:

@@ -10,7 +10,7 @@ import msgspec
 
 from scenarios.record.record_info import RecordInfo
 from wire.bounds import LIMIT
-from wire.codec import CRC, RejectedError, decode
+from wire.codec import CRC, sound
 from wire.journal import ENTRIES, Decision, Entry, Exchange, Heard, Process, Received, Sent, Token, Woken
 from wire.messages import AnyMessage, Measurement, State
 
@@ -63,14 +63,6 @@ def message_of(
     try:
         return msgspec.convert(dict(zip(fields, raw, strict=True)) | {"type": kind.__name__}, kind)
     except msgspec.ValidationError:
-        return None
-
-
-def sound(payload: bytes) -> AnyMessage | None:
-    """Return the message of a payload; None if no receiver of this version would take it."""
-    try:
-        return decode(payload)
-    except RejectedError:
         return None
 
 

@@ -10,13 +10,14 @@ from functools import lru_cache
 from math import inf
 from typing import Any, TypeVar
 
-from scenarios.record.journal_reader import entries_of, message_of, sound, values_of
+from scenarios.record.journal_reader import entries_of, message_of, values_of
 from scenarios.record.record_channels import Topic
 from scenarios.record.record_file import RecordFile, RecordMessage
-from wire.codec import encode
+from wire.codec import encode, sound
 from wire.journal import Entry, Exchange, Heard, Received, Sent
+from wire.journal_keys import kind_of, name_of, sender_of
 from wire.links import REPORT_TICKS
-from wire.messages import PLANT, AnyMessage, Journal, Measurement, State
+from wire.messages import AnyMessage, Journal, Measurement, State
 
 M = TypeVar("M", bound=AnyMessage)
 
@@ -164,6 +165,11 @@ class MessageIndex:
         parts = (self.part(i).measurements for i in self._about(t, reach))
         return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
 
+    def named_by(self, entry: Heard, t: float, reach: float = 0.0) -> State | Measurement | None:
+        """Return the message of about run time t (s) that an entry names by its number, as `state` does."""
+        find = self.measurement if kind_of(entry.key) == "measurement" else self.state
+        return find(name_of(entry.key), entry.seq, t, entry.epoch, reach)
+
     def _about(self, t: float, reach: float) -> range:
         """Return the parts that may have a message of about run time t (s): a journal tells of the last second."""
         further = max(reach, 2.0 * (self._speed - 1.0))
@@ -269,21 +275,21 @@ def on_wire(
     )
 
 
-def heard_of(sender: str, receiver: str, state: State | Measurement | None, entry: Heard, t: float) -> MessageOnWire:
+def heard_of(receiver: str, message: AnyMessage | None, entry: Heard, t: float) -> MessageOnWire:
     """Return a message as it was heard, whose bytes are in its sender's journal."""
-    kind = "Measurement" if entry.key.startswith("measurement/") else "State"
+    kind = Measurement if kind_of(entry.key) == "measurement" else State
     return MessageOnWire(
-        sender=PLANT if kind == "Measurement" else sender,
+        sender=sender_of(entry.key),
         receiver=receiver,
-        kind=kind,
+        kind=kind.__name__,
         key=entry.key,
         epoch=entry.epoch,
         number=entry.seq,
-        t=t if state is None else state.t,
+        t=t if message is None else message.t,
         at=entry.at,
         rejected=entry.rejected,
-        message=state,
-        payload=b"" if state is None else encode(state),
+        message=message,
+        payload=b"" if message is None else encode(message),
     )
 
 

@@ -14,7 +14,8 @@ from plant.plant_interface import LivePlant
 from scenarios.emulation.emulated_links import links_of
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.record.record_info import RecordInfo
-from scenarios.replay.changes import ChangedRule, lossless
+from scenarios.replay.changed_faults import lossless
+from scenarios.replay.changes import ChangedRule
 from scenarios.replay.loop_process import LoopProcess
 from scenarios.replay.recorded_process import RecordedStep
 from scenarios.replay.replay_error import ReplayError
@@ -22,9 +23,6 @@ from scenarios.replay.replayed_process import Message, agent_again, instance_of,
 from wire.codec import decode, encode
 from wire.links import Links
 from wire.messages import PLANT, Command, LinkRequest
-
-COMMANDS = ("link_request/", "command")
-"""Beginnings of the keys of commands to links, among others."""
 
 
 class ChangedProcesses:

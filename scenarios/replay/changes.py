@@ -8,18 +8,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 
 from agents.agent_config import Control
-from netem.schema.fault import KINDS, Fault
+from netem.schema.fault import Fault
 from netem.schema.netem import Netem
-from netem.schema.partition import Partition
 from netem.schema.pattern import objections
 from plant.equipment import Feeder
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changed_faults import spliced, without_loss
 from scenarios.replay.changed_scenario import with_links, with_title
 from scenarios.replay.recorded_process import require_arrivals
 from scenarios.replay.replay_error import ReplayError
@@ -31,8 +31,6 @@ from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import PathError, Tree, put, steps
 from wire.schema.suggestion import suggestion
-
-Entry = TypeVar("Entry", Fault, Partition)
 
 OF_CASE = ("secondary", "graph", "links", "without")
 """Keys of a case that agents have."""
@@ -124,8 +122,8 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     after, _ = _checked(record, tables, frozenset(changed))
     netem_before, netem_after = (_resolved(scenario, feeder, case) for scenario in (before, after))
     if changes.without_loss:
-        netem_after = _lossless(netem_after)
-    netem = _merged(netem_before, netem_after, changes.since)
+        netem_after = without_loss(netem_after)
+    netem = spliced(netem_before, netem_after, changes.since)
     if changes.without:
         cuts = (Fault(on=pattern, cut=True, from_s=changes.since) for pattern in changes.without)
         netem = msgspec.structs.replace(netem, links=(*netem.links, *cuts))
@@ -156,8 +154,8 @@ def _require_own_plant(record: RunRecord) -> None:
     simulator, bridged = record.info.plant.settings.simulator, record.info.plant.bridged
     if simulator != "gridpeers" or bridged:
         raise ReplayError(
-            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be closed "
-            "into a loop again; what would have been needs our own plant"
+            f"{record.path}: its plant was {'a federate' if bridged else f'that of {simulator}'}, which cannot be "
+            "closed into a loop again; what would have been needs our own plant"
         )
 
 
@@ -243,49 +241,3 @@ def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Ne
     setup = EmulationConfig.of_tree(was) if was else setup_of(netem, scenario, feeder, real_nodes=True)
     nodes = setup.netem.nodes if was else ()
     return msgspec.structs.replace(setup, netem=msgspec.structs.replace(netem, nodes=nodes)).to_tree()
-
-
-def lossless(fault: Fault) -> Fault | None:
-    """Return a fault without its loss; None if nothing is left of it.
-
-    Examples
-    --------
-    >>> lossless(Fault(on="* -> inv1", loss=0.2)) is None, lossless(Fault(on="* -> inv1", loss=0.2, delay=0.1)).delay
-    (True, Constant(fifo=False, delay_s=0.1))
-    """
-    models = fault.models()
-    if "loss" not in models:
-        return fault
-    left = {kind: model for kind, model in models.items() if kind in KINDS and kind != "loss"}
-    if not (left or fault.own):
-        return None
-    return Fault(on=fault.on, from_s=fault.from_s, to_s=fault.to_s, own=fault.own, **left)
-
-
-def _lossless(netem: Netem) -> Netem:
-    links = (lossless(fault) for fault in netem.links)
-    return msgspec.structs.replace(netem, links=tuple(fault for fault in links if fault is not None))
-
-
-def _merged(before: Netem, after: Netem, since: float) -> Netem:
-    """Return faults that are those of one configuration up to a time (s), and those of another one from then on."""
-    if before == after or since <= 0.0:
-        return after
-    return msgspec.structs.replace(
-        before,
-        links=_spliced(before.links, after.links, since),
-        partitions=_spliced(before.partitions, after.partitions, since),
-    )
-
-
-def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) -> tuple[Entry, ...]:
-    """Return entries of both, those that both have once and whole."""
-    found = [entry for entry in before if entry in after]
-    for entry in before:
-        if entry not in after and entry.from_s < since:
-            until = since if entry.to_s is None else min(entry.to_s, since)
-            found.append(msgspec.structs.replace(entry, to_s=until))
-    for entry in after:
-        if entry not in before and (entry.to_s is None or entry.to_s > since):
-            found.append(msgspec.structs.replace(entry, from_s=max(entry.from_s, since)))
-    return tuple(found)

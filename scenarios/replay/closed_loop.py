@@ -18,15 +18,17 @@ from agents.graphs import GraphError
 from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
 from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changed_processes import COMMANDS, ChangedProcesses
+from scenarios.replay.changed_processes import ChangedProcesses
 from scenarios.replay.changes import ChangedRule
 from scenarios.replay.link_delays import LinkDelays
-from scenarios.replay.loop_process import LoopProcess, is_arrival, sender, stream
-from scenarios.replay.recorded_process import EACH_TICK, RecordedStep, processes_of
+from scenarios.replay.loop_process import LoopProcess, is_arrival
+from scenarios.replay.recorded_process import RecordedStep, processes_of
 from scenarios.replay.replay_error import ReplayError
 from scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
+from scenarios.replay.sent_statuses import SentStatuses
 from wire.codec import decode
 from wire.journal import Heard, Process, Received, Sent, Woken
+from wire.journal_keys import EACH_TICK, TO_LINKS, kind_of, name_of, sender_of, stream_of
 from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
 
 MOST_SENT = 100_000
@@ -73,6 +75,7 @@ class ClosedLoop:
         self._sent: OrderedDict[tuple[str, int, int], tuple[float, Message]] = OrderedDict()
         """Messages that were sent in the replay, by stream, epoch and number, and when."""
         self._delays = LinkDelays()
+        self._statuses = SentStatuses()
         self._listens = _listeners(record)
         self._lost = frozenset(_lost(record)) if rule is not None and rule.changes.without_loss else frozenset()
         self._number = -1
@@ -162,7 +165,7 @@ class ClosedLoop:
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
         """Undo what a step must not do to a process under the changes."""
-        if isinstance(step.entry, Received) and step.entry.key.startswith(COMMANDS):
+        if isinstance(step.entry, Received) and kind_of(step.entry.key) in TO_LINKS:
             self._making.cut_again(process, self._t)
         node, head = process.agent, process.head
         if node is None or head is None or not node.session_broken:
@@ -178,9 +181,12 @@ class ClosedLoop:
         entry = step.entry
         if not isinstance(entry, Heard | Received):
             return None
-        if not entry.key.startswith(EACH_TICK):
+        kind = kind_of(entry.key)
+        if kind not in EACH_TICK:
             recorded = message_of(process.recorded, step)
-            is_command = entry.key.startswith(COMMANDS) and not entry.rejected
+            if kind == "status" and recorded is not None and not entry.rejected:
+                return self._statuses.as_sent(recorded)
+            is_command = kind in TO_LINKS and not entry.rejected
             return self._making.command(recorded) if is_command and recorded is not None else recorded
         if isinstance(entry, Heard):
             epoch, number = entry.epoch, entry.seq
@@ -189,7 +195,7 @@ class ClosedLoop:
             if known is None:  # no sound message
                 return Message(entry.key, entry.payload)
             epoch, number = known.epoch, known.seq
-        of, src = stream(entry.key), sender(entry.key)
+        of, src = stream_of(entry.key), sender_of(entry.key)
         found, by = self._sent.get((of, epoch, number)), self._processes.get((src, epoch))
         if found is not None:
             at, message = found
@@ -206,13 +212,15 @@ class ClosedLoop:
         """Bring what a process sent in a step to those who hear it, beside those of whom the record has it."""
         theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
         for message in sent:
-            if message.key.startswith(("telemetry", "report/")):
+            if kind_of(message.key) in ("telemetry", "report"):
                 self._record_message(decode(message.payload))
             elif (decoded := tick_message(message)) is not None:
-                self._sent[stream(message.key), decoded.epoch, decoded.seq] = due, message
+                self._sent[stream_of(message.key), decoded.epoch, decoded.seq] = due, message
                 if len(self._sent) > MOST_SENT:
                     self._sent.popitem(last=False)
                 self._send_new(process, message, decoded, theirs, due)
+            elif kind_of(message.key) == "status":
+                self._statuses.sent(message)
 
     def _send_new(
         self,
@@ -223,7 +231,7 @@ class ClosedLoop:
         due: float,
     ) -> None:
         """Send a message to those for whom the record has none of its number, by delays of the link."""
-        kind, _, name = message.key.partition("/")
+        kind, name = kind_of(message.key), name_of(message.key)
         existed = (message.key, decoded.seq) in theirs
         any_state = any((f"{key}/{name}", decoded.seq) in theirs for key in ("state", "set_points"))
         for other in self._processes.values():
@@ -271,7 +279,7 @@ def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
         last: dict[tuple[str, int], int] = {}
         for step in process.steps():
             entry = step.entry
-            if not isinstance(entry, Heard | Received) or not entry.key.startswith(EACH_TICK):
+            if not isinstance(entry, Heard | Received) or kind_of(entry.key) not in EACH_TICK:
                 continue
             if isinstance(entry, Heard):
                 epoch, number = entry.epoch, entry.seq
@@ -279,7 +287,7 @@ def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
                 epoch, number = message.epoch, message.seq
             else:
                 continue
-            of = stream(entry.key), epoch
+            of = stream_of(entry.key), epoch
             before = last.get(of, number)
-            yield from ((sender(entry.key), process.name, epoch, missed) for missed in range(before + 1, number))
+            yield from ((sender_of(entry.key), process.name, epoch, missed) for missed in range(before + 1, number))
             last[of] = max(before, number)

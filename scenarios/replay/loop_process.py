@@ -10,7 +10,7 @@ from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
 from wire.journal import Heard, Received
-from wire.messages import PLANT
+from wire.journal_keys import stream_of
 
 
 class LoopProcess:
@@ -53,7 +53,7 @@ class LoopProcess:
         assert self.head is not None
         for sent in self.head.sent:
             if (message := tick_message(Message(sent.key, sent.payload))) is not None:
-                self._sent[stream(sent.key)] = message.seq
+                self._sent[stream_of(sent.key)] = message.seq
         self.head = next(self._steps, None)
 
     def has_sent(self, of: str, number: int) -> bool:
@@ -64,21 +64,3 @@ class LoopProcess:
 def is_arrival(step: RecordedStep) -> bool:
     """Return whether a message arrives in a step."""
     return isinstance(step.entry, Heard | Received)
-
-
-def stream(key: str) -> str:
-    """Return what numbers a message counts in: an agent's states on both of their keys are one stream.
-
-    Examples
-    --------
-    >>> stream("state/inv1"), stream("set_points/inv1"), stream("measurement/inv1")
-    ('state/inv1', 'state/inv1', 'measurement/inv1')
-    """
-    kind, _, name = key.partition("/")
-    return f"{'measurement' if kind == 'measurement' else 'state'}/{name}"
-
-
-def sender(key: str) -> str:
-    """Return who sends measurements or states on a key."""
-    kind, _, name = key.partition("/")
-    return PLANT if kind == "measurement" else name

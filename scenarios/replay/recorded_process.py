@@ -7,15 +7,13 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
-from scenarios.record.journal_reader import sound
 from scenarios.record.message_index import MessageIndex
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.replay_error import ReplayError
+from wire.codec import sound
 from wire.journal import Decision, Entry, Exchange, Heard, Process, Received, Sent, Token, Woken
-from wire.messages import AnyMessage, Journal
-
-EACH_TICK = ("measurement/", "state/", "set_points/")
-"""Beginnings of the keys of measurements and states."""
+from wire.journal_keys import EACH_TICK, kind_of
+from wire.messages import PLANT, AnyMessage, Journal
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
@@ -68,7 +66,7 @@ class RecordedProcess:
         due = -inf
         for journal, entry in self._entries():
             if isinstance(entry, Sent):
-                if entry.key.startswith(EACH_TICK):
+                if kind_of(entry.key) in EACH_TICK:
                     sent.append(entry)
                 continue
             if isinstance(entry, Decision | Exchange) or (isinstance(entry, Process) and entry.kind not in CALLS):
@@ -100,11 +98,7 @@ class RecordedProcess:
 
     def message(self, entry: Heard, t: float) -> AnyMessage | None:
         """Return a message that it heard by its number, about run time t (s); None if the record does not have it."""
-        index, reach = self._parts.index, self._parts.reach
-        kind, _, name = entry.key.partition("/")
-        if kind == "measurement":
-            return index.measurement(name, entry.seq, t, entry.epoch, reach)
-        return index.state(name, entry.seq, t, entry.epoch, reach)
+        return self._parts.index.named_by(entry, t, self._parts.reach)
 
 
 class JournalParts:
@@ -157,7 +151,7 @@ def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
     """
     info = record.info
     require_arrivals(record)
-    found = sorted(JournalParts(record.index, info.plant.speed).processes(), key=lambda each: each.name != "plant")
+    found = sorted(JournalParts(record.index, info.plant.speed).processes(), key=lambda each: each.name != PLANT)
     if not found:
         raise ReplayError(f"{record.path}: it ends before any process has noted what it was given")
     return tuple(found)

@@ -19,10 +19,11 @@ from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.live_processes import RECORDER_WAIT
 from scenarios.record.record_info import RecordInfo
-from scenarios.replay.recorded_process import EACH_TICK, RecordedProcess, RecordedStep
+from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from scenarios.replay.replay_error import ReplayError
-from wire.codec import RejectedError, decode, encode
+from wire.codec import encode, sound
 from wire.journal import Heard, Process, Received, Sent, Token, Woken
+from wire.journal_keys import EACH_TICK, kind_of
 from wire.links import Links
 from wire.messages import PLANT, Measurement, State
 
@@ -75,7 +76,7 @@ class ReplayedProcess:
 
     def __init__(self, recorded: RecordedProcess, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
         self.recorded, self.node, self.links = recorded, node, links
-        self._root = node.keys.telemetry.removesuffix("telemetry")
+        self._root = node.keys.prefix
         self._sent = _Sent(len(self._root))
         node.traffic = self._sent
 
@@ -218,12 +219,7 @@ def message_of(process: RecordedProcess, step: RecordedStep) -> Message | None:
 
 def tick_message(message: Message | Sent) -> State | Measurement | None:
     """Return a state, or a measurement; None of anything else."""
-    if not message.key.startswith(EACH_TICK):
-        return None
-    try:
-        decoded = decode(message.payload)
-    except RejectedError:
-        return None
+    decoded = sound(message.payload) if kind_of(message.key) in EACH_TICK else None
     return decoded if isinstance(decoded, State | Measurement) else None
 
 

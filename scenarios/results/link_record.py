@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from netem.ledger import LinkCounts, LinkTrace, Outcome, combined
+from netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
 from netem.schema.pattern import Link
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_reports import data_of
@@ -221,8 +221,5 @@ def _rows(trace: LinkTrace) -> Iterator[tuple[object, ...]]:
 def _fates(outcome: Outcome) -> Iterator[tuple[object, str]]:
     if isinstance(outcome, str):
         yield "", outcome
-    elif isinstance(outcome, float | int):
-        yield float(outcome), "passed"
-    else:
-        for copy, (delay_s, bit) in enumerate(outcome):
-            yield delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")
+    for copy, (delay_s, bit) in enumerate(copies_of(outcome)):
+        yield delay_s, ("copy" if copy else "passed") + ("" if bit is None else f", bit {bit} flipped")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import inf, isfinite
 from typing import NamedTuple
 
-from netem.ledger import Outcome
+from netem.ledger import Outcome, copies_of
 from scenarios.record.record_reader import RunRecord
 from wire.messages import PLANT, Measurement, State
 
@@ -63,8 +63,7 @@ def _judged(src: str, dst: str, number: int, t: float, outcome: Outcome, least: 
     if isinstance(outcome, str):
         yield Flow(t, src, dst, number, None, outcome)
         return
-    copies = ((outcome, None),) if isinstance(outcome, int | float) else outcome
-    for delay, bit in copies:
+    for delay, bit in copies_of(outcome):
         fate = "damaged" if bit is not None else "" if isfinite(delay) else "kept"
         yield Flow(t, src, dst, number, t + max(delay, least) if isfinite(delay) else None, fate)
 

@@ -20,11 +20,13 @@ import msgspec
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.emulation.link_reports import data_of
-from scenarios.record.journal_reader import sound, values_of
+from scenarios.record.journal_reader import values_of
 from scenarios.record.record_file import RecordFile
 from scenarios.record.record_info import RecordInfo
 from wire.bounds import LIMIT
+from wire.codec import sound
 from wire.journal import Decision
+from wire.journal_keys import kind_of, name_of
 from wire.messages import PLANT, Journal, LinkReport, State
 
 MOST_BYTES = 64_000_000
@@ -176,11 +178,11 @@ class _Pass:
             for raw in entry[3]:
                 self._state(raw)
         elif (
-            kind in ("sent", "received") and _kind_of(entry[2]) in _STATE_KEYS and not (kind == "received" and entry[4])
+            kind in ("sent", "received") and kind_of(entry[2]) in _STATE_KEYS and not (kind == "received" and entry[4])
         ):
             self._state(entry[3])
-        elif kind == "heard" and _kind_of(entry[2]) == "state":
-            self._heard[entry[2].rpartition("/")[2], journal.sender][entry[3], entry[4]] = entry[5]
+        elif kind == "heard" and kind_of(entry[2]) == "state":
+            self._heard[name_of(entry[2]), journal.sender][entry[3], entry[4]] = entry[5]
         elif kind == "decision" and journal.sender != PLANT:
             decision = msgspec.convert(entry, Decision)
             self._decisions[journal.sender][journal.epoch, decision.tick] = decision
@@ -215,10 +217,6 @@ _VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")
 
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
-
-
-def _kind_of(key: str) -> str:
-    return key.partition("/")[0]
 
 
 def _raw_entries(data: bytes) -> Iterator[list[Any]]:

@@ -17,6 +17,10 @@ SHORT = """
 law = "held:Held"
 [time]
 end_s = 0.1
+[[event]]
+label = "islanding"
+t_s = 0.04
+open = ["13-152"]
 [case.IV]
 secondary = "all"
 graph = "full"

@@ -87,6 +87,7 @@ def test_a_loop_without_a_change_gives_the_run_back(name: str, run_of: Callable[
     assert done.compared == len(run.history)
     assert done.would_be.sha256 == run.sha256
     assert done.table["difference"].abs().max() == 0.0
+    assert done.would_be.events.equals(done.was.events)
 
 
 def test_what_is_lost_comes_without_loss(run_of: Callable[[str], Result]) -> None:

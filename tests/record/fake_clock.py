@@ -1,0 +1,297 @@
+"""A recorded run in wall-clock time whose clock is fake: one thread, no session, the same bytes every time.
+
+The nodes are those of real processes, and are called as `wire.driver.drive` calls them. So what depends on lost and
+late messages, frozen agents and commands of people can be tested without a race.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from heapq import heappop, heappush
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig, Control
+from agents.carriers.make import make_law
+from agents.realtime.realtime_agent import RealtimeAgent
+from netem.schema.netem import Netem
+from plant.plant_config import PlantConfig
+from plant.realtime.realtime_plant import RealtimePlant
+from scenarios.drivers.telemetry_client import RECORDER
+from scenarios.emulation.emulated_links import links_of
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_reader import RunRecord
+from scenarios.results.record import Recorder
+from tests.toy.toy_configs import ALL_FULL, toy_configs
+from tests.toy.toy_plant import ToyPlant
+from wire.actions import Fetch, Listen, Log, Publish
+from wire.codec import decode, encode
+from wire.keys import Keys
+from wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
+
+Node = RealtimePlant | RealtimeAgent
+
+Delay = Callable[[str, str, str, int], float | None]
+"""Returns how long (s) a message is on the wire, by sender, receiver, key and number on that link; None: it is lost."""
+
+START = 1000.0
+"""Time (s) on the fake clock at which the processes start."""
+
+READY = 0.26
+"""Time (s) after which the run is at t = 0, about: all have met, and the plant has waited its lead."""
+
+
+def at_once(src: str, dst: str, key: str, number: int) -> float:
+    """Return a millisecond for every message."""
+    return 0.001
+
+
+class FakeClockRun:
+    """A run of the toy plant.
+
+    Parameters
+    ----------
+    plant : PlantConfig
+        The toy plant's.
+    agents : tuple[AgentConfig, ...]
+        All agents.
+    recorder : Recorder
+        Takes what the plant publishes for recorders.
+    delay : Delay, optional
+        Of every message.
+    """
+
+    def __init__(
+        self, plant: PlantConfig, agents: tuple[AgentConfig, ...], recorder: Recorder, delay: Delay = at_once
+    ) -> None:
+        self.keys = Keys(plant.run)
+        self.now = START
+        self._delay, self._recorder = delay, recorder
+        self._configs = {config.name: config for config in agents}
+        self._events: list[tuple[float, int, Callable[[], None]]] = []
+        self._order = count()
+        self._numbers: dict[tuple[str, str, str], int] = {}
+        self._nodes: dict[str, Node] = {}
+        self._subscribed: dict[str, set[str]] = {}
+        self._frozen: dict[str, float] = {}
+        """Until when (s) each frozen process does nothing."""
+        self._lives: dict[str, int] = {}
+        self._wakes: dict[str, float] = {}
+        """When (s) each process is woken next."""
+        config = replace(plant, epoch=int(START), recorders=(RECORDER,))
+        self.plant = RealtimePlant(config, ToyPlant(config), links_of(PLANT, plant.links))
+        self._join(self.plant, self.plant.subscriptions)
+        self._tell(self.keys.alive_recorder(RECORDER), PLANT, appeared=True)
+        for name in plant.agents:
+            self.start(name)
+
+    # ---------------------------------------------------------------- what people and the machine do
+
+    def at(self, t: float, do: Callable[[], None]) -> None:
+        """Do something at a run time (s), at speed 1."""
+        self._on(START + READY + t, do)
+
+    def start(self, name: str) -> None:
+        """Start the process of an agent."""
+        self._lives[name] = self._lives.get(name, 0) + 1
+        config = replace(self._configs[name], epoch=int(self.now * 1000.0))
+        links, law = links_of(name, config.links), make_law(config.control)
+        agent = RealtimeAgent(config, f"{name}x{self._lives[name]}", links, law)
+        self._join(agent, agent.subscriptions)
+
+    def stop(self, name: str) -> None:
+        """Have an agent leave, as by Ctrl-C in its terminal."""
+        agent = self._nodes[name]
+        assert isinstance(agent, RealtimeAgent)
+        agent.asked_to_leave("asked to leave: SIGINT")
+        self._work(name)
+
+    def kill(self, name: str) -> None:
+        """End the process of an agent without a word."""
+        self._gone(name)
+
+    def freeze(self, name: str, seconds: float) -> None:
+        """Let a process stand still for some time (s)."""
+        self._frozen[name] = self.now + seconds
+
+    def command(self, verb: Any, **further: Any) -> None:
+        """Send the plant a command."""
+        command = Command(sender="cli", epoch=1, seq=7, t=0.0, verb=verb, reply_to="z1", **further)
+        self._send("cli", self.keys.command, encode(command))
+
+    # ---------------------------------------------------------------- the clock
+
+    def run(self) -> None:
+        """Run until the plant is over."""
+        while not self.plant.finished:
+            due, _, do = heappop(self._events)
+            self.now = max(self.now, due)
+            do()
+
+    def _on(self, time: float, do: Callable[[], None]) -> None:
+        heappush(self._events, (time, next(self._order), do))
+
+    def _later(self, seconds: float, do: Callable[[], None]) -> None:
+        self._on(self.now + seconds, do)
+
+    # ---------------------------------------------------------------- processes
+
+    def _join(self, node: Node, subscriptions: tuple[str, ...]) -> None:
+        """Start a process; then it and the others learn of each other."""
+        name, others = node.name, list(self._nodes)
+        self._nodes[name] = node
+        for key in subscriptions:
+            self._subscribed.setdefault(key, set()).add(name)
+        node.start(self.now)
+        self._work(name)
+        for other in others:
+            self._tell(self._nodes[other].token, name, appeared=True)
+            self._tell(node.token, other, appeared=True)
+
+    def _gone(self, name: str) -> None:
+        node = self._nodes.pop(name)
+        for receivers in self._subscribed.values():
+            receivers.discard(name)
+        for other in self._nodes:
+            self._tell(node.token, other, appeared=False)
+
+    def _tell(self, token: str, to: str, *, appeared: bool) -> None:
+        """Tell a process that a token appeared, or vanished."""
+
+        def tell() -> None:
+            if (node := self._nodes.get(to)) is not None:
+                (node.appeared if appeared else node.vanished)(token, self.now)
+                self._work(to)
+
+        self._later(0.002, tell)
+
+    def _wake(self, name: str, node: Node) -> None:
+        """Wake a process, unless another one has its name by now; the frozen one does nothing until it thaws."""
+        if self._nodes.get(name) is not node:
+            return
+        if (until := self._frozen.get(name, 0.0)) > self.now:
+            self._on(until, lambda: self._wake(name, node))
+            return
+        if node.deadline <= self.now:
+            node.expire(self.now)
+            self._work(name)
+
+    def _work(self, name: str) -> None:
+        """Do what a node asks for, and wake it when it says."""
+        node = self._nodes[name]
+        while True:
+            for action in node.take_actions():
+                if isinstance(action, Publish):
+                    self._publish(name, action)
+                elif isinstance(action, Fetch):
+                    self._fetch(name, action.key)
+                elif isinstance(action, Listen):
+                    self._subscribed.setdefault(action.key, set()).add(name)
+                else:
+                    assert isinstance(action, Log)
+            if node.finished or not node.work(self.now):
+                break
+        if node.finished and name != PLANT:
+            self._gone(name)
+        elif not node.finished and self._wakes.get(name) != node.deadline:
+            self._wakes[name] = node.deadline
+            self._on(node.deadline, lambda: self._wake(name, node))
+
+    # ---------------------------------------------------------------- messages
+
+    def _publish(self, src: str, action: Publish) -> None:
+        if action.key == self.keys.telemetry and src == PLANT:
+            self._record(action.payload)
+        self._send(src, action.key, action.payload)
+
+    def _record(self, payload: bytes) -> None:
+        message = decode(payload)
+        assert isinstance(message, Telemetry | LinkReport | Journal | LinkRequest)
+        self._recorder(message)
+        if isinstance(message, Telemetry) and message.final:
+            self._tell(self.keys.alive_recorder(RECORDER), PLANT, appeared=False)
+
+    def _send(self, src: str, key: str, payload: bytes) -> None:
+        for dst in sorted(self._subscribed.get(key, ())):
+            link = src, dst, key.removeprefix(self.keys.prefix)
+            number = self._numbers[link] = self._numbers.get(link, -1) + 1
+            if (seconds := self._delay(*link, number)) is not None:
+                self._later(seconds, partial(self._receive, dst, key, payload))
+
+    def _receive(self, name: str, key: str, payload: bytes) -> None:
+        """Hand a message over; a frozen process takes it when it thaws."""
+        if (node := self._nodes.get(name)) is None:
+            return
+        if (until := self._frozen.get(name, 0.0)) > self.now:
+            self._on(until, lambda: self._receive(name, key, payload))
+            return
+        node.received(key, payload, self.now)
+        self._work(name)
+
+    def _fetch(self, name: str, key: str) -> None:
+        for node in self._nodes.values():
+            if isinstance(node, RealtimeAgent) and node.nameplate[0] == key:
+                self._later(0.002, partial(self._receive, name, key, node.nameplate[1]))
+
+
+def fake_clock_record(
+    folder: Path,
+    *,
+    n: int = 3,
+    end: float = 1.0,
+    netem: Netem | None = None,
+    control: Control = ALL_FULL,
+    delay: Delay = at_once,
+    happens: Callable[[FakeClockRun], None] = lambda run: None,
+) -> RunRecord:
+    """Run the toy plant on a fake clock; return its record.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the case, which is made.
+    n : int, optional
+        Number of agents.
+    end : float, optional
+        End of the run (s).
+    netem : Netem, optional
+        Faults of emulated links; without it there are none.
+    control : Control, optional
+        Rule of control.
+    delay : Delay, optional
+        Of every message.
+    happens : Callable[[FakeClockRun], None], optional
+        Plans what people and the machine do, before the run.
+    """
+    plant, agents = toy_configs(n, control, end=end)
+    links: dict[str, Any] = {}
+    if netem is not None:
+        microgrids = {agent.name: agent.microgrid for agent in agents}
+        links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
+    plant = replace(plant, clock="wall", links=links, record="all", wait_for_agents=5.0)
+    agents = tuple(replace(agent, clock="wall", links=links, record="all", deadline=0.0) for agent in agents)
+    info = RecordInfo(
+        level="all",
+        scenario="toy",
+        case="case",
+        toml="",
+        seed=1,
+        driver="inprocess",  # so its file is written between the calls, and has the same parts every time
+        versions={},
+        inverters=tuple(agent.name for agent in agents),
+        plant=plant,
+        agents=agents,
+    )
+    with pytest.MonkeyPatch.context() as patch, Recorder(folder, gaps=True, record=info) as recorder:
+        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
+        run = FakeClockRun(plant, agents, recorder, delay)
+        happens(run)
+        run.run()
+        recorder.finish(recorder.ended, recorder.record_step)
+    return RunRecord.open(folder)

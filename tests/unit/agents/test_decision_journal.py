@@ -1,0 +1,136 @@
+"""What an agent notes about how it decides."""
+
+from __future__ import annotations
+
+from math import inf
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from agents.agent import Agent
+from agents.decision_journal import DecisionJournal
+from scenarios.record.journal_reader import entries_of
+from wire.journal import Decision, JournalBuffer
+
+NEIGHBOURS = ("inv2", "inv3", "inv4", "inv5")
+
+
+class Deciding:
+    """An agent as its decision journal sees it."""
+
+    def __init__(self, *, weighs_alike: bool = True, watches_saturation: bool = False) -> None:
+        self.weighs_alike, self.watches_saturation = weighs_alike, watches_saturation
+        self.heard: dict[str, Any] = {}
+        self.around: list[Any] = []
+        self.saturated = (0, 0)
+        self.here = set(NEIGHBOURS)
+        self.journal = DecisionJournal(cast(Agent, self), JournalBuffer())
+
+    def shares_island(self, name: str) -> bool:
+        """Whether a neighbour is in its island."""
+        return name in self.here
+
+    def hear(self, number: int, *names: str) -> None:
+        """States of this number were heard."""
+        self.heard |= {name: SimpleNamespace(seq=number) for name in names}
+
+    def use(self, *names: str, weight: float = 1.0) -> None:
+        """These are in the sums."""
+        self.around = [SimpleNamespace(name=name, weight=weight) for name in names]
+
+    def noted(self) -> list[Decision]:
+        """Entries since last asked."""
+        entries = [entry for part in self.journal.journal.take_parts() for entry in entries_of(part)]
+        return [entry for entry in entries if isinstance(entry, Decision)]
+
+
+def test_in_ticks_only_what_changes_is_noted() -> None:
+    """An entry holds until the next one: as long as all states are those of the tick before, there is none."""
+    agent = Deciding()
+    for tick in range(1, 5):
+        agent.hear(tick - 1, *NEIGHBOURS)
+        agent.use(*NEIGHBOURS)
+        assert agent.journal.tick(tick, 0, NEIGHBOURS) == (tick == 1)
+    assert agent.journal.is_usual
+
+    (entry,) = agent.noted()
+    assert (entry.tick, entry.measurement, entry.neighbours) == (1, 0, list(NEIGHBOURS))
+    assert (entry.states, entry.unused, entry.weights) == ([1, 1, 1, 1], [], [])
+
+
+@pytest.mark.parametrize("what", ["older", "measurement", "saturated", "fewer", "another"])
+def test_in_ticks_each_change_is_noted(what: str) -> None:
+    """An older state, a late measurement, a saturated side, a neighbour less, another neighbour."""
+    agent = Deciding()
+    agent.hear(0, *NEIGHBOURS)
+    agent.use(*NEIGHBOURS)
+    agent.journal.tick(1, 0, NEIGHBOURS)
+    agent.noted()
+    agent.hear(1, *(NEIGHBOURS[:-1] if what == "older" else NEIGHBOURS), "inv6")
+    if what == "saturated":
+        agent.saturated = (1, 0)
+    names = {"fewer": NEIGHBOURS[:-1], "another": (*NEIGHBOURS[:-1], "inv6")}.get(what, NEIGHBOURS)
+    agent.use(*names)
+
+    assert agent.journal.tick(2, 1 if what == "measurement" else 0, names)
+
+    (entry,) = agent.noted()
+    assert (entry.states, entry.measurement, entry.saturated, entry.neighbours) == (
+        [1, 1, 1, 2] if what == "older" else [1] * len(names),
+        1 if what == "measurement" else 0,
+        agent.saturated,
+        list(names),
+    )
+    assert agent.journal.is_usual == (what in ("saturated", "fewer", "another"))
+
+
+def test_in_ticks_each_reason_is_its_own() -> None:
+    """Nothing was heard of the one, the other's state is stale, the third is in another island."""
+    agent = Deciding()
+    agent.hear(4, "inv2")
+    agent.hear(1, "inv4", "inv5")
+    agent.here -= {"inv5"}
+    agent.use("inv2")
+
+    agent.journal.tick(5, 0, NEIGHBOURS)
+
+    (entry,) = agent.noted()
+    assert entry.states == [1, None, 4, 4]
+    assert entry.unused == ["", "silent", "stale", "island"]
+    assert not agent.journal.is_usual
+
+
+def test_in_real_time_each_decision_is_noted_with_its_reasons() -> None:
+    """Ages tell who was silent and who was stale; a young state that is in no sum is of another island."""
+    agent = Deciding()
+    agent.hear(7, "inv2", "inv4", "inv5")
+    agent.use("inv2")
+    ages = {"inv2": 0.01, "inv3": inf, "inv4": 0.3, "inv5": 0.25}
+
+    agent.journal.realtime_tick(9, 11, ages, 0.25, 1000.5, (5e4, 277.0))
+    agent.journal.realtime_tick(10, 12, {"inv2": 0.02}, 0.25, 1000.52, None)
+
+    first, second = agent.noted()
+    assert (first.tick, first.measurement, first.at, first.before) == (9, 11, 1000.5, [5e4, 277.0])
+    assert first.states == [7, None, 7, 7]
+    assert first.unused == ["", "silent", "stale", "island"]
+    assert first.ages == [0.01, None, 0.3, 0.25]
+    assert (second.neighbours, second.unused, second.before, second.weights) == (["inv2"], [], [], [])
+
+
+@pytest.mark.parametrize("realtime", [False, True])
+def test_weights_are_noted_of_all_neighbours(realtime: bool) -> None:
+    """Also where all are 1 now: under such options they change from one decision to the next."""
+    agent = Deciding(weighs_alike=False)
+    agent.hear(4, *NEIGHBOURS)
+    agent.use("inv2", "inv4", weight=0.5)
+
+    if realtime:
+        agent.journal.realtime_tick(5, 5, dict.fromkeys(NEIGHBOURS, 0.02), 0.25, 1000.0, None)
+    else:
+        agent.journal.tick(5, 0, NEIGHBOURS)
+
+    (entry,) = agent.noted()
+    assert entry.weights == [0.5, 0.0, 0.5, 0.0]
+    assert not agent.journal.is_usual

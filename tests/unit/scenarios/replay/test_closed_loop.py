@@ -1,0 +1,177 @@
+"""A closed loop gives the run back without a change, and under one the run that was recorded with that change.
+
+The runs are of the toy plant on a fake clock, where every message takes a millisecond unless a test says otherwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent_config import Control, LawChoice
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.changes import ChangedRule, Changes
+from scenarios.replay.closed_loop import ClosedLoop
+from scenarios.replay.replay import replay
+from tests.record.fake_clock import FakeClockRun, at_once, fake_clock_record
+from tests.toy.toy_configs import ALL_FULL
+from tests.toy.toy_plant import ToyPlant
+from wire.messages import LinkReport, PlantEvent, Telemetry
+
+Rows = list[tuple[float, ...]]
+
+CUT = Netem(links=(Fault(on="inv1 -> inv2", cut=True, from_s=0.3, to_s=0.8),))
+
+
+def told(messages: list[Telemetry]) -> tuple[Rows, list[PlantEvent]]:
+    """Rows and events of telemetry."""
+    return [row for each in messages for row in each.rows], [event for each in messages for event in each.events]
+
+
+def again(record: RunRecord, changes: Changes | None = None, **rule: Any) -> tuple[Rows, list[PlantEvent]]:
+    """Rows and events of the closed loop."""
+    found: list[Telemetry] = []
+
+    def take(message: Telemetry | LinkReport) -> None:
+        if isinstance(message, Telemetry):
+            found.append(message)
+
+    changed = None
+    if changes is not None:
+        changed = ChangedRule(**(dict.fromkeys(ChangedRule.__annotations__) | {"changes": changes} | rule))
+    ClosedLoop(record, cast(ChangedRule | None, changed), take, ToyPlant).run()
+    return told(found)
+
+
+def links_of(record: RunRecord, netem: Netem) -> dict[str, Any]:
+    """Configuration of emulated links between the agents of a record."""
+    microgrids = {agent.name: agent.microgrid for agent in record.info.agents}
+    return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
+
+
+def uneven(src: str, dst: str, key: str, number: int) -> float | None:
+    """Messages late by 1 to 5 ms, by a rule; every seventh state between two agents is lost."""
+    if key.startswith("state/") and "plant" not in (src, dst) and number % 7 == 3:
+        return None
+    return 0.001 * (1 + (number * 7 + len(key)) % 5)
+
+
+def much_happens(run: FakeClockRun) -> None:
+    """An agent is frozen, one dies and comes again, one leaves, and people command."""
+    run.at(0.2, lambda: run.freeze("inv3", 0.5))
+    run.at(0.5, lambda: run.command("open", argument="sw1"))
+    run.at(0.8, lambda: run.kill("inv2"))
+    run.at(1.0, lambda: run.start("inv2"))
+    run.at(1.1, lambda: run.stop("inv1"))
+    run.at(1.15, lambda: run.command("link", link_command={"fault": {"on": "inv2 -> inv3", "cut": True}}))
+    run.at(1.2, lambda: run.start("inv1"))
+
+
+def test_without_a_change_the_loop_gives_rows_and_events_back(tmp_path: Path) -> None:
+    """Who joined, left, died, was silent or was not heard by whom: all to the bit, at the times at which it was."""
+    record = fake_clock_record(tmp_path / "case", end=1.5, netem=CUT, delay=uneven, happens=much_happens)
+
+    rows, events = again(record)
+
+    assert (rows, events) == told(list(record.telemetry()))
+    texts = "; ".join(event.text for event in events)
+    for text in ("inv2 does not hear inv1", "inv3 is silent", "inv2 died", "inv1 left", "link command 1", "sw1: open"):
+        assert text in texts
+    assert replay(record, ToyPlant).difference is None
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """A run of three agents in which nothing goes wrong."""
+    return fake_clock_record(tmp_path_factory.mktemp("plain") / "case")
+
+
+def test_a_cut_link_gives_the_run_with_that_cut(plain: RunRecord, tmp_path: Path) -> None:
+    """From its time on, and to the bit; the same with the cut as a fault of the scenario."""
+    netem = Netem(links=(Fault(on="inv1 -> inv2", cut=True, from_s=0.5),))
+    cut = told(list(fake_clock_record(tmp_path / "case", netem=netem).telemetry()))
+
+    found = again(plain, Changes(without=("inv1 -> inv2",), since=0.5), links=links_of(plain, netem))
+
+    assert found == cut
+    assert found[0] != told(list(plain.telemetry()))[0]
+
+
+def test_another_gain_gives_the_run_with_that_gain(plain: RunRecord, tmp_path: Path) -> None:
+    """A gain from the start decides every step."""
+    control = replace(ALL_FULL, gains=replace(ALL_FULL.gains, k_p=0.5 * ALL_FULL.gains.k_p))
+    other = told(list(fake_clock_record(tmp_path / "case", control=control).telemetry()))
+
+    assert again(plain, Changes(keys={"gains.k_p": 1}), control=control) == other
+    assert other[0] != told(list(plain.telemetry()))[0]
+
+
+def test_without_loss_gives_the_run_without_it(tmp_path: Path) -> None:
+    """What the wire lost from then on comes after the median delay; up to then the same messages stay lost."""
+
+    def lossy(until: float) -> Callable[[str, str, str, int], float | None]:
+        def delay(src: str, dst: str, key: str, number: int) -> float | None:
+            between = key.startswith("state/") and "plant" not in (src, dst)
+            late = number * 0.02 > until
+            return None if between and number % 3 == 1 and not late else at_once(src, dst, key, number)
+
+        return delay
+
+    lost = fake_clock_record(tmp_path / "lost" / "case", delay=lossy(9.0))
+    half = fake_clock_record(tmp_path / "half" / "case", delay=lossy(0.5))
+
+    found = again(lost, Changes(without_loss=True, since=0.51))
+
+    assert found == told(list(half.telemetry()))
+    assert found[0] != told(list(lost.telemetry()))[0]
+
+
+def test_messages_that_the_record_lacks_come_as_those_of_their_link(tmp_path: Path) -> None:
+    """A law that saved messages is replaced: the states that it did not send are sent, and take the link's delays."""
+    saves = Control(secondary="all", graph="full", law=LawChoice(use="event-triggered"))
+    saving, talking = (
+        fake_clock_record(tmp_path / name / "case", control=control)
+        for name, control in (("saves", saves), ("talks", ALL_FULL))
+    )
+
+    assert again(saving) == told(list(saving.telemetry()))
+    assert again(saving, Changes(law="consensus"), control=ALL_FULL) == told(list(talking.telemetry()))
+    assert again(talking, Changes(law="event-triggered"), control=saves) == told(list(saving.telemetry()))
+    assert told(list(saving.telemetry()))[0] != told(list(talking.telemetry()))[0]
+
+
+def test_link_commands_stay_or_are_left_out(tmp_path: Path) -> None:
+    """Without them the run is that in which nobody commanded the links."""
+    nobody = fake_clock_record(tmp_path / "nobody" / "case", netem=Netem())
+    tree = {"fault": {"on": "inv1 -> inv2", "cut": True}}
+    record = fake_clock_record(
+        tmp_path / "somebody" / "case",
+        netem=Netem(),
+        happens=lambda run: run.at(0.4, lambda: run.command("link", link_command=tree)),
+    )
+
+    rows, events = again(record, Changes(without_link_commands=True))
+
+    assert (rows, events) == told(list(nobody.telemetry()))
+    assert rows != told(list(record.telemetry()))[0]
+    assert again(record, Changes(without_link_commands=True, since=0.6)) == told(list(record.telemetry()))
+
+
+def test_a_record_that_is_cut_off_ends_where_all_journals_do(plain: RunRecord, tmp_path: Path) -> None:
+    """Up to there the rows are those of the record, and there are none that nobody has recorded."""
+    whole = plain.path.read_bytes()
+    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 3 // 4])
+    record = RunRecord.open(tmp_path)
+
+    rows, _ = again(record)
+
+    recorded = told(list(record.telemetry()))[0]
+    assert 5 < len(rows) <= len(recorded)
+    assert rows == recorded[: len(rows)]

@@ -1,0 +1,173 @@
+"""What a node notes of its messages and tokens."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from scenarios.record.journal_reader import entries_of
+from wire.codec import encode
+from wire.journal import AT_ONCE, Entry, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
+from wire.keys import Keys
+from wire.messages import Leave, Measurement, State
+from wire.traffic import SHOWN, TickTraffic, TimedTraffic
+
+KEYS = Keys("toy")
+STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))
+LEAVE = encode(Leave(sender="inv2", epoch=3, seq=6, t=0.1))
+NOISE = b"\x00" * (SHOWN + 7)
+
+
+def noted(journal: JournalBuffer) -> list[Entry]:
+    """Entries since last asked."""
+    return [entry for part in journal.take_parts() for entry in entries_of(part)]
+
+
+def timed(**options: Any) -> tuple[TimedTraffic, JournalBuffer]:
+    """Traffic of a node in real time, and its journal."""
+    journal = JournalBuffer()
+    return TimedTraffic(KEYS, journal, **options), journal
+
+
+def test_in_real_time_each_call_has_its_time() -> None:
+    """A message that is sent, and a line of the log, have that of the call in which they come about."""
+    traffic, journal = timed()
+    traffic.process("start", "instance a", 9.0)
+    traffic.token(KEYS.alive_agent("inv2", "b"), 9.5, appeared=True)
+    traffic.received(KEYS.state("inv2"), STATE, 10.0, "")
+    traffic.sent(KEYS.state("inv1"), STATE)
+    traffic.woken(10.5)
+    traffic.line("joins")
+    traffic.woken(11.0, work=True)
+    traffic.sent(KEYS.leave("inv1"), LEAVE)
+    traffic.token(KEYS.alive_agent("inv2", "b"), 11.5, appeared=False)
+
+    assert noted(journal) == [
+        Process(9.0, "start", "instance a"),
+        Token(9.5, "alive/agent/inv2/b", True),
+        Heard(10.0, "state/inv2", 3, 5),
+        Sent(10.0, "state/inv1", STATE),
+        Woken(10.5),
+        Process(10.5, "line", "joins"),
+        Woken(11.0, True),
+        Sent(11.0, "leave/inv1", LEAVE),
+        Token(11.5, "alive/agent/inv2/b", False),
+    ]
+
+
+def test_the_bytes_of_a_message_are_noted_once() -> None:
+    """By its sender, and by the plant; whoever else hears a sound one notes its number, also of one that is stale."""
+    for whole, rejected, entry in (
+        (False, "", Heard(1.0, "state/inv2", 3, 5)),
+        (False, "stale", Heard(1.0, "state/inv2", 3, 5, "stale")),
+        (False, "ghost", Received(1.0, "state/inv2", STATE, "ghost")),
+        (True, "", Received(1.0, "state/inv2", STATE)),
+        (True, "stale", Received(1.0, "state/inv2", STATE, "stale")),
+    ):
+        traffic, journal = timed(whole=whole)
+        traffic.received(KEYS.state("inv2"), STATE, 1.0, rejected)
+        assert noted(journal) == [entry]
+
+
+def test_of_a_rejected_message_the_beginning_is_noted() -> None:
+    """A flood of long messages must not fill the record; one that was used is whole, whatever its length."""
+    traffic, journal = timed()
+    traffic.received(KEYS.state("inv2"), NOISE, 1.0, "corrupt")
+    traffic.received(KEYS.link_request("inv1"), NOISE, 2.0, "")
+
+    assert noted(journal) == [
+        Received(1.0, "state/inv2", NOISE[:SHOWN], "corrupt"),
+        Received(2.0, "link_request/inv1", NOISE),
+    ]
+
+
+def test_what_the_record_has_anyway_is_not_noted() -> None:
+    """What the plant publishes for recorders, but for a message that was rejected; of a status what the plant hears."""
+    for whole in (False, True):
+        traffic, journal = timed(whole=whole)
+        for key in (KEYS.telemetry, KEYS.journal("inv2"), KEYS.report("inv2"), KEYS.status("inv1"), KEYS.answer("z")):
+            traffic.sent(key, b"it")
+        for key in (KEYS.journal("inv2"), KEYS.report("inv2")):
+            traffic.received(key, b"it", 1.0, "")
+        assert noted(journal) == []
+        traffic.received(KEYS.journal("inv2"), b"it", 1.0, "corrupt")
+        traffic.received(KEYS.status("inv2"), b"it", 2.0, "")
+        assert noted(journal) == [Received(1.0, "journal/inv2", b"it", "corrupt"), Received(2.0, "status/inv2", b"it")]
+
+
+def test_without_arrivals_a_node_notes_what_it_sends() -> None:
+    """And the plant the states of all, but no status: it decides nothing but events."""
+    for whole in (False, True):
+        traffic, journal = timed(arrivals=False, whole=whole)
+        traffic.token(KEYS.alive_agent("inv2", "b"), 0.5, appeared=True)
+        traffic.woken(1.0)
+        traffic.received(KEYS.state("inv2"), STATE, 2.0, "")
+        traffic.received(KEYS.status("inv2"), b"it", 2.0, "")
+        traffic.sent(KEYS.state("inv1"), STATE)
+        assert noted(journal) == [Received(2.0, "state/inv2", STATE)] * whole + [Sent(2.0, "state/inv1", STATE)]
+
+
+def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
+    """Measurements and states in their order; all else one by one, and a tick in which nothing came not at all."""
+    journal = JournalBuffer()
+    traffic = TickTraffic(KEYS, ("inv1", "inv2"), journal)
+    traffic.sent(KEYS.measurement("inv1"), b"m1")
+    traffic.sent(KEYS.measurement("inv2"), b"m2")
+    traffic.received(KEYS.state("inv2"), b"s2", 0.0, "")
+    traffic.received(KEYS.state("inv1"), b"bad", 0.0, "corrupt")
+    traffic.received(KEYS.state("inv1"), b"s1", 0.0, "")
+    traffic.sent(KEYS.control, b"go")
+    traffic.sent(KEYS.telemetry, b"rows")
+    traffic.received(KEYS.journal("inv1"), b"part", 0.0, "")
+    traffic.received(KEYS.ready("inv1"), b"ready", 0.0, "")
+    traffic.token(KEYS.alive_agent("inv2", "b"), 0.0, appeared=True)
+    traffic.line("all are there")
+    traffic.ticked(4)
+    traffic.ticked(5)
+
+    assert noted(journal) == [
+        Received(None, "state/inv1", b"bad", "corrupt"),
+        Sent(None, "control", b"go"),
+        Received(None, "ready/inv1", b"ready"),
+        Token(None, "alive/agent/inv2/b", True),
+        Process(None, "line", "all are there"),
+        Exchange(4, [b"m1", b"m2"], [b"s2", b"s1"]),
+    ]
+
+
+@pytest.mark.parametrize("count", [AT_ONCE, AT_ONCE + 1, 2 * AT_ONCE + 3])
+def test_the_messages_of_many_agents_are_several_entries(count: int) -> None:
+    """Each message is in one of them, and none has more than fit into a part of a journal."""
+    journal = JournalBuffer()
+    traffic = TickTraffic(KEYS, ("inv1",), journal)
+    for number in range(count):
+        traffic.sent(KEYS.measurement("inv1"), b"m%d" % number)
+        traffic.received(KEYS.state("inv1"), b"s%d" % number, 0.0, "")
+    traffic.ticked(4)
+
+    entries = [entry for entry in noted(journal) if isinstance(entry, Exchange)]
+    assert len(entries) == -(-count // AT_ONCE)
+    assert max(len(entry.states) for entry in entries) <= AT_ONCE
+    assert [raw for entry in entries for raw in entry.measurements] == [b"m%d" % number for number in range(count)]
+    assert [raw for entry in entries for raw in entry.states] == [b"s%d" % number for number in range(count)]
+
+
+@pytest.mark.parametrize("count", [1, AT_ONCE, AT_ONCE + 1])
+def test_in_one_process_a_tick_has_the_values_of_its_messages(count: int) -> None:
+    """In the order of the fields, as nothing was encoded to be sent."""
+    journal = JournalBuffer()
+    measurement = Measurement(
+        sender="plant", epoch=1, seq=4, t=0.08, to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0,
+        P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=(),
+    )  # fmt: skip
+    state = State(sender="inv1", epoch=1, seq=4, t=0.08, P_set=5e4, V_set=277.0, Q=0.0)
+    TickTraffic(KEYS, ("inv1",), journal).exchanged(4, [measurement] * count, [state] * count)
+
+    entries = [entry for entry in noted(journal) if isinstance(entry, Exchange)]
+    assert {entry.tick for entry in entries} == {4}
+    measurements = [raw for entry in entries for raw in entry.measurements]
+    states = [raw for entry in entries for raw in entry.states]
+    assert (len(measurements), len(states)) == (count, count)
+    assert dict(zip(State.__struct_fields__, states[-1], strict=True))["P_set"] == 5e4
+    assert dict(zip(Measurement.__struct_fields__, measurements[-1], strict=True))["to"] == "inv1"
