@@ -340,7 +340,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
             raise ValueError(f"ages: {len(self.ages)} of {len(self.neighbours)} neighbours")
 
 
-class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """An event of the plant or of the roster, for `events.csv`."""
 
     t: Time
@@ -348,9 +348,15 @@ class PlantEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     kind: Literal["switch", "island", "dead", "trip", "inverter", "limit", "load", "roster", "link", "law", "warning"]
     """Kind of the event."""
     subject: Label
-    """The switch, island or agent concerned."""
+    """The switch, load, island or agent concerned."""
     text: Text
     """One sentence for a person."""
+    closed: bool | None = None
+    """Of a switch: whether it is closed from now on; None of other events, and in records of format 1."""
+    P: Power | None = None
+    """Of a load: its real power at nominal voltage from now on (W); None as `closed`."""
+    Q: Power | None = None
+    """Of a load: its reactive power at nominal voltage from now on (var)."""
 
 
 class Pacing(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

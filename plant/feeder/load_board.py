@@ -96,7 +96,7 @@ class LoadBoard:
         t, events = time_of(step, self._h), []
         for name, S in self._coming.items():
             text = f"load {name} set to {self._powers.words(name, S)}"
-            events.append(PlantEvent(t=t, kind="load", subject=name, text=text))
+            events.append(PlantEvent(t=t, kind="load", subject=name, text=text, P=S.real, Q=S.imag))
             self._put(self._set, name, S)
         self._coming = {}
         return self._network_with(self._set), events

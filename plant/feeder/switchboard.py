@@ -110,7 +110,8 @@ class Switchboard:
             what = f"was {'closed' if known else 'open'} already" if already else _PAST[action]
             switch = self.switch(name)
             text = f"switch {switch.full_name} {what}{notes.get(name, '')}"
-            events.append(PlantEvent(t=t, kind="switch", subject=switch.event_name, text=text))
+            closed = action == "close"
+            events.append(PlantEvent(t=t, kind="switch", subject=switch.event_name, text=text, closed=closed))
         return events
 
 

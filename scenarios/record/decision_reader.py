@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-from bisect import bisect_right
 from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
-from math import inf
-from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -17,6 +14,7 @@ from agents.graphs import GraphError
 from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
 from netem.liar import HeardFrom
+from scenarios.record.decision_entries import DecisionEntries
 from scenarios.record.heard_lies import StatesInRecord, hearing_of
 from scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
 from scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
@@ -25,23 +23,6 @@ from wire.messages import OFF, PLANT, Measurement, Nameplate, State
 from wire.timing.clock import time_of
 
 _NOTHING = Decision(0, 0, [], [], [], [])
-
-
-class _Forms(NamedTuple):
-    """How an agent decides in simulated time."""
-
-    ticks: list[int]
-    """The ticks from which on the entries hold, in their order."""
-    entries: list[Decision]
-    covered: float
-    """Run time (s) up to which the journal is there."""
-    holes: list[tuple[float, float]]
-    """Run times (s) between which entries may be lost: the first one excluded, the last one included."""
-
-
-def inside(holes: list[tuple[float, float]], t: float) -> bool:
-    """Whether a run time (s) is in one of `DecisionReader.holes`."""
-    return any(since < t <= until for since, until in holes)
 
 
 class DecisionReader:
@@ -56,7 +37,8 @@ class DecisionReader:
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
         self._nameplates = {config.name: nameplate_of(config) for config in index.info.agents}
-        self._forms = lru_cache(maxsize=None)(self._read_forms)
+        self.entries = DecisionEntries(index)
+        """How the agents decided, where the record has it."""
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
         self._hearing = lru_cache(maxsize=None)(self._heard_from)
         self._true_states = StatesInRecord(index)
@@ -68,55 +50,20 @@ class DecisionReader:
             return iter(())
         return (self._in_ticks if self._info.clock == "simulated" else self._live)(config, since, until)
 
-    def forget(self) -> None:
-        """Forget what was read of all parts: there are more of them now."""
-        self._forms.cache_clear()
-
     # ---------------------------------------------------------------- simulated time
-
-    def holes(self, agent: str) -> list[tuple[float, float]]:
-        """Return the run times (s) between which it is not known how an agent decided: the file is damaged there.
-
-        The first one is excluded, the last one included. In wall-clock time each decision tells all by itself.
-        """
-        return self._forms(agent).holes if self._info.clock == "simulated" else []
-
-    def _read_forms(self, agent: str) -> _Forms:
-        """Return how an agent decides, and since when."""
-        found: dict[int, Decision] = {}
-        holes: list[tuple[float, float]] = []
-        times: list[float] = []
-        last: tuple[int, int] | None = None
-        for journal in self._index.journals(agent):
-            following = (0 if last is None or last[0] != journal.epoch else last[1] + 1) == journal.seq
-            if not following:  # a part of the journal is lost
-                holes.append((times[-1] if times else -1.0, journal.t))
-            last = journal.epoch, journal.seq
-            times.append(journal.t)
-            for entry in self._index.entries_in(journal):
-                if isinstance(entry, Decision):
-                    found[entry.tick] = entry
-        for since, _ in self._index.file.holes:  # the entries that were lost there hold up to the next ones
-            holes.append((since, next((t for t in times if t > since), inf)))
-        linked = bool((config := self._info.agent(agent)) and config.links)
-        ticks = sorted(found)
-        # the journal of one with links comes in parts: of what is behind the last one nothing is known
-        covered = max(times, default=-1.0) if linked else inf
-        return _Forms(ticks, [found[tick] for tick in ticks], covered, holes)
 
     def _in_ticks(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name, T_c = config.name, self._info.T_c
-        ticks, forms, covered, holes = self._forms(name)
         for index in self._index.near(since, until):
             own = [
                 each for (sender, _), all_ in self._index.part(index).states.items() if sender == name for each in all_
             ]
             for state in sorted(own, key=lambda each: each.seq):
                 t = time_of(state.seq, T_c)
-                if not since - 1e-9 <= t <= until + 1e-9 or t > covered or inside(holes, t):
+                if not since - 1e-9 <= t <= until + 1e-9 or not self.entries.knows(name, t):
                     continue
-                at = bisect_right(ticks, state.seq) - 1
-                decision = self._at_tick(config, state, t, forms[at] if at >= 0 else _NOTHING)
+                form = self.entries.at(name, state.seq) or _NOTHING
+                decision = self._at_tick(config, state, t, form)
                 if decision is not None:
                     yield decision
 

@@ -78,13 +78,16 @@ class MessageIndex:
         self.damage: list[str] = []
         """Sentences on what could not be read."""
         wall = self.info.clock == "wall"
-        self._speed = max(1.0, self.info.plant.speed) if wall else 1.0
-        self._late = LATE * self._speed if wall else max(LATE, REPORT_TICKS * self.info.T_c)
+        speed = self.info.plant.speed if wall else 0.0
+        self._late = LATE * max(1.0, speed) if wall else max(LATE, REPORT_TICKS * self.info.T_c)
         """As `LATE`, of run time: in simulated time reports come every so many ticks."""
+        self._reach = max(0.0, 2.0 * speed - 1.0)
+        """How much further than its own time a message is looked for (s of run time): a journal comes up to a second of
+        wall time after what it is about, and so does that of the sender."""
         self._ends: list[float] = []
         """Last run time (s) of each part."""
         self._note_parts()
-        self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 12 in real time
+        self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 20 in real time
 
     def refresh(self) -> bool:
         """Note what the file of a run that is still recorded has got since; return whether that is anything."""
@@ -137,10 +140,6 @@ class MessageIndex:
         except ValueError as error:
             self.note_damage(f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read: {error}")
 
-    def journals(self, node: str) -> Iterator[Journal]:
-        """Yield the parts of the journal of a node."""
-        return (journal for journal in self.of_type("journal", Journal) if journal.sender == node)
-
     def journals_in(self, part: int) -> Iterator[Journal]:
         """Yield the parts of journals, of all nodes, in one part of the file."""
         return self.of_type("journal", Journal, (part,))
@@ -158,21 +157,19 @@ class MessageIndex:
         parts = (self.part(i).states for i in self._about(t, reach))
         return _nearest((each for part in parts for each in part.get((sender, number), ())), t, epoch)
 
-    def measurement(
-        self, to: str, number: int, t: float, epoch: int | None = None, reach: float = 0.0
-    ) -> Measurement | None:
+    def measurement(self, to: str, number: int, t: float, epoch: int | None = None) -> Measurement | None:
         """Return a measurement of about run time t (s), as `state` does."""
-        parts = (self.part(i).measurements for i in self._about(t, reach))
+        parts = (self.part(i).measurements for i in self._about(t))
         return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
 
-    def named_by(self, entry: Heard, t: float, reach: float = 0.0) -> State | Measurement | None:
+    def named_by(self, entry: Heard, t: float) -> State | Measurement | None:
         """Return the message of about run time t (s) that an entry names by its number, as `state` does."""
         find = self.measurement if kind_of(entry.key) == "measurement" else self.state
-        return find(name_of(entry.key), entry.seq, t, entry.epoch, reach)
+        return find(name_of(entry.key), entry.seq, t, entry.epoch)
 
-    def _about(self, t: float, reach: float) -> range:
+    def _about(self, t: float, reach: float = 0.0) -> range:
         """Return the parts that may have a message of about run time t (s): a journal tells of the last second."""
-        further = max(reach, 2.0 * (self._speed - 1.0))
+        further = max(reach, self._reach)
         return self.near(t - 1.0 - further, t + further)
 
     def messages(self, sender: str | None, since: float, until: float, kind: str | None) -> Iterator[MessageOnWire]:

@@ -175,6 +175,7 @@ class RecordFile:
                 since, until, size = _TIMES.unpack(file.read(_TIMES.size))
                 if size > MOST_CHUNK or since > until:
                     self._damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
+                    self.holes.append((self.t_end, self.t_end))
                 else:
                     self._chunks.append(_ChunkPlace(start, length, since, until))
             elif opcode == Opcode.HEADER:
@@ -233,11 +234,13 @@ class RecordFile:
         except OSError as error:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
         except _BROKEN as error:
-            self.holes.append((place.since / 1e9, place.until / 1e9))
-            self._damage.append(
-                f"a chunk is damaged, from t = {place.since / 1e9:.2f} s to {place.until / 1e9:.2f} s: "
-                f"{str(error)[:100] or type(error).__name__}"
-            )
+            hole = place.since / 1e9, place.until / 1e9
+            if hole not in self.holes:
+                self.holes.append(hole)
+                self._damage.append(
+                    f"a chunk is damaged, from t = {hole[0]:.2f} s to {hole[1]:.2f} s: "
+                    f"{str(error)[:100] or type(error).__name__}"
+                )
             return ()
         messages = []
         for record in records:

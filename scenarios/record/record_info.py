@@ -14,8 +14,9 @@ from wire.messages import Measurement, State
 FILE = "run.mcap"
 """Name of a record in the folder of its case."""
 
-FORMAT = 1
-"""Version of the format. A reader refuses a record of a later one; a new kind of entry or message does not raise it."""
+FORMAT = 2
+"""Version of the format. A reader refuses a record of a later one; a new kind of entry or message does not raise it.
+Since 2 events have what became of switches and loads as numbers, not in words alone."""
 
 PROFILE = "gridpeers"
 """Profile in the header of the file, by which a record of ours is known."""

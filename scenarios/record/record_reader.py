@@ -9,25 +9,33 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterable, Iterator
-from math import inf
+from math import inf, isnan
+from numbers import Real
 from pathlib import Path
-from typing import TypeVar
+from typing import TypeVar, get_args
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.emulation.link_reports import data_of
-from scenarios.record.decision_reader import DecisionReader, inside
+from scenarios.record.decision_entries import DecisionEntries
+from scenarios.record.decision_reader import DecisionReader
+from scenarios.record.journal_coverage import Hole
 from scenarios.record.message_index import MessageIndex, MessageOnWire
 from scenarios.record.record_file import RecordFile, RecordFileError
-from scenarios.record.record_info import FILE
+from scenarios.record.record_path import record_path
 from scenarios.record.recorded_decision import RecordedDecision
 from scenarios.results.history import History
 from scenarios.short_names import short
 from wire.journal import Entry
-from wire.messages import LinkReport, LinkRequest, PlantEvent, Telemetry
+from wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
+from wire.schema.suggestion import suggestion
+from wire.timing.clock import time_of
 
 __all__ = ["RecordFileError", "RunRecord"]
 
 T = TypeVar("T")
+
+KINDS = tuple(kind.__name__ for kind in get_args(AnyMessage))
+"""Types of the messages that a record may have."""
 
 
 class RunRecord:
@@ -63,21 +71,28 @@ class RunRecord:
         """What is in each part of the file, for readers that go through it by parts."""
         return self._index
 
+    @property
+    def entries_of_decisions(self) -> DecisionEntries:
+        """How agents decided, and where the record lacks it, for readers that look at all agents."""
+        return self._decisions.entries
+
     @classmethod
-    def open(cls, path: str | Path) -> RunRecord:
+    def open(cls, path: str | Path, case: str = "") -> RunRecord:
         """Open a record.
 
         Parameters
         ----------
         path : str or Path
-            The file run.mcap, the folder of a case, or the folder of a run with one case.
+            The file run.mcap, the folder of a case, or the folder of a run.
+        case : str, optional
+            Case of the run, if it has several.
 
         Raises
         ------
         RecordFileError
-            If there is none, it is no record of gridpeers, or from a later version; one sentence.
+            If there is none, or none of the case, it is no record of gridpeers, or from a later version; one sentence.
         """
-        return cls(RecordFile(_file_of(Path(path))))
+        return cls(RecordFile(record_path(path, case)))
 
     # ---------------------------------------------------------------- what it is
 
@@ -88,10 +103,7 @@ class RunRecord:
 
     def refresh(self) -> bool:
         """Take in what was written since, of a run that is still recorded; return whether that is anything."""
-        changed = self._index.refresh()
-        if changed:
-            self._decisions.forget()
-        return changed
+        return self._index.refresh()
 
     @property
     def damage(self) -> tuple[str, ...]:
@@ -121,6 +133,7 @@ class RunRecord:
 
         Messages have the rows of a while: those between two run times (s) come with others around them.
         """
+        _check_times(since=since, until=until)
         return self._index.of_type("telemetry", Telemetry, self._index.near(since, until))
 
     def physics(self) -> History:
@@ -160,6 +173,11 @@ class RunRecord:
         kind : str, optional
             Type of the messages, such as "State" or "Measurement"; by default all.
         """
+        _check_times(since=since, until=until)
+        if not isinstance(sender, str | None):
+            raise RecordFileError(f'sender: needs the name of an agent, or "plant", got {sender!r:.60}')
+        if kind is not None and kind not in KINDS:
+            raise RecordFileError(f"kind: no message is a {kind!r:.60}; {suggestion(str(kind), KINDS, 'types')}")
         return self._index.messages(sender, since, until, kind)
 
     def heard(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[MessageOnWire]:
@@ -174,6 +192,7 @@ class RunRecord:
             If there was no such agent.
         """
         self._require(agent)
+        _check_times(since=since, until=until)
         return self._decisions.heard(agent, since, until)
 
     def entries(self, node: str, *, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
@@ -181,6 +200,7 @@ class RunRecord:
 
         An entry has no run time of its own: `since` and `until` (s) choose the parts of the journal, of 0.2 s or so.
         """
+        _check_times(since=since, until=until)
         return self._index.entries(node, since, until)
 
     def links(self) -> Iterator[LinkTrace]:
@@ -216,17 +236,18 @@ class RunRecord:
             If there was no such agent, or the record has the physics only.
         """
         self._require(agent)
+        _check_times(since=since, until=until)
         if self.info.level == "physics":
             raise RecordFileError(f'{self.path}: it has no decisions: the run was recorded with record = "physics"')
         return self._decisions.decisions(agent, since, until)
 
-    def holes(self, agent: str) -> list[tuple[float, float]]:
+    def holes(self, agent: str) -> list[Hole]:
         """Return the run times (s) between which it is not known how an agent decided: the file is damaged there.
 
-        The first one is excluded, the last one included.
+        The first one is excluded, the last one included. In wall-clock time single decisions in between may be there.
         """
         self._require(agent)
-        return self._decisions.holes(agent)
+        return list(self._decisions.entries.holes(agent))
 
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
@@ -237,22 +258,25 @@ class RunRecord:
             If there was no such agent, the time is outside of the record, the agent had not decided by then, or the
             record lacks what it decided.
         """
+        _check_times(t=t)
         if not 0.0 <= t <= self.t_end + self.info.T_c:
             raise RecordFileError(
                 f"{self.path}: t = {t:g} s is outside of the record, which has 0 to {self.t_end:.2f} s"
             )
-        if inside(self.holes(agent), t):
-            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self.damage[0]}")
-        back = 1.0
-        while True:
+        back, found = 1.0, None
+        while found is None and back < 4.0 * (t + 1.0):
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
-            if found is not None:
-                return found
-            if back > t:
-                raise RecordFileError(
-                    f"{self.path}: {agent} had not decided anything by t = {t:g} s{self._first(agent)}"
-                )
             back *= 4.0
+        T_c = self.info.T_c
+        at = time_of(int(t / T_c + 1e-6), T_c) if self.info.clock == "simulated" else t
+        if any(a < at <= b and (found is None or found.t <= a + 1e-9) for a, b in self.holes(agent)):
+            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self._lost()}")
+        if found is None:
+            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{self._first(agent)}")
+        return found
+
+    def _lost(self) -> str:
+        return self.damage[0] if self.damage else "parts of journals never came into it"
 
     def _first(self, agent: str) -> str:
         first = next(self.decisions(agent), None)
@@ -260,29 +284,19 @@ class RunRecord:
             return f", as far as the record has it: {self.damage[0]}"
         return "" if first is None else f"; its first decision is of t = {first.t:.2f} s"
 
-    def _require(self, agent: str) -> None:
+    def _require(self, agent: object) -> None:
         if agent != "plant" and agent not in self.agents:
-            raise RecordFileError(f"{self.path}: there was no agent {agent}; agents are {short(self.agents)}")
+            raise RecordFileError(f"{self.path}: there was no agent {agent!s:.64}; agents are {short(self.agents)}")
+
+
+def _check_times(**times: object) -> None:
+    """Refuse what is no run time, by the name of its argument."""
+    for name, t in times.items():
+        if not isinstance(t, Real) or isnan(t):
+            raise RecordFileError(f"{name}: needs a run time in s, as 4.3, got {t!r:.60}")
 
 
 def _last(items: Iterable[T]) -> T | None:
     """Return the last of some items; None if there is none."""
     latest = deque(items, maxlen=1)
     return latest[0] if latest else None
-
-
-def _file_of(path: Path) -> Path:
-    """Return the file of a record, given the file, or the folder of its case or of its run."""
-    if path.is_file() or not path.exists():
-        return path
-    if (path / FILE).exists():
-        return path / FILE
-    found = sorted(path.glob(f"*/{FILE}"))
-    if len(found) == 1:
-        return found[0]
-    if not found:
-        raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
-    cases = ", ".join(file.parent.name for file in found)
-    raise RecordFileError(
-        f"{path}: it has a record of each case, {cases}; give the folder of one, as {found[0].parent}"
-    )

@@ -17,6 +17,13 @@ Action = Literal["law", "hold", "off", "idle"]
 """What an agent does at a tick: its law decides; secondary control is on hold, as the inverter is grid-connected or has
 none; the inverter is out of service; the agent is paused, without a measurement, or its law has failed."""
 
+_IN_WORDS: dict[Action, str] = {
+    "law": "its law decided",
+    "hold": "secondary control was on hold while grid-connected: the set-points follow the plant's",
+    "off": "its inverter was out of service: nothing to control",
+    "idle": "it was idle: paused, without a measurement, or its law has failed",
+}
+
 
 @dataclass(frozen=True, kw_only=True)
 class NeighbourInput:
@@ -105,6 +112,18 @@ class RecordedDecision:
             for each in self.neighbours
             if not each.unused and each.state is not None and each.age is not None
         )
+
+    @property
+    def takes_part(self) -> bool:
+        """Whether the agent has secondary control in this case."""
+        return self.config.control.acts(self.config.name, self.config.kind)
+
+    @property
+    def in_words(self) -> str:
+        """What the agent did, in words."""
+        if self.action == "hold" and not self.takes_part:
+            return "it has no secondary control in this case: the set-points are those that the plant holds"
+        return _IN_WORDS[self.action]
 
     @property
     def T(self) -> float:

@@ -98,7 +98,7 @@ class RecordedProcess:
 
     def message(self, entry: Heard, t: float) -> AnyMessage | None:
         """Return a message that it heard by its number, about run time t (s); None if the record does not have it."""
-        return self._parts.index.named_by(entry, t, self._parts.reach)
+        return self._parts.index.named_by(entry, t)
 
 
 class JournalParts:
@@ -108,14 +108,10 @@ class JournalParts:
     ----------
     index : MessageIndex
         Of the record.
-    speed : float
-        Run time per wall time (s/s): a journal comes up to a second of wall time after what it is about.
     """
 
-    def __init__(self, index: MessageIndex, speed: float) -> None:
+    def __init__(self, index: MessageIndex) -> None:
         self.index, self.count = index, len(index.file.spans)
-        self.reach = max(0.0, 2.0 * speed - 1.0)
-        """How much further than its own time a message is looked for (s of run time)."""
         self.of = lru_cache(maxsize=16)(self._of)
 
     def _of(self, number: int) -> dict[tuple[str, int], list[tuple[Journal, list[Entry]]]]:
@@ -149,9 +145,8 @@ def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
     ReplayError
         If the record has no arrivals, or nothing at all.
     """
-    info = record.info
     require_arrivals(record)
-    found = sorted(JournalParts(record.index, info.plant.speed).processes(), key=lambda each: each.name != PLANT)
+    found = sorted(JournalParts(record.index).processes(), key=lambda each: each.name != PLANT)
     if not found:
         raise ReplayError(f"{record.path}: it ends before any process has noted what it was given")
     return tuple(found)

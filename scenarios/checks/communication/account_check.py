@@ -11,6 +11,7 @@ from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.record_content import Link, RecordContent, SentState
 from scenarios.checks.communication.used_states import used_states
+from scenarios.record.journal_coverage import inside
 from wire.messages import PLANT
 from wire.schema.plausible import Plausible, Unit
 
@@ -113,6 +114,7 @@ def _not_used(content: RecordContent, agent: str) -> Iterator[tuple[Link, list[f
         for_neighbours[name] = {state.number for state in states.values() if not (state.quiet or state.idle)}
         all_sent[name] = {state.number for state in states.values()}
     own = {state.number for state in content.of_agent(agent) if not state.idle}
+    lost, T_c = content.holes.get(PLANT, ()), content.info.T_c
     found: dict[Link, list[float]] = {}
     for each in used_states(content, agent):
         if each.link in content.counts:
@@ -126,6 +128,7 @@ def _not_used(content: RecordContent, agent: str) -> Iterator[tuple[Link, list[f
             before = state.number - 1
             newer = before in sent and before in own and lag != 1
             invented = lag is not None and not each.unused and state.number - lag not in there
+            invented = invented and not inside(lost, (state.number - (lag or 0)) * T_c)
             if newer or invented:
                 missing.append(state.t)
     yield from found.items()

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,8 @@ import msgspec
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.emulation.link_reports import data_of
+from scenarios.record.decision_entries import is_periodic
+from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage, inside
 from scenarios.record.journal_reader import values_of
 from scenarios.record.record_file import RecordFile
 from scenarios.record.record_info import RecordInfo
@@ -28,6 +31,7 @@ from wire.codec import sound
 from wire.journal import Decision
 from wire.journal_keys import kind_of, name_of
 from wire.messages import PLANT, Journal, LinkReport, State
+from wire.timing.clock import time_of
 
 MOST_BYTES = 64_000_000
 """Largest record that is read for a verdict: some ten minutes of nine agents, which take ten seconds."""
@@ -63,6 +67,9 @@ class RecordContent:
     """States of each agent by epoch and number, in the order of time."""
     decisions: Mapping[str, list[tuple[int, Decision]]] = field(default_factory=dict)
     """How each agent decided, with its epoch, in the order of time; in simulated time each holds until the next one."""
+    holes: Mapping[str, Sequence[Hole]] = field(default_factory=dict)
+    """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard: the
+    file is damaged there, or the rest of a journal is missing."""
     heard: Mapping[Link, dict[tuple[int, int], str]] = field(default_factory=dict)
     """Wall-clock time: epoch and number of each state that arrived, and why it was rejected, if it was."""
     counts: Mapping[Link, LinkCounts] = field(default_factory=dict)
@@ -94,7 +101,8 @@ class RecordContent:
 
     def segments(self, agent: str) -> Iterator[tuple[Decision, list[SentState]]]:
         """Yield how an agent decided, each with the states that came out: not those in which it was idle."""
-        own = [state for state in self.of_agent(agent) if not state.idle]
+        holes = self.holes.get(agent, ())
+        own = [state for state in self.of_agent(agent) if not (state.idle or inside(holes, state.t))]
         entries = self.decisions.get(agent, [])
         if self.simulated:
             ticks = [entry.tick for _, entry in entries]
@@ -139,6 +147,7 @@ class _Pass:
         self._file, self._info = file, file.info
         self._states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
         self._decisions: dict[str, dict[tuple[int, int], Decision]] = defaultdict(dict)
+        self._coverage: dict[str, JournalCoverage] = {}
         self._heard: dict[Link, dict[tuple[int, int], str]] = defaultdict(dict)
         self._counts: dict[Link, LinkCounts] = {}
         self._traces: dict[Link, list[LinkTrace]] = defaultdict(list)
@@ -150,8 +159,12 @@ class _Pass:
         for record in self._file.messages(("journal", "link_reports")):
             message = sound(record.data)
             if isinstance(message, Journal):
+                ticks: list[int] = []
                 for entry in _raw_entries(message.data):
                     self._take(message, entry)
+                    if entry[0] in ("decision", "exchange"):
+                        ticks.append(entry[1])
+                self._cover(message, ticks)
             elif isinstance(message, LinkReport):
                 self._report(message)
             else:
@@ -161,6 +174,7 @@ class _Pass:
             t_end=self._file.t_end,
             states=self._states,
             decisions={agent: self._in_order(of) for agent, of in self._decisions.items()},
+            holes=self._holes(),
             heard=self._heard,
             counts=self._counts,
             traces=self._traces,
@@ -171,6 +185,25 @@ class _Pass:
     def _in_order(self, of: dict[tuple[int, int], Decision]) -> list[tuple[int, Decision]]:
         entries = [(epoch, decision) for (epoch, _), decision in of.items()]
         return sorted(entries, key=lambda each: each[1].tick) if self._info.clock == "simulated" else entries
+
+    def _cover(self, journal: Journal, ticks: list[int]) -> None:
+        """Note which part of a journal is there, and the ticks of which it tells."""
+        name = journal.sender
+        if name not in self._coverage:
+            self._coverage[name] = JournalCoverage(periodic=is_periodic(self._info, name))
+        T_c = self._info.T_c
+        times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
+        self._coverage[name].take(journal, lambda: times)
+
+    def _holes(self) -> dict[str, Sequence[Hole]]:
+        """Return the run times (s) between which it is not known how each node decided."""
+        if self._info.clock != "simulated":  # each entry tells all by itself
+            return {}
+        numbered, damaged = self._info.driver != "inprocess", self._file.holes
+        return {
+            name: [*each.holes(damaged, numbered=numbered), (each.known_until + INSTANT, inf)]
+            for name, each in self._coverage.items()
+        }
 
     def _take(self, journal: Journal, entry: Any) -> None:
         kind = entry[0]

@@ -172,6 +172,7 @@ class RunMonitor:
             V=None if V is None or config is None else V / config.V_nom,
             V_set=None if V_set is None or config is None else V_set / config.V_nom,
             ages={neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used},
+            hears=None if status is None else len(status.used),
             received=status.received if status else None,
             sent=status.sent if status else None,
             lost=status.lost if status else None,

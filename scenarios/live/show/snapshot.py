@@ -31,6 +31,8 @@ class InverterStatus:
     """pu of its nominal voltage."""
     ages: dict[str, float] = field(default_factory=dict)
     """Age (s) of the latest state of each neighbour that it uses."""
+    hears: int | None = None
+    """Neighbours that it uses; None if that is not known."""
     received: int | None = None
     """Messages that came in."""
     sent: int | None = None

@@ -81,7 +81,8 @@ export class Diagram {
   // Each label goes where it covers least of the marks and of the labels before it.
   label(r, W) {
     const covered = [...this.inverters.values()].map(({ x, y }) => [x - r - 2, y - r - 2, x + r + 2, y + r + 2]);
-    for (const { g } of this.switches.values()) { const box = g.querySelector(".grab"); covered.push([+box.getAttribute("x") + 4, +box.getAttribute("y") + 4, +box.getAttribute("x") + 18, +box.getAttribute("y") + 18]); }
+    for (const { g } of this.switches.values()) { const box = g.querySelector(".grab"); covered.push([+box.getAttribute("x") + 4, +box.getAttribute("y") + 4, +box.getAttribute("x") + 18, +box.getAttribute("y") + 18]);
+      const text = g.querySelector("text"), x = text && +text.getAttribute("x"), y = text && +text.getAttribute("y"); if (text) covered.push([x, y - 10, x + 6 * text.textContent.length, y + 3]); }
     const shared = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
     for (const [name, drawn] of this.inverters) {
       const w = 50, h = 27, gap = r + 6, { x, y } = drawn;

@@ -17,7 +17,7 @@ const number = (value, digits) => value === null || value === undefined ? "–" 
 const COLUMNS = [
   ["agent", "", i => i.name], ["island", "", i => i.island || "–", "text"], ["f", "Hz", i => number(i.f, 3)], ["P", "kW", i => number(i.P, 1)],
   ["P_set", "kW", i => number(i.P_set, 1)], ["P", "pu", i => number(i.P_share, 3)], ["Q", "kvar", i => number(i.Q, 1)], ["V", "pu", i => number(i.V, 4)],
-  ["V_set", "pu", i => number(i.V_set, 4)], ["hears", "", i => i.received === null && !(S.hello?.record && i.island) ? "–" : String(Object.keys(i.ages).length)],
+  ["V_set", "pu", i => number(i.V_set, 4)], ["hears", "", i => i.hears ?? "–"],
   ["age", "s", i => { const ages = Object.values(i.ages); return ages.length ? number(Math.max(...ages), 2) : "–"; }, "age"],
   ["in", "", i => i.received ?? "–", "count"], ["out", "", i => i.sent ?? "–", "count"], ["lost", "", i => i.lost ?? "–", "count"], ["", "", i => i.note, "text note"],
 ];
@@ -60,7 +60,7 @@ function connect() {
 }
 function take(message) {
   if (message.hello) {
-    S.hello = message.hello; player.keepTime(); $("run").textContent = S.hello.run; document.title = `${S.hello.run} – gridpeers view`;
+    S.hello = message.hello; player.keepTime(); entitle("", "", S.hello.run);
     $("control").hidden = $("tools").hidden = !S.hello.control; $("player").hidden = $("decision").hidden = !S.hello.record; strips.end = null; strips.length = 30; put($("strips-title"), "Last 30 s");
     $("rights").textContent = S.hello.record ? `${S.hello.where}: a record: nothing can be changed` : S.hello.control ? "" : "nothing can be changed; start it with --control to act";
     document.body.classList.toggle("can-act", S.hello.control); document.body.classList.toggle("record", !!S.hello.record); heads();
@@ -71,10 +71,16 @@ function take(message) {
   else if (message.decision) { takeDecision(message.decision); }
   else if (message.problem) { player.failed(); put($("live-text"), message.problem); }
   else if (message.map) {
-    S.map = message.map; recolour(); legend(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
+    S.map = message.map; if (!S.hello.record) entitle(S.map.scenario, S.map.case, S.hello.run);
+    recolour(); legend(); fill($("switch"), S.map.switches.map(s => [s.name, s.alias ? `${s.alias} (${s.name})` : s.name]));
     fill($("load"), (S.map.loads || []).map(load => [load.name, load.name])); $("load-choice").hidden = !S.map.loads?.length;
   } else if (message.done) { done(message.done); }
   else if (message.frame) { takeFrame(message.frame); }
+}
+// what runs, in the head of the page and in the tab: a run of several is known by its name as well
+function entitle(scenario, name, run = "") {
+  const text = [scenario + (name ? `, case ${name}` : ""), run && (scenario ? `run ${run}` : run)].filter(Boolean).join(" · ");
+  put($("run"), text); document.title = `${text} – gridpeers view`;
 }
 function clear() { S.links.clear(); S.pairs = null; strips.clear(); if (!S.hello.record) { S.events = []; $("event-list").replaceChildren(); } }
 function takeFrame(frame) {
@@ -138,7 +144,7 @@ function draw() {
   if (S.tip) showTip();
 }
 const acts = () => S.hello.control || S.hello.record;
-const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, received: null, sent: null, lost: null, island: "" });
+const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, hears: null, received: null, sent: null, lost: null, island: "" });
 const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 function heads() {
   const head = document.querySelector("thead tr"); head.replaceChildren(); document.querySelector("tbody").replaceChildren();
@@ -178,7 +184,7 @@ function fill(select, options) { select.replaceChildren(...options.map(([value, 
 function ask(question) { if (S.socket?.readyState !== 1) return false; S.socket.send(JSON.stringify(question)); return true; }
 function takeRecord(record) {
   clear(); S.frame = null; strips.names = []; player.open(record);
-  put($("run"), `${record.scenario}${record.case ? `, case ${record.case}` : ""}`); document.title = `${$("run").textContent} – gridpeers view`;
+  entitle(record.scenario, record.case);
   if (!record.agents.includes(S.chosen)) choose("");
 }
 function choose(name) {

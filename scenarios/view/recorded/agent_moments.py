@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections import Counter, defaultdict
 from functools import lru_cache
 from typing import NamedTuple
 
+from scenarios.record.journal_coverage import inside
 from scenarios.record.record_reader import RunRecord
 from wire.journal import Decision
 from wire.messages import PLANT, Measurement, State
@@ -31,13 +32,14 @@ class AgentMoment(NamedTuple):
     """Neighbours in its sums."""
     idle: bool
     """Whether it was paused, without a measurement, or its law had failed."""
+    known: bool = True
+    """Whether the record says how it decided: not where a part of its journal is missing."""
+    damaged: bool = False
+    """Whether that part is lost, as the file is damaged there."""
 
 
 class AgentMoments:
     """Find the last decisions of all agents at any time.
-
-    In simulated time an entry on how an agent decides holds until the next one, which may be minutes away. So the parts
-    of the file are gone through once, and where each agent has entries is kept.
 
     Parameters
     ----------
@@ -46,12 +48,8 @@ class AgentMoments:
     """
 
     def __init__(self, record: RunRecord) -> None:
-        self._index, self._info = record.index, record.info
-        self._parts = 0
-        """Parts that were gone through."""
-        self._places: dict[str, tuple[list[int], list[int]]] = {}
-        """Of each agent: first ticks of the parts that have entries of it, and these parts."""
-        self._entries_in = lru_cache(maxsize=64)(self._read_entries)
+        self._index, self._info, self._entries = record.index, record.info, record.entries_of_decisions
+        self._gone = max(GONE * max(1.0, self._info.plant.speed), 2.5 * self._info.T_c)
         self._sent_in = lru_cache(maxsize=64)(self._read_sent)
 
     def at(self, t: float) -> dict[str, AgentMoment]:
@@ -59,7 +57,7 @@ class AgentMoments:
         if self._info.level == "physics":
             return {}
         found = (self._in_ticks if self._info.clock == "simulated" else self._live)(t)
-        return {moment.name: moment for moment in found}
+        return self._perhaps_there(t) | {moment.name: moment for moment in found}
 
     def sent(self, since: float, until: float) -> Counter[str]:
         """Return how many states each agent sent to its neighbours after a run time (s) and up to another one."""
@@ -69,14 +67,19 @@ class AgentMoments:
                 counts[name] += bisect_right(times, until + 1e-9) - bisect_right(times, since + 1e-9)
         return counts
 
+    def lost(self, since: float, until: float) -> float:
+        """Return how much of the time between two run times (s) is lost, as the file is damaged there."""
+        holes = self._entries.holes(PLANT)
+        return sum(max(0.0, min(until, end) - max(since, begin)) for begin, end in holes)
+
     # ---------------------------------------------------------------- simulated time
 
     def _in_ticks(self, t: float) -> list[AgentMoment]:
-        self._go_through()
         T_c = self._info.T_c
         last, moments = int(t / T_c + 1e-6), []
         for config in self._info.agents:
-            for tick in range(last, max(-1, last - 2), -1):
+            lost = inside(self._entries.holes(config.name), last * T_c)
+            for tick in range(last, max(-1, last - (1 if lost else 2)), -1):
                 state = self._index.state(config.name, tick, tick * T_c)
                 if state is not None:
                     moments.append(self._at_tick(state, tick * T_c))
@@ -84,45 +87,18 @@ class AgentMoments:
         return moments
 
     def _at_tick(self, state: State, t: float) -> AgentMoment:
-        form = None if state.idle else self._form(state.sender, state.seq)
-        measured = self._index.measurement(state.sender, state.seq, t)
-        island = state.island if measured is None else measured.island
-        T_c = self._info.T_c
+        name, measured = state.sender, self._index.measurement(state.sender, state.seq, t)
+        if measured is None or not (state.idle or self._entries.knows(name, t)):
+            island = state.island if measured is None else measured.island
+            return _unknown(name, t, island, damaged=inside(self._entries.holes(name), t))
+        form, T_c = None if state.idle else self._entries.at(name, state.seq), self._info.T_c
         ages = () if form is None else tuple(-1.0 if lag is None else round(lag * T_c, 9) for lag in form.states)
-        return _moment(state.sender, t, island, form, ages, idle=state.idle)
-
-    def _form(self, name: str, tick: int) -> Decision | None:
-        """Return the entry that says how an agent decided at a tick."""
-        first_ticks, parts = self._places.get(name, ([], []))
-        place = bisect_right(first_ticks, tick) - 1
-        if place < 0:
-            return None
-        ticks, entries = self._entries_in(parts[place])[name]
-        return entries[bisect_right(ticks, tick) - 1]
-
-    def _read_entries(self, part: int) -> dict[str, tuple[list[int], list[Decision]]]:
-        """Return the entries of each agent in a part, and their ticks."""
-        found: dict[str, dict[int, Decision]] = defaultdict(dict)
-        for journal in self._index.journals_in(part):
-            if journal.sender != PLANT:
-                for entry in self._index.entries_in(journal):
-                    if isinstance(entry, Decision):
-                        found[journal.sender][entry.tick] = entry
-        return {name: (sorted(by_tick), [by_tick[tick] for tick in sorted(by_tick)]) for name, by_tick in found.items()}
-
-    def _go_through(self) -> None:
-        for part in range(self._parts, self._index.parts):
-            for name, (ticks, _) in self._read_entries(part).items():
-                first_ticks, parts = self._places.setdefault(name, ([], []))
-                at = bisect_left(first_ticks, ticks[0])
-                first_ticks.insert(at, ticks[0])
-                parts.insert(at, part)
-        self._parts = self._index.parts
+        return _moment(name, t, measured.island, form, ages, idle=state.idle)
 
     # ---------------------------------------------------------------- wall-clock time
 
     def _live(self, t: float) -> list[AgentMoment]:
-        gone = max(GONE * max(1.0, self._info.plant.speed), 2.5 * self._info.T_c)
+        gone = self._gone
         last: dict[str, tuple[Measurement, Decision]] = {}
         for part in self._index.near(t - gone, t):
             for journal, entry in self._index.part(part).entries:
@@ -139,11 +115,28 @@ class AgentMoments:
 
     # ---------------------------------------------------------------- both
 
+    def _perhaps_there(self, t: float) -> dict[str, AgentMoment]:
+        """Return the agents that may have been there, for all that a damaged file says."""
+        simulated = self._info.clock == "simulated"  # the plant has all states
+        since = t - (self._info.T_c if simulated else self._gone)
+
+        def is_lost(node: str) -> bool:
+            return any(begin < t and end >= since for begin, end in self._entries.holes(node))
+
+        names = [config.name for config in self._info.agents]
+        if not (simulated and is_lost(PLANT)):
+            names = [] if simulated else [name for name in names if is_lost(name)]
+        return {name: _unknown(name, t, "", damaged=True) for name in names}
+
     def _read_sent(self, part: int) -> dict[str, list[float]]:
         times: dict[str, list[float]] = defaultdict(list)
         for (name, _), states in self._index.part(part).states.items():
             times[name] += [state.t for state in states[:1] if not (state.quiet or state.idle)]
         return {name: sorted(each) for name, each in times.items()}
+
+
+def _unknown(name: str, t: float, island: str, *, damaged: bool) -> AgentMoment:
+    return AgentMoment(name, t, island, (), (), (), idle=False, known=False, damaged=damaged)
 
 
 def _moment(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator, Mapping
+from itertools import takewhile
 
 from msgspec.structs import replace
 
@@ -60,6 +61,7 @@ class RecordView:
         """The one-line diagram; the inverters in a ring if the feeder is not here."""
         self._switches = {switch.name: switch.closed for switch in self.map.switches}
         self._by_name = {name: switch.name for switch in self.map.switches for name in (switch.alias, switch.name)}
+        self._tables = {load.name: (load.P, load.Q) for load in self.map.loads}
         self.missing = tuple(_missing(record, has_feeder=feeder is not None))
         """Sentences on what the record, or this host, does not have."""
 
@@ -94,7 +96,12 @@ class RecordView:
             view.config(config)
         view.presence(plant=True, agents=self._present(t, agents), now=t)
         status = PlantStatus(
-            phase="running", t=t, speed=self.record.info.plant.speed, pacing=_STILL, switches=self._switches_at(t)
+            phase="running",
+            t=t,
+            speed=self.record.info.plant.speed,
+            pacing=_STILL,
+            switches=self._switches_at(t),
+            loads=self._loads_at(t),
         )
         view.plant_status(status)
         row = self._feed_row(view, t)
@@ -149,13 +156,24 @@ class RecordView:
     def _switches_at(self, t: float) -> dict[str, bool]:
         """Return the position of each switch."""
         positions = dict(self._switches)
-        for event in self.events:
-            if event.t > t + 1e-9:
-                break
+        for event in self._until(t):
             name = self._by_name.get(event.subject) if event.kind == "switch" else None
-            if name is not None and ("opened" in event.text or "closed" in event.text):
-                positions[name] = "opened" not in event.text
+            if name is not None and (closed := _closed_after(event)) is not None:
+                positions[name] = closed
         return positions
+
+    def _loads_at(self, t: float) -> dict[str, tuple[float, float]]:
+        """Return real (W) and reactive power (var) of each load that has another one than in its table."""
+        powers: dict[str, tuple[float, float]] = {}
+        for event in self._until(t):
+            if event.kind == "load" and event.P is not None and event.Q is not None:
+                powers[event.subject] = event.P, event.Q
+        return {name: power for name, power in powers.items() if power != self._tables.get(name)}
+
+    def _until(self, t: float) -> Iterator[PlantEvent]:
+        """Yield the events up to a run time (s)."""
+        self.events  # noqa: B018  reads them, if there are more
+        return takewhile(lambda event: event.t <= t + 1e-9, self._plant_events)
 
     def _feed_row(self, view: RunView, t: float) -> float | None:
         """Feed the last row; return its run time (s)."""
@@ -184,6 +202,7 @@ class RecordView:
         sent, faults = self._moments.sent(t - WINDOW, t), self._faults.into(t, WINDOW)
         T_c = self.record.info.T_c
         span = min(WINDOW, T_c * (int(t / T_c + 1e-6) + 1))  # in the first second: the periods that have begun
+        span = max(T_c, span - self._moments.lost(t - span, t))
         statuses = [_status(agent, sent[name], tuple(faults.get(name, ()))) for name, agent in agents.items()]
         view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
         for name in agents:
@@ -197,9 +216,12 @@ class RecordView:
         note = one.note
         if agent is not None and agent.idle:
             note = "idle: paused, without a measurement, or its law has failed"
+        elif agent is not None and agent.damaged:
+            note = "how it decided is not known: the record is damaged there"
         elif agent is None and note != "no agent":
             note = ""
-        return dataclasses.replace(one, received=None, sent=None, lost=None, note=note)
+        hears = one.hears if agent is None or agent.known else None
+        return dataclasses.replace(one, received=None, sent=None, lost=None, hears=hears, note=note)
 
 
 def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentStatus:
@@ -224,6 +246,13 @@ def _status(agent: AgentMoment, sent: int, impaired: tuple[str, ...]) -> AgentSt
         lateness=0.0,
         impaired=impaired,
     )
+
+
+def _closed_after(event: PlantEvent) -> bool | None:
+    """Return whether a switch is closed after an event; None if that is not told."""
+    if event.closed is None and ("opened" in event.text or "closed" in event.text):  # a record of format 1: words alone
+        return "opened" not in event.text
+    return event.closed
 
 
 def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:

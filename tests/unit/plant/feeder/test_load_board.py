@@ -56,6 +56,7 @@ def test_a_load_that_was_set_is_the_load_of_another_table() -> None:
     assert words == "load 48: 315 kW and 225 kvar at nominal voltage, 1.5 times its table"
     (told,) = [event for event in p.take_events() if event.kind == "load"]
     assert (told.t, told.subject) == (pytest.approx(at), "48")
+    assert (S.real, S.imag) == (told.P, told.Q)
     assert told.text == "load 48 set to 315 kW and 225 kvar at nominal voltage, 1.5 times its table"
     assert p.loads == {"48": S}
     for name, reading in p.measure().items():

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import shutil
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import pytest
 
+from plant.feeder import Plant
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.run_view import Frame
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
+from wire.messages import LoadSetting, PlantEvent
 
 ISLANDED = """
 [time]
@@ -134,7 +137,7 @@ def test_faults_of_links_are_those_of_the_time(view: RecordView) -> None:
     assert link(1.5, "inv1", "inv3") == (False, 0.0, 50.0)
 
 
-def test_switches_and_events_are_those_of_the_time(view: RecordView) -> None:
+def test_switches_eachevents_are_those_of_the_time(view: RecordView) -> None:
     """A switch has its position of the time, also going back; events are listed once, in their order."""
     positions = [view.frame(t).switches for t in (0.19, 0.2, 1.0, 0.0)]
 
@@ -142,6 +145,38 @@ def test_switches_and_events_are_those_of_the_time(view: RecordView) -> None:
     assert [event.number for event in view.events] == list(range(1, len(view.events) + 1))
     assert [event.t for event in view.events] == sorted(event.t for event in view.events)
     assert view.events[0].text == "switch 13-152 opened"
+
+
+def test_loads_are_those_of_the_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A load that was set has its power from then on, also going back, until it is as in its table again."""
+    advance, factors = Plant.advance, {10: 1.5, 20: 0.25, 30: 1.0}
+
+    def set_on_the_way(plant: Plant) -> None:
+        if plant.tick in factors:
+            plant.set_load("48", LoadSetting(factor=factors[plant.tick]))
+        advance(plant)
+
+    monkeypatch.setattr(Plant, "advance", set_on_the_way)
+    record = recorded_in_chunks(ISLANDED.partition("[[link]]")[0], tmp_path)
+    view = RecordView(record)
+
+    loads = [view.frame(t).loads for t in (0.18, 0.22, 0.44, 0.58, 0.62, 0.22)]
+
+    assert loads == [{}, {"48": (315e3, 225e3)}, {"48": (52.5e3, 37.5e3)}, {"48": (52.5e3, 37.5e3)}, {}, loads[1]]
+
+
+def test_switches_of_an_old_record_are_read_from_its_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In format 1 events have words alone."""
+
+    def in_words(*, closed: bool, **rest: Any) -> PlantEvent:
+        return PlantEvent(**rest)
+
+    monkeypatch.setattr("plant.feeder.switchboard.PlantEvent", in_words)
+    view = RecordView(recorded_in_chunks(ISLANDED.partition("[[link]]")[0], tmp_path))
+
+    positions = [view.frame(t).switches for t in (0.19, 0.2)]
+
+    assert [each["13-152"] for each in positions if each] == [True, False]
 
 
 def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
@@ -163,7 +198,7 @@ def test_a_decision_is_explained(record: RunRecord, view: RecordView) -> None:
     assert "10 states since: 10 cut off by a cut link" in view.decision("inv4", 0.7)
 
 
-def test_a_record_of_the_physics_shows_them_and_says_what_it_lacks(tmp_path: Path) -> None:
+def test_a_record_of_the_physics_shows_them_eachsays_what_it_lacks(tmp_path: Path) -> None:
     """No link and no age is made up; agents are there as the scenario says."""
     (tmp_path / "it.toml").write_text(ISLANDED.replace("1.6", "0.6"), encoding="utf-8")
     view = RecordView(recorded_run(tmp_path / "it.toml", "case", tmp_path / "case", level="physics"))
@@ -175,7 +210,7 @@ def test_a_record_of_the_physics_shows_them_and_says_what_it_lacks(tmp_path: Pat
     assert view.missing == ('It was recorded with record = "physics": no links and no decisions are in it.',)
 
 
-def test_without_the_feeder_the_inverters_stand_in_a_ring(record: RunRecord, tmp_path: Path) -> None:
+def test_without_the_feeder_the_inverters_steachin_a_ring(record: RunRecord, tmp_path: Path) -> None:
     """A feeder of one's own may have moved since the run; the rest of the page does not depend on it."""
     copy = RunRecord.open(shutil.copy(record.path, tmp_path))
     settings = msgspec.structs.replace(copy.info.plant.settings, feeder=str(tmp_path / "gone"))
@@ -189,7 +224,7 @@ def test_without_the_feeder_the_inverters_stand_in_a_ring(record: RunRecord, tmp
     assert view.frame(0.3).inverters[0].P is not None
 
 
-def test_agents_that_join_and_leave(tmp_path: Path) -> None:
+def test_agents_that_join_eachleave(tmp_path: Path) -> None:
     """An agent is there from its first decision to its last one."""
     (tmp_path / "it.toml").write_text(
         '[time]\nend_s = 0.8\n[case.case]\nsecondary = "all"\ngraph = "full"\n'

@@ -1,0 +1,133 @@
+"""The journal entries that say how agents decide: where each is in the file, and where some are lost.
+
+In simulated time an entry holds until the next one of its agent, which may be minutes away. So the parts of the file
+are gone through once, and where each agent has entries is kept, not the entries. In wall-clock time each decision has
+an entry of its own, and the file is only gone through once it turns out to be damaged.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import lru_cache, partial
+
+from scenarios.record.journal_coverage import Hole, JournalCoverage, inside
+from scenarios.record.message_index import MessageIndex
+from scenarios.record.record_info import RecordInfo
+from wire.journal import Decision, Exchange
+from wire.messages import PLANT, Journal
+from wire.timing.clock import time_of
+
+
+class DecisionEntries:
+    """Find how an agent decided, and where the record lacks it.
+
+    Parameters
+    ----------
+    index : MessageIndex
+        Messages and entries of the record.
+    """
+
+    def __init__(self, index: MessageIndex) -> None:
+        self._index, self._info = index, index.info
+        self._simulated = self._info.clock == "simulated"
+        self._parts = 0
+        """Parts that were gone through."""
+        self._places: dict[str, tuple[list[int], list[int]]] = {}
+        """Of each agent: first ticks of the parts that have entries of it, and these parts."""
+        self._coverage: dict[str, JournalCoverage] = {}
+        self._holes: dict[str, Sequence[Hole]] = {}
+        self._in_part = lru_cache(maxsize=64)(self._read_part)
+
+    def at(self, agent: str, tick: int) -> Decision | None:
+        """Return the entry that holds at a tick of simulated time; None before the first one.
+
+        Where entries are lost, another one may have held: ask `knows` first.
+        """
+        self._go_through()
+        first_ticks, parts = self._places.get(agent, ([], []))
+        place = bisect_right(first_ticks, tick) - 1
+        if place < 0:
+            return None
+        ticks, entries = self._in_part(parts[place])[agent]
+        return entries[bisect_right(ticks, tick) - 1]
+
+    def knows(self, agent: str, t: float) -> bool:
+        """Return whether the record says how an agent decided at a run time (s) of simulated time."""
+        self._go_through()
+        return t <= self._covered(agent).known_until + 1e-9 and not inside(self.holes(agent), t)
+
+    def holes(self, node: str) -> Sequence[Hole]:
+        """Return the run times (s) between which it is not known how an agent decided, as the file is damaged there.
+
+        Of the plant: between which it is not known what it sent and heard. A decision of simulated time starts from the
+        state of the tick before, which the plant has noted.
+        """
+        if not (self._simulated or self._index.file.holes):
+            return ()
+        self._go_through()
+        if node not in self._holes:
+            numbered = self._info.driver != "inprocess"
+            found = self._covered(node).holes(self._index.file.holes, numbered=numbered)
+            if node != PLANT:
+                later = self._info.T_c if self._simulated else 0.0
+                found = sorted({*found, *((since, until + later) for since, until in self.holes(PLANT))})
+            self._holes[node] = found
+        return self._holes[node]
+
+    # ---------------------------------------------------------------- inner
+
+    def _covered(self, node: str) -> JournalCoverage:
+        if node not in self._coverage:
+            self._coverage[node] = JournalCoverage(periodic=is_periodic(self._info, node))
+        return self._coverage[node]
+
+    def _go_through(self) -> None:
+        """Note where the entries of the parts are that are new, and which parts of journals are lost."""
+        if self._parts == self._index.parts:
+            return
+        self._holes.clear()
+        for part in range(self._parts, self._index.parts):
+            first_in_part: dict[str, int] = {}
+            for journal in self._index.journals_in(part):
+                first = self._first_tick(journal) if self._simulated and journal.sender != PLANT else None
+                if first is not None:
+                    first_in_part.setdefault(journal.sender, first)
+                self._covered(journal.sender).take(journal, partial(self._span, journal, first))
+            for name, first in first_in_part.items():
+                first_ticks, parts = self._places.setdefault(name, ([], []))
+                at = bisect_left(first_ticks, first)
+                first_ticks.insert(at, first)
+                parts.insert(at, part)
+        self._parts = self._index.parts
+
+    def _span(self, journal: Journal, first: int | None) -> Hole | None:
+        """Return the first and the last run time (s) of which a part of a journal tells; None if it tells nothing."""
+        if not self._simulated:  # each entry tells all by itself
+            return journal.t, journal.t
+        T_c = self._info.T_c
+        if journal.sender != PLANT:  # the last entry holds on
+            return None if first is None else (time_of(first, T_c), journal.t)
+        ticks = [entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Exchange)]
+        return (time_of(ticks[0], T_c), time_of(ticks[-1], T_c)) if ticks else None
+
+    def _first_tick(self, journal: Journal) -> int | None:
+        """Return the first tick of which a part of the journal of an agent tells."""
+        return next((entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Decision)), None)
+
+    def _read_part(self, part: int) -> dict[str, tuple[list[int], list[Decision]]]:
+        """Return the entries of each agent in a part, and their ticks."""
+        found: dict[str, dict[int, Decision]] = defaultdict(dict)
+        for journal in self._index.journals_in(part):
+            if journal.sender != PLANT:
+                for entry in self._index.entries_in(journal):
+                    if isinstance(entry, Decision):
+                        found[journal.sender][entry.tick] = entry
+        return {name: (sorted(by_tick), [by_tick[tick] for tick in sorted(by_tick)]) for name, by_tick in found.items()}
+
+
+def is_periodic(info: RecordInfo, node: str) -> bool:
+    """Return whether the journal of a node comes in parts all the time: of the plant, and of agents with links."""
+    config = info.agent(node)
+    return config is None or info.clock == "wall" or bool(config.links)
