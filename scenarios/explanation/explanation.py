@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from agents.laws.law import Neighbour
+from scenarios.explanation.last_decision import aftermath
 from scenarios.explanation.law_step import LawStep, law_step
 from scenarios.explanation.unheard import absence, missed, reason, rejections, verdicts
 from scenarios.record.record_reader import RecordFileError, RunRecord
@@ -53,6 +54,8 @@ class Explanation:
     """The step of the law in its terms (pu); None if the law was on hold."""
     events: tuple[PlantEvent, ...]
     """Events of the last second before the decision, and those about the agent since."""
+    aftermath: tuple[str, ...]
+    """Sentences on the time between the decision and the one that was asked for; none if it was made then."""
     damage: tuple[str, ...]
     """What could not be read of the record."""
 
@@ -85,7 +88,7 @@ def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, .
         has no decisions.
     """
     if agent not in record.agents:
-        raise RecordFileError(f"{record.path}: there was no agent {agent:.64}; agents are {short(record.agents)}")
+        raise RecordFileError(f"{record.path}: there was no agent {agent!s:.64}; agents are {short(record.agents)}")
     return explained(record, record.decision(agent, t), t, events)
 
 
@@ -103,6 +106,7 @@ def explained(
         neighbours=_accounts(record, decision, events),
         step=step,
         events=tuple(event for event in events if _matters(event, decision, asked)),
+        aftermath=aftermath(record, decision, asked, events),
         damage=record.damage,
     )
 
@@ -123,7 +127,7 @@ def _accounts(
             why = "; ".join(filter(None, (why, missed(record, decision, each, fates, rejected))))
         accounts.append(NeighbourAccount(name=each.name, input=each, seen=seen.get(each.name), why=why))
     for name in decision.not_met:
-        why = "idle agents hear nobody" if decision.action == "idle" else absence(name, events, decision.t)
+        why = "idle agents hear nobody" if decision.action == "idle" else absence(decision, name, events)
         accounts.append(NeighbourAccount(name=name, input=None, seen=None, why=why))
     return tuple(accounts)
 

@@ -19,13 +19,6 @@ _WIDE = 10_000
 SHOWN = 12
 """Most terms that stand in a row of their own: the others are summed."""
 
-_DONE = {
-    "law": "its law decided",
-    "hold": "secondary control was on hold: the set-points follow the plant's",
-    "off": "its inverter was out of service: nothing to control",
-    "idle": "it was idle: paused, without a measurement, or its law has failed",
-}
-
 _SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
 
 
@@ -72,17 +65,16 @@ def _head(it: Explanation) -> Iterator[RenderableType]:
     config = decision.config
     case = f", case {it.case}" if it.case else ""
     yield Text.assemble(
-        (f"{it.agent} at t = {decision.t:.2f} s", "bold"), f" ({it.scenario}{case}): {_DONE[decision.action]}"
+        (f"{it.agent} at t = {decision.t:.2f} s", "bold"), f" ({it.scenario}{case}): {decision.in_words}"
     )
-    if it.asked - decision.t > 1.5 * config.T_c:
-        yield Text(f"it is the last decision before {it.asked:g} s", style="yellow")
+    yield from (Text(sentence, style="yellow") for sentence in it.aftermath)
     where = "grid-connected" if m.grid_connected else f"island {m.island or 'unknown'}"
     late = f", {decision.measurement_age} ticks old" if decision.measurement_age else ""
     e = (m.f - config.f_nom) / config.f_nom
     yield _table(
         ("measured" + late, "", "pu"),
         (
-            ("f", f"{m.f:.4f} Hz", f"{e:+.6f} from nominal"),
+            ("f", f"{m.f:.4f} Hz", f"{e:+.6f} pu from nominal"),
             ("P", f"{m.P / 1e3:.2f} kW", f"{m.P / config.P_rated:.5f}"),
             ("Q", f"{m.Q / 1e3:.2f} kvar", f"{m.Q / config.P_rated:.5f}"),
             ("V", f"{m.V:.2f} V", f"{m.V / config.V_nom:.5f}"),

@@ -42,7 +42,7 @@ def trail(record: RunRecord, decision: RecordedDecision, quantity: Quantity, hop
         largest = max(terms, key=lambda term: abs(term.value), default=None)
         before = None if largest is None else _behind(record, decision, largest)
         if step is None:
-            end = "the law is on hold: the set-point is the plant's"
+            end = decision.in_words
         elif largest is None or largest.value == 0.0:
             end = "no term moves it"
         elif not largest.neighbour:

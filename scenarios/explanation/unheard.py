@@ -118,7 +118,10 @@ def reason(decision: RecordedDecision, each: NeighbourInput) -> str:
     return "" if each.weight > 0.0 else "its state is not new: weight 0"
 
 
-def absence(name: str, events: tuple[PlantEvent, ...], t: float) -> str:
+def absence(decision: RecordedDecision, name: str, events: tuple[PlantEvent, ...]) -> str:
     """Return in words why an agent that the graph makes a neighbour was not met, from the last event about it."""
-    about = [event for event in events if event.subject == name and event.t <= t + 1e-9 and event.kind == "roster"]
+    if decision.config.clock == "simulated" and decision.restarted and not decision.neighbours:
+        return "no state yet: at its first tick an agent has heard nobody"
+    about = [event for event in events if event.subject == name and event.t <= decision.t + 1e-9]
+    about = [event for event in about if event.kind == "roster"]
     return f"not met: {about[-1].text}" if about else "not met: it was not there"

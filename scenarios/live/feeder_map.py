@@ -46,7 +46,7 @@ class MapLoad(msgspec.Struct, frozen=True):
 
 
 class FeederMap(msgspec.Struct, frozen=True):
-    """A feeder's one-line diagram."""
+    """A feeder's one-line diagram, and what runs on it."""
 
     buses: tuple[tuple[str, float, float], ...] = ()
     """Name and place of each bus, in the units of its coordinates."""
@@ -59,6 +59,10 @@ class FeederMap(msgspec.Struct, frozen=True):
     """Number of the substation's bus; -1 if there is none."""
     to_scale: bool = True
     """Whether both axes have the same unit: not if the places are those of a tree."""
+    scenario: str = ""
+    """Name of the scenario that runs; empty of a diagram of a feeder alone."""
+    case: str = ""
+    """Name of its case."""
 
 
 def feeder_map(feeder: Feeder) -> FeederMap:

@@ -104,6 +104,7 @@ def configure(
         msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
     )
     end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
+    diagram = msgspec.structs.replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
     plant = msgspec.structs.replace(
         plant,
         **live,
@@ -113,7 +114,7 @@ def configure(
         connect=beyond,
         wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
         strict=options.strict,
-        feeder_map=msgspec.to_builtins(feeder_map(as_in(scenario, feeder))),
+        feeder_map=msgspec.to_builtins(diagram),
         agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
     )
     return plant, everyone

@@ -64,11 +64,18 @@ def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
     On this host's loopback no token is needed, and only names of this host are taken. Beyond it a token is: without a
     given one it is made up.
 
+    Raises
+    ------
+    UsageError
+        If the token is no text.
+
     Examples
     --------
     >>> access("127.0.0.1", "")
     ('', ('127.0.0.1', 'localhost', '[::1]'))
     """
+    if token != token.encode(errors="replace").decode():
+        raise UsageError("--token: has bytes that are no text; give letters and digits")
     if is_this_host(address):
         return token, tuple(dict.fromkeys((*LOOPBACK, address)))
     return token or secrets.token_urlsafe(16), ()

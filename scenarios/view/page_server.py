@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hashlib
 import logging
 import secrets
 import signal
@@ -163,7 +164,7 @@ class PageServer:
 
     def _knows_token(self, connection: HTTPConnection) -> bool:
         token = self._options.token
-        return not token or secrets.compare_digest(connection.cookies.get(COOKIE, "").encode(), token.encode())
+        return not token or secrets.compare_digest(connection.cookies.get(COOKIE, "").encode(), _hashed(token).encode())
 
     async def _index(self, request: Request) -> Response:
         if not self._admits(request):
@@ -182,11 +183,11 @@ class PageServer:
 
     def _let_in(self, given: str) -> Response:
         token = self._options.token
-        if token and not secrets.compare_digest(given.encode(), token.encode()):
+        if token and not secrets.compare_digest(_hashed(given), _hashed(token)):
             return _answer(_ASK_TOKEN % "That is not the token of this view.", 401)
         answer = _answer("", 303, Location="/")
         if token:
-            answer.set_cookie(COOKIE, token, httponly=True, samesite="strict")
+            answer.set_cookie(COOKIE, _hashed(token), httponly=True, samesite="strict")
         return answer
 
     async def _static(self, request: Request) -> Response:
@@ -217,6 +218,11 @@ class PageServer:
 
 def _stop(number: int, frame: FrameType | None) -> NoReturn:
     raise StoppedError(signal.Signals(number).name)
+
+
+def _hashed(token: str) -> str:
+    """Return what the cookie has of a token: a header takes few letters, a token may have any."""
+    return hashlib.sha256(token.encode()).hexdigest()
 
 
 def _refusal() -> Response:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import re
+import shutil
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -11,7 +14,7 @@ import pytest
 from scenarios.explanation.explanation import Explanation, NeighbourAccount, explain
 from scenarios.explanation.law_step import LawStep
 from scenarios.explanation.trail import trail
-from scenarios.record.record_reader import RunRecord
+from scenarios.record.record_reader import RecordFileError, RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 
@@ -159,7 +162,39 @@ def test_an_agent_that_was_not_there(tmp_path: Path) -> None:
     assert gone.why.startswith("not met: ")
     assert "inv9" in gone.why
     assert own.t < 0.55
-    assert "it is the last decision before 0.7 s" in str(own)
+    assert own.aftermath[0].startswith("it is the last decision before 0.7 s: inv9 dies at t = 0.5 s")
+    assert own.aftermath[1].startswith("at 0.7 s its inverter is on the network, delivers ")
+    assert own.aftermath[1].endswith(" kW, and keeps these set-points")
+    assert all(sentence in str(own) for sentence in own.aftermath)
+    assert explain(record, "inv9", own.t + 0.01).aftermath == ()
+
+
+def test_an_agent_that_has_left(tmp_path: Path) -> None:
+    """Its last decision is not in force: it says when the agent left, and that its inverter is off the network."""
+    record = run(tmp_path, '[[event]]\nlabel = "leave"\nt_s = 0.5\nleave = ["inv9"]\n')
+
+    explanation = explain(record, "inv9", 0.7)
+
+    assert explanation.t < 0.51
+    assert explanation.aftermath[0].startswith("it is the last decision before 0.7 s: inv9 leaves at t = 0.5 s")
+    assert explanation.aftermath[1:] == ("at 0.7 s its inverter is off the network",)
+
+
+def test_what_was_not_decided_by_a_law(tmp_path: Path) -> None:
+    """On hold while grid-connected, no secondary control in this case, and nobody heard at the first tick."""
+    record, file = run(tmp_path), tmp_path / "none.toml"
+    file.write_text(ISLANDED.format(end=0.8).replace('secondary = "all"', 'secondary = "none"'), encoding="utf-8")
+    none = recorded_run(file, "case", tmp_path / "none")
+
+    assert "secondary control was on hold while grid-connected" in str(explain(record, "inv1", 0.1))
+    for t in (0.1, 0.7):
+        text = str(explain(none, "inv1", t))
+        assert "it has no secondary control in this case" in text
+        assert "on hold" not in text
+    first = explain(record, "inv1", 0.0)
+    assert {each.why for each in first.neighbours} == {"no state yet: at its first tick an agent has heard nobody"}
+    assert len(first.neighbours) == 8
+    assert " pu from nominal" in str(first)
 
 
 @pytest.mark.parametrize("law", ["dapi", "finite-time", "event-triggered", "centralised"])
@@ -242,7 +277,7 @@ def test_the_command(islanded: RunRecord) -> None:
         (("plant", "0.5"), "there was no agent plant; agents are inv1-9"),
         (("inv4", "7"), "t = 7 s is outside of the record, which has 0 to 0.80 s"),
         (("inv4", "nan"), "needs a run time in s"),
-        (("inv4", "0.5", "--case", "V"), "cannot be read: "),
+        (("inv4", "0.5", "--case", "V"), 'it is the record of one case, and "V" is another one; leave --case out'),
     ],
 )
 def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunRecord) -> None:
@@ -252,6 +287,38 @@ def test_bad_input(arguments: tuple[str, ...], complaint: str, islanded: RunReco
     assert code == 2
     assert complaint in printed
     assert printed.count("\n") == 1
+
+
+def test_a_run_with_several_cases_names_them(islanded: RunRecord, tmp_path: Path) -> None:
+    """Without a case, and with one that is not there, one line says which there are, and how one is chosen."""
+    for case in ("I", "IV"):
+        shutil.copytree(islanded.path.parent, tmp_path / case)
+    arguments = str(tmp_path), "inv4", "0.5"
+
+    several, unknown = invoke("why", *arguments), invoke("why", *arguments, "--case", "V")
+
+    assert several[0] == unknown[0] == 2
+    assert "it has a record of each case, I, IV; choose one with --case I" in several[1]
+    assert 'no record of case "V"; ' in unknown[1]
+    assert "I, IV" in unknown[1]
+    assert invoke("why", *arguments, "--case", "IV")[0] == 0
+    assert invoke("view", str(tmp_path), "--case", "V") == unknown
+
+
+def test_wrong_types_are_one_sentence(islanded: RunRecord) -> None:
+    """From Python too, what is no path, name or time is refused with what would be right."""
+    calls: dict[str, Callable[[], object]] = {
+        'needs the path of a record, as "runs/islanding': lambda: RunRecord.open(4),  # type: ignore[arg-type]
+        "t: needs a run time in s, as 4.3, got '0.5'": lambda: islanded.decision("inv4", "0.5"),  # type: ignore[arg-type]
+        "there was no agent 4; agents are inv1-9": lambda: explain(islanded, 4, 0.5),  # type: ignore[arg-type]
+        "since: needs a run time in s, as 4.3, got None": lambda: islanded.decisions("inv4", since=None),  # type: ignore[arg-type]
+        "no message is a 'state'; did you mean \"State\"": lambda: islanded.messages(kind="state"),
+        "sender: needs the name of an agent": lambda: islanded.messages(["inv4"]),  # type: ignore[arg-type]
+    }
+    for complaint, call in calls.items():
+        with pytest.raises(RecordFileError, match=re.escape(complaint)) as refused:
+            call()
+        assert "\n" not in str(refused.value)
 
 
 def test_a_record_that_is_cut_off(islanded: RunRecord, tmp_path: Path) -> None:

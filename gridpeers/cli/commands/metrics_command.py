@@ -34,7 +34,7 @@ def metrics(
     from scenarios.results.report import show
 
     try:
-        report = report_of(RunRecord.open(run / case if case else run))
+        report = report_of(RunRecord.open(run, case))
     except RecordFileError as error:
         fail([str(error)], BAD_INPUT)
     show(report, Console())

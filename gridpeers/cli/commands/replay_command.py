@@ -63,7 +63,7 @@ def replay(
 
     with ended_by_signals("nothing was written"):
         try:
-            record = RunRecord.open(run / case if case else run)
+            record = RunRecord.open(run, case)
             changes = Changes(
                 without=tuple(without or ()),
                 without_loss=without_loss,

@@ -27,7 +27,9 @@ def trace(
     svg: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Space-time diagram instead, as .svg, .pdf or .png.")
     ] = None,
-    since: Annotated[float, typer.Option("--from", metavar="T", help="Begin of the diagram (s of run time).")] = 0.0,
+    since: Annotated[
+        float | None, typer.Option("--from", metavar="T", help="Begin of the diagram (s); 0 when left out.")
+    ] = None,
     until: Annotated[
         float | None, typer.Option("--to", metavar="T", help="End of the diagram (s); 0.2 s later when left out.")
     ] = None,
@@ -47,12 +49,18 @@ def trace(
     """
     require({"mcap": "the record of a run"})
     if svg is None:
+        given = {"--from": since is not None, "--to": until is not None, "--agents": bool(agents)}
+        if wrong := [name for name, is_given in given.items() if is_given]:
+            fail([f"{', '.join(wrong)}: for a diagram; add --svg FILE. A Perfetto trace has the whole run"], BAD_INPUT)
         require({"perfetto": "a Perfetto trace"}, "install it: pip install 'gridpeers[trace]'; or give --svg FILE")
     else:
+        if out is not None:
+            fail(["--out: for a Perfetto trace; --svg names the file of the diagram. Give one of them"], BAD_INPUT)
         require({"matplotlib": "the diagram"})
         kinds = (".svg", ".pdf", ".png")
         if svg.suffix not in kinds:
             fail([f"--svg {svg}: must end in {', '.join(kinds)}"], BAD_INPUT)
+    since = 0.0 if since is None else since
     end = since + 0.2 if until is None else until
     if not (isfinite(since) and isfinite(end) and 0.0 <= since < end):
         fail([f"--from {since:g} --to {end:g}: needs two run times in s, the later one second"], BAD_INPUT)
@@ -61,7 +69,7 @@ def trace(
     from scenarios.results.run_files import refusal, shown
 
     try:
-        record = RunRecord.open(run / case if case else run)
+        record = RunRecord.open(run, case)
         if svg is None:
             from scenarios.trace.perfetto_trace import write_perfetto_trace
 
@@ -89,7 +97,8 @@ def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str
 
     if since > record.t_end:
         fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)
-    nodes = [name.strip() for name in agents.split(",") if name.strip()] or in_order(record.agents)
+    named = dict.fromkeys(name.strip() for name in agents.split(",") if name.strip())  # a name twice is one axis
+    nodes = list(named) or in_order(record.agents)
     if unknown := [name for name in nodes if name not in (*record.agents, "plant")]:
         fail([f"--agents: there was no agent {unknown[0]}; agents are {short(record.agents)}, and plant"], BAD_INPUT)
     T_c = record.info.T_c

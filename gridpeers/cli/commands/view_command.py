@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
+from urllib.parse import quote
 
 import typer
 
@@ -66,7 +67,7 @@ def view(
     if control or connect or keys or run != RUN:
         option = "--control" if control else "--connect" if connect else "--keys" if keys else "--run"
         fail([f"{option}: goes with a live run; nothing can be done to a record"], BAD_INPUT)
-    _serve(lambda: _recorded(record / case if case else record), address, port, token)
+    _serve(lambda: _recorded(record, case), address, port, token)
 
 
 @contextmanager
@@ -87,14 +88,16 @@ def _live(
 
 
 @contextmanager
-def _recorded(path: Path) -> Iterator[tuple[Pages, Line]]:
+def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a record, and the line that tells their address."""
     require({"mcap": "the record of a run"})
+    from scenarios.record.record_path import record_path
     from scenarios.record.record_reader import RecordFileError
     from scenarios.view.recorded.record_pages import RecordPages
     from scenarios.view.recorded.recorded_run import RecordedRun
 
     try:
+        path = record_path(path, case).parent if case else path
         recorded = RecordedRun(path)
     except RecordFileError as error:
         fail([str(error)], BAD_INPUT)
@@ -108,15 +111,15 @@ def _serve(
     with usage_errors():
         from scenarios.view.page_address import access, listen, url_of
 
+        token, hosts = access(address, token)
         listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
         from scenarios.view.page_server import PageOptions, PageServer
         from wire.driver.drive import StoppedError
 
-        token, hosts = access(address, token)
         watch_readers(quits=False)
         signal = "SIGINT"
-        typer.echo(line(url_of(listening, address) + (f"?token={token}" if token else "")))
+        typer.echo(line(url_of(listening, address) + (f"?token={quote(token, safe='')}" if token else "")))
         try:
             PageServer(shown, PageOptions(token=token, hosts=hosts)).run(listening)
         except (KeyboardInterrupt, StoppedError) as stop:

@@ -44,7 +44,7 @@ def why(
     if not isfinite(t):
         fail([f"TIME {t}: needs a run time in s, as 4.3"], BAD_INPUT)
     try:
-        record = RunRecord.open(run / case if case else run)
+        record = RunRecord.open(run, case)
         explanation = explain(record, agent, t)
         trails = [(name, trail(record, explanation.decision, name, hops)) for name in ("P_set", "V_set") if follow]
     except RecordFileError as error:

@@ -12,6 +12,7 @@ from itertools import takewhile
 
 from msgspec.structs import replace
 
+from plant.equipment.load_powers import set_power
 from scenarios.explanation.explanation import explain
 from scenarios.live.feeder_map import FeederMap, feeder_map
 from scenarios.live.show.run_monitor import PlantStatus
@@ -166,9 +167,9 @@ class RecordView:
         """Return real (W) and reactive power (var) of each load that has another one than in its table."""
         powers: dict[str, tuple[float, float]] = {}
         for event in self._until(t):
-            if event.kind == "load" and event.P is not None and event.Q is not None:
-                powers[event.subject] = event.P, event.Q
-        return {name: power for name, power in powers.items() if power != self._tables.get(name)}
+            if event.kind == "load" and (power := _power_after(event)) is not None:
+                powers[event.subject] = power.real, power.imag
+        return {name: power for name, power in powers.items() if not _alike(power, self._tables.get(name))}
 
     def _until(self, t: float) -> Iterator[PlantEvent]:
         """Yield the events up to a run time (s)."""
@@ -253,6 +254,18 @@ def _closed_after(event: PlantEvent) -> bool | None:
     if event.closed is None and ("opened" in event.text or "closed" in event.text):  # a record of format 1: words alone
         return "opened" not in event.text
     return event.closed
+
+
+def _power_after(event: PlantEvent) -> complex | None:
+    """Return the power (VA) of a load after an event; None if that is not told."""
+    if event.P is None or event.Q is None:  # a record of format 1
+        return set_power(event.text)
+    return complex(event.P, event.Q)
+
+
+def _alike(power: tuple[float, float], other: tuple[float, float] | None) -> bool:
+    """Return whether two powers are the same, to the digits that words have."""
+    return other is not None and abs(complex(*power) - complex(*other)) <= 1e-5 * abs(complex(*other))
 
 
 def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:

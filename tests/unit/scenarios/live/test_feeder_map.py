@@ -17,6 +17,7 @@ def test_loads_are_on_the_map_as_the_run_has_them() -> None:
     plant, _ = configure(twice, feeder, LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
     diagram = msgspec.convert(plant.feeder_map, FeederMap)
 
+    assert (diagram.scenario, diagram.case) == ("islanding", "IV")
     assert {load.name: (diagram.buses[load.bus][0], complex(load.P, load.Q)) for load in diagram.loads} == {
         name: (load.bus, 2.0 * load.S) for name, load in named_loads(feeder).items()
     }

@@ -69,7 +69,8 @@ def test_the_command_names_the_cases_of_a_run(result: Result, tmp_path: Path) ->
 
     assert (code, "Voltage and var sharing" in printed) == (0, True)
     assert none[0] == 2
-    assert "cannot be read" in none[1]
+    assert 'no record of case "V"; ' in none[1]
+    assert "IV" in none[1]
 
 
 def test_a_record_without_a_scenario_is_told(tmp_path: Path) -> None:

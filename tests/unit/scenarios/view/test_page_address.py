@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from scenarios.live.run_address import UsageError
 from scenarios.view.page_address import access
 
 
@@ -26,3 +27,9 @@ def test_on_this_host_no_token_is_needed_but_a_name_of_this_host_is(address: str
     assert token == ""
     assert {"127.0.0.1", "localhost", "[::1]"} <= set(hosts)
     assert access(address, "mine")[0] == "mine"
+
+
+def test_a_token_of_no_text_is_refused() -> None:
+    """Bytes of a command line that are no UTF-8 can be typed into no page."""
+    with pytest.raises(UsageError, match="--token: has bytes that are no text"):
+        access("127.0.0.1", "a\udcff")

@@ -9,12 +9,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from plant.feeder import Plant
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.run_view import Frame
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
-from wire.messages import LoadSetting, PlantEvent
+from wire.messages import PlantEvent
 
 ISLANDED = """
 [time]
@@ -35,6 +34,21 @@ on = "inv1 -> inv2"
 loss = 0.5
 """
 """Nine agents that island at 0.2 s; one link is cut from 0.5 s on, another loses half of its messages."""
+
+WITH_LOADS = (
+    ISLANDED.partition("[[link]]")[0].replace("end_s = 1.6", "end_s = 0.8")
+    + """
+[[event]]
+label = "more"
+t_s = 0.4
+load = { 48 = { factor = 1.5 } }
+[[event]]
+label = "table"
+t_s = 0.6
+load = { 48 = { factor = 1.0 } }
+"""
+)
+"""The same without faults; a load is set, and set back."""
 
 
 @pytest.fixture(scope="module")
@@ -147,36 +161,32 @@ def test_switches_eachevents_are_those_of_the_time(view: RecordView) -> None:
     assert view.events[0].text == "switch 13-152 opened"
 
 
-def test_loads_are_those_of_the_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_loads_are_those_of_the_time(tmp_path: Path) -> None:
     """A load that was set has its power from then on, also going back, until it is as in its table again."""
-    advance, factors = Plant.advance, {10: 1.5, 20: 0.25, 30: 1.0}
+    view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
 
-    def set_on_the_way(plant: Plant) -> None:
-        if plant.tick in factors:
-            plant.set_load("48", LoadSetting(factor=factors[plant.tick]))
-        advance(plant)
+    loads = [view.frame(t).loads for t in (0.38, 0.4, 0.58, 0.6, 0.4)]
 
-    monkeypatch.setattr(Plant, "advance", set_on_the_way)
-    record = recorded_in_chunks(ISLANDED.partition("[[link]]")[0], tmp_path)
-    view = RecordView(record)
-
-    loads = [view.frame(t).loads for t in (0.18, 0.22, 0.44, 0.58, 0.62, 0.22)]
-
-    assert loads == [{}, {"48": (315e3, 225e3)}, {"48": (52.5e3, 37.5e3)}, {"48": (52.5e3, 37.5e3)}, {}, loads[1]]
+    assert loads == [{}, {"48": (315e3, 225e3)}, {"48": (315e3, 225e3)}, {}, loads[1]]
 
 
-def test_switches_of_an_old_record_are_read_from_its_words(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_switches_and_loads_of_an_old_record_are_read_from_its_words(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """In format 1 events have words alone."""
 
-    def in_words(*, closed: bool, **rest: Any) -> PlantEvent:
-        return PlantEvent(**rest)
+    def in_words(*, t: float, kind: Any, subject: str, text: str, **numbers: Any) -> PlantEvent:
+        assert numbers
+        return PlantEvent(t=t, kind=kind, subject=subject, text=text)
 
-    monkeypatch.setattr("plant.feeder.switchboard.PlantEvent", in_words)
-    view = RecordView(recorded_in_chunks(ISLANDED.partition("[[link]]")[0], tmp_path))
+    for module in ("switchboard", "load_board"):
+        monkeypatch.setattr(f"plant.feeder.{module}.PlantEvent", in_words)
+    view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
 
     positions = [view.frame(t).switches for t in (0.19, 0.2)]
 
     assert [each["13-152"] for each in positions if each] == [True, False]
+    assert [view.frame(t).loads for t in (0.38, 0.4, 0.6)] == [{}, {"48": (315e3, 225e3)}, {}]
 
 
 def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
