@@ -244,7 +244,7 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Table `[plant]`."""
     protection: Protection = Protection()
     """Table `[protection]`: when inverters trip, and when they come back."""
-    law: LawKey = "consensus"
+    law: Annotated[LawKey, Label("control law")] = "consensus"
     """Control law that the agents run: a name that `gridpeers doc laws` lists, "mine:Mine" for the class Mine of
     mine.py beside this file, or a table `[law]` with one of use, command = ["./mylaw"] (any program), fmu = "law.fmu",
     and with the law's parameters; time_limit_s is the longest time of one step."""

@@ -37,6 +37,10 @@ INDEXES = {
     "t_share_s": IndexAxis("time to share power (s)", 0.02),
     "f_swing_Hz": IndexAxis("swing of f at the end (Hz)", 0.001),
     "V_swing_pu": IndexAxis("swing of V at the end (pu)", 0.0001),
+    "f_off_Hz": IndexAxis("largest abs(f - f_nom) at the end (Hz)", 0.01),
+    "S_max_pu": IndexAxis("largest apparent power at the end (pu)", 0.01),
+    "V_min_pu": IndexAxis("least voltage at the end (pu)", 0.001),
+    "V_max_pu": IndexAxis("largest voltage at the end (pu)", 0.001),
     "steady": IndexAxis("steady at the end (1: yes, 0: no)", 1.0),
 }
 """Axes of the project's own indexes."""

@@ -25,6 +25,9 @@ from scenarios.results.plots.style import PAGE, case_style, save
 from scenarios.sweep.column_labels import INDEXES, label_of
 from scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, is_number, spread_of, values_of
 
+MOST_LETTERS = 24
+"""Letters of a value at an axis: a table of faults, as JSON, is longer than the figure."""
+
 MOST_TICKS = 12
 """Most values of a parameter that are written at an axis."""
 
@@ -95,7 +98,7 @@ def _bars(panel: Axes, spread: pd.DataFrame, case: str, number: int, order: Sequ
     x = [order.index(value) + 0.12 * number for value in spread.index]
     panel.vlines(x, spread["low"], spread["high"], color=colour, alpha=0.5, lw=3)
     panel.plot(x, spread["median"].where(np.isfinite(spread["median"])), "o", color=colour, label=f"case {case}")
-    panel.set_xticks(range(len(order)), [str(value) for value in order], rotation=30, ha="right")
+    panel.set_xticks(range(len(order)), [_short(value) for value in order], rotation=30, ha="right")
 
 
 def heat_maps(frame: pd.DataFrame, window: str, x: str, y: str, case: str) -> Figure:
@@ -166,7 +169,8 @@ def _frame(panel: Axes, index: str) -> None:
 
 
 def _short(value: Any) -> str:
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    text = f"{value:.3g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= MOST_LETTERS else text[: MOST_LETTERS - 3] + "..."
 
 
 def _save(figure: Figure, folder: Path, name: str) -> Path:

@@ -25,6 +25,9 @@ DASHES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (5, 1, 1, 1, 1, 1)), (0, (3
 """Of traces over time, which have no markers."""
 
 
+SLANTED = 12
+"""Most names at an axis that slant; more of them stand upright."""
+
 DPI = 130
 """Points per inch: readable in print, and small enough for a repository."""
 
@@ -68,7 +71,8 @@ def _draw(axes: Axes, panel: Panel) -> None:
         axes.set_xticks(panel.x_ticks, [f"{x:g}" for x in panel.x_ticks])
         axes.minorticks_off()
     if panel.x_names:
-        axes.set_xticks(range(len(panel.x_names)), panel.x_names, rotation=35, ha="right", fontsize=7.5)
+        lean: dict[str, Any] = {"rotation": 35, "ha": "right"} if len(panel.x_names) <= SLANTED else {"rotation": 90}
+        axes.set_xticks(range(len(panel.x_names)), panel.x_names, fontsize=7.5, **lean)
     if panel.x_range:
         axes.set_xlim(*panel.x_range)
     if panel.y_range:

@@ -9,6 +9,7 @@ from papers.singhal2022.experiments.degraded_communication_experiment import deg
 from papers.singhal2022.experiments.delay_experiment import communication, delay
 from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from papers.singhal2022.experiments.experiment_output import ExperimentResult
+from papers.singhal2022.experiments.hostile_experiment import hostile
 from papers.singhal2022.experiments.loss_experiment import loss
 from papers.singhal2022.experiments.outage_experiments import flapping, partition
 from papers.singhal2022.experiments.places_experiment import places
@@ -42,5 +43,6 @@ EXPERIMENTS: Mapping[str, FromSweep | FromScenario] = {
     "partition": FromScenario("partition", partition),
     "degraded-communication": FromSweep("degraded-communication", degraded_communication),
     "communication": FromSweep("communication-delay", communication),
+    "hostile": FromSweep("hostile", hostile),
 }
 """In the order of docs/experiments.md."""

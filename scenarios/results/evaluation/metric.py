@@ -30,7 +30,7 @@ _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
 ALWAYS = ("f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s", "t_load_s", "p", "messages_saved")
 """Metrics of gridpeers that every run has."""
 
-_OURS = (*ALWAYS, "t_f_s", "t_share_s", "f_swing_Hz", "V_swing_pu")
+_OURS = (*ALWAYS, "t_f_s", "t_share_s", "f_swing_Hz", "V_swing_pu", "f_off_Hz", "S_max_pu", "V_min_pu", "V_max_pu")
 
 
 METRICS: Registry[Any] = Registry(

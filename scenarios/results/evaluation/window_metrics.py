@@ -12,7 +12,7 @@ import numpy as np
 from plant.equipment import Feeder
 from scenarios.results.evaluation.metric import Measured, make_metrics, measured
 from scenarios.results.event_windows import CaseRecord, Window
-from scenarios.results.history import History, Nameplates, read_only
+from scenarios.results.history import Flags, Floats, History, Nameplates, read_only
 from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import without_agent
@@ -20,6 +20,10 @@ from scenarios.schema.plugin_keys import metrics_of
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+LATE = 0.5
+"""Length (s) of the end of a window over which extremes are looked for."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +71,19 @@ class WindowData(History):
     def history(self) -> pd.DataFrame:
         """Rows of the window as a table: columns (inverter, quantity), index t (s); each metric has its own."""
         return self.frame()
+
+    @property
+    def late(self) -> Flags:
+        """Which rows are of the last half second of the window."""
+        rows: Flags = self.t >= self.end - LATE
+        return rows
+
+    @property
+    def late_voltages(self) -> Floats:
+        """Voltages (pu) of the inverters on the network in the last half second of the window, in one row."""
+        on = self.present & self.late[:, None]
+        voltages: Floats = (self.V / self.nameplates.V_nom)[on]
+        return voltages
 
     @cached_property
     def steady(self) -> Steady:
@@ -118,6 +135,20 @@ V_swing_pu = _built_in(
 )
 messages_saved = _built_in(
     lambda window: window.messages_saved, "Share of states that the laws did not send to their neighbours."
+)
+f_off_Hz = _built_in(
+    lambda window: np.abs(window.f[window.late][:, window.nameplates.GFM] - window.f_nom).max(),
+    "Largest abs(f - f_nom) of a grid-forming inverter in the last half second of the window (Hz).",
+)
+S_max_pu = _built_in(
+    lambda window: (np.hypot(window.P, window.Q) / window.nameplates.s)[window.late].max(),
+    "Largest apparent power of an inverter in the last half second, per unit of its rated real power (pu).",
+)
+V_min_pu = _built_in(
+    lambda window: window.late_voltages.min(), "Least voltage of an inverter in the last half second (pu)."
+)
+V_max_pu = _built_in(
+    lambda window: window.late_voltages.max(), "Largest voltage of an inverter in the last half second (pu)."
 )
 
 

@@ -1,0 +1,149 @@
+"""Agents that lie: frequency, sharing and limits under every attack, on every graph, with every defence."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from papers.singhal2022.experiments.experiment_data import SweepData
+from papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    Panel,
+    TableCell,
+)
+
+EVENT = "event2"
+"""The event at which the lies begin."""
+
+GRAPHS = ("full", "robust", "reduced")
+
+MEASURES: tuple[tuple[str, str, float, tuple[float, float], float], ...] = (
+    ("f_off_Hz", "largest abs(f - 60) at the end (Hz)", 0.01, (1e-4, 2.0), 1e-4),
+    ("MPSI", "MPSI", 0.01, (1e-4, 1.0), 1e-4),
+    ("MQSI", "MQSI", 0.2, (1e-3, 20.0), 1e-3),
+    ("S_max_pu", "largest S at the end (pu)", 1.2, (0.4, 1.4), 0.0),
+)
+"""Measures, labels, the limit of the checks, ends of the axis, and the least value that is drawn."""
+
+SIZES = (("P_set_W", 1e-3, " kW"), ("P_set", 1.0, ""), ("delay_s", 1.0, " s"))
+"""Keys of a lie that are its size: key, factor, and unit in words."""
+
+
+def hostile(sweep: SweepData) -> ExperimentResult:
+    """Return how far every attack gets against every defence, on every graph."""
+    lies = replace(sweep, window=EVENT)
+    rows = lies.rows
+    attacks = {attack_words(node, link): {"node": node, "link": link} for node, link in _unique(rows, "node", "link")}
+    defences = {defence_words(law): {"law": law} for (law,) in _unique(rows, "law")}
+
+    def measured(case: str, attack: str, defence: str, index: str) -> float:
+        (value,) = lies.measured(index, lies.where({"case": case, **attacks[attack], **defences[defence]}))
+        return float(value)
+
+    def curves(case: str, index: str, least: float) -> list[Curve]:
+        found = []
+        for style, defence in enumerate(defences):
+            x = np.arange(float(len(attacks))) + 0.13 * (style - 0.5 * (len(defences) - 1))
+            y = np.array([measured(case, attack, defence, index) for attack in attacks])
+            found.append(Curve(x, np.maximum(y, least), style, "points"))
+        return found
+
+    panels = [
+        Panel(
+            title=sweep.base.cases[case].title if index == MEASURES[0][0] else "",
+            x_label="",
+            y_label=label if case == GRAPHS[0] else "",
+            curves=curves(case, index, least),
+            level=limit,
+            log="y" if least else "",
+            x_names=list(attacks) if index == MEASURES[-1][0] else [""] * len(attacks),
+            y_range=ends,
+        )
+        for index, label, limit, ends, least in MEASURES
+        for case in GRAPHS
+    ]
+    page = Page(
+        title="Agents that lie from 4 s on, as a third of the load is lost; lines: limits of the checks",
+        panels=panels,
+        columns=len(GRAPHS),
+        names=dict(enumerate(defences)),
+        looks={},
+        share_y=True,
+        height=3.0,
+    )
+    table: list[tuple[TableCell, ...]] = []
+    for case in GRAPHS:
+        for attack in attacks:
+            cells = []
+            for defence in defences:
+                f, MPSI, MQSI, S = (measured(case, attack, defence, index) for index, *_ in MEASURES)
+                low, high = (measured(case, attack, defence, index) for index in ("V_min_pu", "V_max_pu"))
+                cells.append(f"{f:.3f} / {MPSI:.2f} / {MQSI:.2f} / {S:.2f} / {low:.2f}..{high:.2f}")
+            table.append((case, attack, *cells))
+    return ExperimentResult(page=page, table=ExperimentTable(columns=("graph", "attack", *defences), rows=table))
+
+
+def _unique(rows: Any, *columns: str) -> list[tuple[str, ...]]:
+    """Return the different values of some columns together, in the order of the sweep."""
+    return list(dict.fromkeys(zip(*(rows[name] for name in columns), strict=True)))
+
+
+def attack_words(node: str, link: str) -> str:
+    """Return an attack in words, from the entries of its nodes and links as the sweep writes them.
+
+    Examples
+    --------
+    >>> attack_words("[]", "[]"), attack_words("[]", '[{"on": "* -> inv1", "loss": 0.9}]')
+    ('nobody lies', 'flood, 90 % lost')
+    >>> lies = {"model": "offset", "P_set_W": 1e5, "plant": True, "in_name_of": "inv1"}
+    >>> attack_words(json.dumps([{"name": "inv2", "lies": lies}]), "[]")
+    'offset 100 kW, as inv1, plant too'
+    >>> attack_words(json.dumps([{"name": name, "lies": {"model": "freeze"}} for name in ("inv2", "inv5")]), "[]")
+    'freeze, two'
+    """
+    liars, links = json.loads(node), json.loads(link)
+    if links:
+        lost = links[0].get("loss")
+        return "old bytes, all twice" if lost is None else f"flood, {100.0 * lost:g} % lost"
+    return ", ".join(_lie_words(liars)) if liars else "nobody lies"
+
+
+def _lie_words(liars: list[dict[str, Any]]) -> Iterator[str]:
+    lies = liars[0]["lies"]
+    yield lies["model"] + "".join(f" {factor * lies[key]:g}{unit}" for key, factor, unit in SIZES if key in lies)
+    if "side" in lies:
+        yield str(lies["side"])
+    if lies.get("two_faced"):
+        yield "two-faced"
+    if "in_name_of" in lies:
+        yield f"as {lies['in_name_of']}"
+    elif lies.get("plant"):
+        yield "leader"
+    if lies.get("plant"):
+        yield "plant too"
+    if len(liars) > 1:
+        yield {2: "two"}.get(len(liars), str(len(liars)))
+
+
+def defence_words(law: str) -> str:
+    """Return a defence in words, from the law as the sweep writes it.
+
+    Examples
+    --------
+    >>> defence_words('"consensus"'), defence_words('{"use": "resilient", "F": 1, "tolerance": 0.1, "T_out": 0.5}')
+    ("the paper's law", 'F = 1, plausible')
+    """
+    given = json.loads(law)
+    if isinstance(given, str):
+        return "the paper's law"
+    words = [f"F = {given['F']}"] if given["F"] else []
+    words += ["plausible"] if given.get("tolerance") else []
+    words += ["rate"] if given.get("rate") else []
+    return ", ".join(words)
