@@ -102,8 +102,7 @@ class AgentNode(PlantFollower):
                 self.plant_seen = True
                 self._plant_came(now)
             case ("alive", "agent", name, instance) if name != self._name:
-                self.members.appeared(name, instance)
-                self._ask(name, instance)
+                self._process_came(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""

@@ -103,8 +103,7 @@ class PlantNode(Node):
                 if refusal:
                     self._refuse(name, instance, refusal)
                 else:
-                    self.members.appeared(name, instance)
-                    self._ask(name, instance)
+                    self._process_came(name, instance)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""

@@ -38,6 +38,7 @@ KINDS = {
     "impostor": "from a process whose link has a certificate of another name",
     "ghost": "from another epoch than the sender's valid one",
     "stale": "about a past tick or roster",
+    "excess": "dropped unread, or unanswered: more came than this process takes at once",
     "unexpected": "well-formed, but not for this receiver at this time",
     "failed": "it raised an error of ours, see the traceback",
 }
@@ -161,8 +162,8 @@ class RejectedMessages:
         self._who = who
         self._lines: list[str] = []
 
-    def add(self, kind: str, key: str, text: str, trace: str = "") -> None:
-        """Count a message; write a line for the first of its kind, with the traceback of an error of ours."""
+    def add(self, kind: str, key: str, text: str, trace: str = "", count: int = 1) -> None:
+        """Count messages; write a line for the first of its kind, with the traceback of an error of ours."""
         assert kind in KINDS
         if not self.counts[kind]:
             line = (
@@ -170,11 +171,12 @@ class RejectedMessages:
                 "More of this kind are only counted. See docs/protocol.md"
             )
             self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-TRACED:])]))
-        self.counts[kind] += 1
+        self.counts[kind] += count
 
     def failed(self, key: str, error: Exception) -> None:
         """Count a message that raised an error of ours; call it while that error is caught."""
-        self.add("failed", key, f"{type(error).__name__}: {error}", traceback.format_exc())
+        trace = "" if self.counts["failed"] else traceback.format_exc()
+        self.add("failed", key, f"{type(error).__name__}: {error}", trace)
 
     @property
     def has_lines(self) -> bool:

@@ -10,8 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from wire.admission import Admission
+from wire.bounds import MOST
 from wire.codec import RejectedError
 from wire.messages import Nameplate
+
+MOST_PROCESSES = 8
+"""Processes that may claim one name: two, while one replaces another, and some that are mistaken."""
+
+ASKED_AT_ONCE = 50
+"""Most processes that are asked for their nameplates again in one go: a question costs as much as ten messages."""
 
 
 class Membership:
@@ -47,6 +54,13 @@ class Membership:
         """Nameplates of the processes that count."""
         self.changes = 0
         """Number of changes so far of the processes that count, or of their nameplates."""
+        self._asked = 0
+        """Where among the processes without a nameplate the next ones to be asked again begin."""
+
+    def has_room(self, name: str) -> bool:
+        """Return whether one more token of a name is to be noted: anybody may hold tokens, each costs every node."""
+        instances = self._instances.get(name)
+        return len(self._instances) < MOST if instances is None else len(instances) < MOST_PROCESSES
 
     def appeared(self, name: str, instance: str) -> bool:
         """Note a token; return whether its process counts."""
@@ -112,6 +126,13 @@ class Membership:
         """Name and instance of the processes that have not answered."""
         every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
         return (process for process in every if process not in self._answers)
+
+    def next_unmet(self) -> list[tuple[str, str]]:
+        """Return the next of the processes that have not answered, to be asked again; all come in turn."""
+        unmet = list(self.unmet)
+        begin = self._asked if self._asked < len(unmet) else 0
+        self._asked = begin + ASKED_AT_ONCE
+        return unmet[begin : self._asked]
 
     def clear(self) -> None:
         """Forget all members."""

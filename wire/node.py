@@ -8,6 +8,7 @@ thread and does
     node.work(now)                                          for at most one piece of work, if it is ready
     for action in node.take_actions(): ...                  to perform the actions, in this order
     node.expire(now)                                        when `node.deadline` has passed
+    node.lost(loss, now)                                    for messages that it has dropped unread
 
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
@@ -25,6 +26,7 @@ from typing import Any, NamedTuple
 
 from wire.actions import Action, Fetch, Log, Publish
 from wire.admission import Admission
+from wire.backlog import Loss, is_marked
 from wire.codec import RejectedError, RejectedMessages, decode, encode
 from wire.journal import JournalBuffer
 from wire.keys import Keys
@@ -139,12 +141,36 @@ class Node:
         if self.traffic is not None:
             self.traffic.received(key, payload, now, rejected_as)
 
+    def is_known(self, key: str, payload: bytes) -> bool:
+        """Whether a message looks like one of the sender of its key, in that sender's epoch; see `wire.backlog`.
+
+        Any thread may ask.
+        """
+        route = self.routes.get(key)
+        epoch = None if route is None else self.admission.epochs.get(route.sender)
+        return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
+
+    def lost(self, loss: Loss, now: float) -> None:
+        """Count messages that the driver has dropped unread; the journal has one entry for them, without bytes."""
+        self.rejects.add(loss.kind, loss.key, loss.text, count=loss.number)
+        if self.traffic is not None:
+            self.traffic.received(loss.key, b"", now, loss.kind)
+
     @property
     def watched(self) -> str:
         """Key expression of the tokens to watch."""
         return self.keys.any_alive
 
     # ---------------------------------------------------------------- nameplates
+
+    def _process_came(self, name: str, instance: str) -> None:
+        """Note the token of an agent's process and ask it for its nameplate, unless too many processes are noted."""
+        if self.members.has_room(name):
+            self.members.appeared(name, instance)
+            self._ask(name, instance)
+        else:
+            text = f"a token of {name}: too many processes hold tokens"
+            self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
 
     def _ask(self, name: str, instance: str) -> None:
         """Ask a process for its nameplate."""

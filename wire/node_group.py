@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
 from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from wire.backlog import Loss
 from wire.codec import RejectedMessages
 
 
@@ -49,6 +50,8 @@ class GroupedNode(Protocol):
     def appeared(self, key: str, now: float) -> None: ...  # noqa: D102
     def vanished(self, key: str, now: float) -> None: ...  # noqa: D102
     def received(self, key: str, payload: bytes, now: float) -> None: ...  # noqa: D102
+    def is_known(self, key: str, payload: bytes) -> bool: ...  # noqa: D102
+    def lost(self, loss: Loss, now: float) -> None: ...  # noqa: D102
     def work(self, now: float) -> bool: ...  # noqa: D102
     def expire(self, now: float) -> None: ...  # noqa: D102
 
@@ -193,6 +196,18 @@ class NodeGroup:
             key = key.partition("#")[0]
         for node in tuple(self._listeners.get(key, ())) if query is None else query.askers:
             node.received(key, payload, now)
+
+    def is_known(self, key: str, payload: bytes) -> bool:
+        """Whether a message looks like one of the sender of its key, to any of the nodes."""
+        return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
+
+    def lost(self, loss: Loss, now: float) -> None:
+        """Count messages that the driver has dropped unread; who waits for a lost answer asks again."""
+        query = self._open.pop(loss.key, None)
+        if query is not None:
+            self._queries.pop(loss.key.partition("#")[0], None)
+        for node in self._listeners.get(loss.key, ()) or self._active[:1]:
+            node.lost(loss, now)
 
     def work(self, now: float) -> bool:
         """Let every node do a piece of work; return whether one did."""

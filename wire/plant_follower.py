@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import inf
 
+from wire.backlog import is_marked
 from wire.keys import epoch_of
 from wire.messages import PLANT, AnyMessage
 from wire.node import Node, Route
@@ -43,6 +44,14 @@ class PlantFollower(Node):
         if followed == epoch:
             self.admission.release(PLANT)
         return followed == epoch or not self._plants
+
+    def is_known(self, key: str, payload: bytes) -> bool:
+        """Whether a message looks like one of the sender of its key, be it a plant that is not followed yet."""
+        route = self.routes.get(key)
+        of_plant = route is not None and route.sender == PLANT
+        return super().is_known(key, payload) or (
+            of_plant and any(is_marked(payload, PLANT, epoch) for epoch in tuple(self._plants))
+        )
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
         """Check a message; first follow its plant if this node follows none."""

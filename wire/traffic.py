@@ -12,9 +12,19 @@ from wire.journal import AT_ONCE, Exchange, Heard, JournalBuffer, Process, Recei
 from wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
 from wire.keys import Keys
 from wire.messages import Measurement, State
+from wire.rate_limit import RateLimit
 
 SHOWN = 4_000
 """Most bytes that are noted of a message that was rejected."""
+
+REJECTED_OF_TICK = 20
+"""Rejected messages that are noted in one tick of simulated time; the others are only counted."""
+
+REJECTED, REJECTED_INTERVAL = 100, 0.05
+"""The same in wall-clock time, of each kind: how many at once, and the time (s) after which one more is noted."""
+
+STALE, STALE_INTERVAL = 2_000, 0.001
+"""The same of late messages, which links in bad order bring, and which the account of a link needs."""
 
 
 class Traffic(Protocol):
@@ -63,6 +73,8 @@ class TickTraffic:
             self._of_tick[keys.state(name)] = self._states
         self._elsewhere = {keys.telemetry, *map(keys.report, names), *map(keys.journal, names)}
         """Keys whose messages the record has anyway."""
+        self._rejected = 0
+        """Messages rejected in this tick."""
 
     def sent(self, key: str, payload: bytes) -> None:
         """Note a message that the node sends."""
@@ -77,8 +89,12 @@ class TickTraffic:
         of_tick = self._of_tick.get(key)
         if of_tick is not None and not rejected:
             of_tick.append(payload)
-        elif rejected or key not in self._elsewhere:
-            self._journal.add(Received(None, key[self._cut :], payload[:SHOWN] if rejected else payload, rejected))
+        elif rejected:
+            self._rejected += 1
+            if self._rejected <= REJECTED_OF_TICK:
+                self._journal.add(Received(None, key[self._cut :], payload[:SHOWN], rejected))
+        elif key not in self._elsewhere:
+            self._journal.add(Received(None, key[self._cut :], payload))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""
@@ -103,6 +119,9 @@ class TickTraffic:
 
     def ticked(self, tick: int) -> None:
         """Note that tick k is complete, or that it ends as it is."""
+        if self._rejected > REJECTED_OF_TICK:
+            self.line(f"{self._rejected - REJECTED_OF_TICK} more rejected messages left out")
+        self._rejected = 0
         measurements, states = self._measurements, self._states
         if not (measurements or states):
             return
@@ -138,6 +157,7 @@ class TimedTraffic:
         self._whole = whole
         self.now = 0.0
         """Time of the last call of the node (s, monotonic)."""
+        self._rejected, self._stale = RateLimit(REJECTED, REJECTED_INTERVAL), RateLimit(STALE, STALE_INTERVAL)
 
     def sent(self, key: str, payload: bytes) -> None:
         """Note a message that the node sends."""
@@ -153,6 +173,8 @@ class TimedTraffic:
         needless = IN_TELEMETRY if self._arrivals else _NOT_NOTED
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
+        if rejected and not self._is_noted(rejected):
+            return
         if (
             kind in EACH_TICK
             and not self._whole
@@ -162,6 +184,13 @@ class TimedTraffic:
             self._journal.add(Heard(at, name, message.epoch, message.seq, rejected))
             return
         self._journal.add(Received(at, name, payload[:SHOWN] if rejected else payload, rejected))
+
+    def _is_noted(self, rejected: str) -> bool:
+        """Return whether a rejected message is noted; one of many is not, and their number is."""
+        line = (self._stale if rejected == "stale" else self._rejected).admit(rejected, self.now)
+        if line is not None and line != rejected:
+            self._journal.add(Process(self.now, "line", f"rejected messages: {line}"))
+        return line is not None
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""

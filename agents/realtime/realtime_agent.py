@@ -256,7 +256,7 @@ class RealtimeAgent(AgentNode):
 
     def _ask_again(self) -> None:
         """Ask for the nameplates that have not come: a question dies with its link."""
-        for name, instance in self.members.unmet:
+        for name, instance in self.members.next_unmet():
             self._ask(name, instance)
 
     def _listen(self) -> None:

@@ -108,7 +108,7 @@ class LivePlantNode(PlantNode):
         """Ask for the nameplates that have not come."""
         if now >= self._ask_timer.due:
             self._ask_timer.take(now)
-            for name, instance in self.members.unmet:
+            for name, instance in self.members.next_unmet():
                 self._ask(name, instance)
 
     def _recorder_came(self, name: str, now: float) -> None:

@@ -44,6 +44,11 @@ WAITING = 0.5
 """Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
 
 
+COMMANDS, COMMAND_INTERVAL = 100, 0.02
+"""Commands of one verb that are carried out at once, and time (s, wall) after which one more is: a step must not wait
+for those who ask without end."""
+
+
 class RealtimePlant(LivePlantNode):
     """The plant under real time; parameters as of `PlantNode`."""
 
@@ -62,6 +67,7 @@ class RealtimePlant(LivePlantNode):
         self._waiting_timer = Timer(WAITING, 0.0)
         self._warnings = RateLimit(burst=5)
         self._commands = RunCommands(self)
+        self._command_limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
         self._stays = False
         """Whether the end is kept back only for recorders."""
         self.routes[self.keys.command] = Route(ANYBODY, (Command,), self._on_command)
@@ -171,6 +177,8 @@ class RealtimePlant(LivePlantNode):
         self._on_command(command, payload, now)
 
     def _on_command(self, command: Command, payload: bytes, now: float) -> None:
+        if self._command_limit.admit(command.verb, now) is None:
+            raise RejectedError("excess", f'more than {COMMANDS} commands "{command.verb}" at once')
         answer = self._commands.answer(command, now)
         self._publish(self.keys.answer(command.reply_to), encode(answer))
         if answer.ok:

@@ -65,8 +65,9 @@ class TelemetryClient:
         self._closed = False
         self.rejects = self._core.rejects
         """The messages that were dropped."""
-        self.inbox = Inbox()
+        self.inbox = Inbox(holds=clock == "simulated")
         """Takes the words of other threads."""
+        self.inbox.is_known = self._core.is_known
         self._session = self._open()
 
     @property
@@ -103,6 +104,8 @@ class TelemetryClient:
                 self._core.received(key, payload, monotonic())
                 for message in self._core.take():
                     self._pass_on(message)
+        for loss in self._session.take_losses():
+            self._core.lost(loss, monotonic())
         if self._stream is not None and not self._closed:
             self._look_after(self._stream)
         return words

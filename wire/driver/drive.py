@@ -8,6 +8,7 @@ from time import monotonic
 from typing import Protocol
 
 from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from wire.backlog import Loss
 from wire.driver.log_limit import limit_log
 from wire.driver.session import Session
 
@@ -78,6 +79,14 @@ class Core(Protocol):
         """Take a message that arrived at `now` (s); it may have waited in the inbox since."""
         ...
 
+    def is_known(self, key: str, payload: bytes) -> bool:
+        """Whether a message looks like one of a known sender; called from any thread."""
+        ...
+
+    def lost(self, loss: Loss, now: float) -> None:
+        """Count messages that were dropped unread."""
+        ...
+
     def work(self, now: float) -> bool:
         """Do a piece of work, if there is one."""
         ...
@@ -141,6 +150,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     StoppedError
         If another thread asks the process to stop.
     """
+    session.inbox.is_known = core.is_known
     take = session.take
     limit = limit_log(log)
     now = monotonic()
@@ -165,6 +175,8 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
+        for loss in session.take_losses():
+            core.lost(loss, now)
         for line in session.take_lines():
             log.warning("%s", line)
         deadline = core.deadline  # a message may have postponed it

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from _thread import allocate_lock
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 from time import monotonic
 from typing import Literal
+
+from wire.backlog import ROOM, SMALL, Backlog, Loss
+from wire.bounds import LIMIT
 
 Kind = Literal["message", "appeared", "vanished", "word"]
 """A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
@@ -17,12 +22,27 @@ Event = tuple[Kind, str, bytes]
 Stamped = tuple[Kind, str, bytes, float]
 """The same with its time of arrival (s, monotonic): it may wait here for its owner."""
 
+HELD = 1.0
+"""Longest time (s) for which a known sender's message waits for room where none may be lost. Its sender waits
+meanwhile, and Zenoh closes a link only after 5 s."""
+
 
 class Inbox:
-    """Queue events from Zenoh's threads to the owner's thread.
+    """Queue events from Zenoh's threads to the owner's thread, within the bounds of `wire.backlog`.
 
     The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine
     this is one wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
+
+    Parameters
+    ----------
+    holds : bool, optional
+        Whether a known sender's message waits for room, as in simulated time, where none may be lost: then the sender
+        goes no faster than the owner.
+
+    Attributes
+    ----------
+    is_known : Callable[[str, bytes], bool]
+        Whether a message on a key is of a known sender; called from Zenoh's threads, and only when many wait.
 
     Examples
     --------
@@ -34,21 +54,71 @@ class Inbox:
     []
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, holds: bool = False) -> None:
+        self.is_known: Callable[[str, bytes], bool] = lambda key, payload: False
+        self._holds = holds
         self._events: deque[Stamped] = deque()
         self._needed = 1
         self._urgent = False
         self._wake = allocate_lock()
         self._wake.acquire()
+        self._backlog, self._guard = Backlog(), allocate_lock()
+        self._counted = False
+        """Whether the backlog has counted any of the messages that wait."""
+        self._emptied = threading.Event()
 
-    def put(self, event: Event) -> None:
-        """Put an event in; from any thread, never blocking."""
-        self._events.append((*event, monotonic()))
+    def put(self, event: Event, *, asked: bool = False) -> None:
+        """Put an event in, from any thread; drop and count a message for which there is no room.
+
+        Parameters
+        ----------
+        event : Event
+            The event.
+        asked : bool, optional
+            Whether it answers an own question.
+        """
         if event[0] != "message":
+            self._events.append((*event, monotonic()))
             self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
+        elif (len(self._events) < ROOM and len(event[2]) <= SMALL) or self._admits(event, asked=asked):
+            self._events.append((*event, monotonic()))
         if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
+
+    def _admits(self, event: Event, *, asked: bool) -> bool:
+        """Return whether a message may wait: one of many, or a long one."""
+        _, key, payload = event
+        size, known = len(payload), asked or self.is_known(key, payload)
+        if size > LIMIT and not asked:
+            self._refuse(key, size)
+            return False
+        self._counted = True
+        if known and self._holds:
+            self._wait_for_room(key, size)
+            with self._guard:
+                self._backlog.add(key, size, waiting=len(self._events))
+            return True
+        with self._guard:
+            return self._backlog.admits(key, size, known=known, waiting=len(self._events))
+
+    def _wait_for_room(self, key: str, size: int) -> None:
+        self._emptied.clear()
+        if not self._backlog.has_room(key, size, known=True, waiting=len(self._events)):
+            with suppress(RuntimeError):
+                self._wake.release()  # the owner may wait for more than there is room for
+            self._emptied.wait(HELD)
+
+    def _refuse(self, key: str, size: int) -> None:
+        with self._guard:
+            self._backlog.lose(key, "oversized", f"{size} bytes, at most {LIMIT} are allowed")
+
+    def take_losses(self) -> tuple[Loss, ...]:
+        """Take out the messages that were dropped since the last call."""
+        if not self._backlog.has_losses:
+            return ()
+        with self._guard:
+            return self._backlog.take_losses()
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take all events out.
@@ -74,4 +144,9 @@ class Inbox:
         taken = []
         while events:
             taken.append(events.popleft())
+        if self._counted:
+            with self._guard:
+                self._counted = False
+                self._backlog.emptied()
+            self._emptied.set()
         return taken

@@ -13,6 +13,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
+from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
 from wire.driver.inbox import Inbox, Kind, Stamped
 from wire.driver.lingering import do_not_linger
@@ -78,6 +79,14 @@ failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
+
+MOST_BYTES = 8_000_000
+"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have `wire.bounds.LIMIT`
+at most, a configuration or a feeder's diagram more. Zenoh closes the link on which a longer one comes."""
+
+MOST_UNPREPARED = 64
+"""Publishers that are kept for keys that nobody has prepared, such as those of answers: anybody may ask, under as many
+names as he likes."""
 
 
 def load_zenoh(*, one_thread: bool = False) -> None:
@@ -153,10 +162,12 @@ class Session:
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
         elif credentials is not None and rendezvous:
             zenoh.init_log_from_env_or(_REFUSED_LINKS)
-        self.inbox = inbox or Inbox()
+        self.inbox = inbox or Inbox(holds=clock == "simulated")
         self._zenoh = zenoh
         self._profile = profile = _PROFILES[clock]
         self._publishers: dict[str, zenoh.Publisher] = {}
+        self._unprepared: list[str] = []
+        """Keys of the publishers that nobody has prepared, oldest first."""
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._credentials, self._relayed = credentials, star and not rendezvous
@@ -241,6 +252,10 @@ class Session:
                 self._note_links(self._credentials)
         return self.inbox.take(needed, timeout)
 
+    def take_losses(self) -> tuple[Loss, ...]:
+        """Take out the messages that were dropped unread since the last call."""
+        return self.inbox.take_losses()
+
     def subscribe(self, key: str) -> None:
         """Put messages on a key, without wildcards, into the inbox."""
         enqueue = self.inbox.put
@@ -271,7 +286,7 @@ class Session:
 
         def on_reply(reply: zenoh.Reply) -> None:
             if reply.ok is not None:
-                enqueue(("message", reply_key or key, reply.ok.payload.to_bytes()))
+                enqueue(("message", reply_key or key, reply.ok.payload.to_bytes()), asked=True)
 
         consolidation, target = self._zenoh.ConsolidationMode.NONE, self._zenoh.QueryTarget.ALL
         handler = self._direct(on_reply)
@@ -300,9 +315,17 @@ class Session:
         """Publish bytes on a key; block rather than drop, except in wall-clock time for keys of `LATEST_ONLY`."""
         publisher = self._publishers.get(key)
         if publisher is None:
-            self.prepare(key)
-            publisher = self._publishers[key]
+            publisher = self._prepare_for_now(key)
         publisher.put(payload)
+
+    def _prepare_for_now(self, key: str) -> zenoh.Publisher:
+        """Declare the publisher of a key that nobody has prepared, and drop the oldest of these if there are many."""
+        if len(self._unprepared) >= MOST_UNPREPARED:
+            oldest = self._publishers.pop(self._unprepared.pop(0))
+            oldest.undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
+        self.prepare(key)
+        self._unprepared.append(key)
+        return self._publishers[key]
 
     def prepare(self, key: str) -> None:
         """Declare the publisher of a key, once."""
@@ -407,7 +430,8 @@ def _config(
                     "lease": profile.lease,
                     "keep_alive": 4,
                     "queue": {"congestion_control": {"block": {"wait_before_close": profile.wait_before_close}}},
-                }
+                },
+                "rx": {"max_message_size": MOST_BYTES},
             },
             # Else Zenoh makes pools at the first message of more than 3 kB: 65 ms in which the plant misses its steps.
             "shared_memory": {"enabled": False},
