@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from time import time_ns
 
 from msgspec.structs import replace
 
@@ -16,7 +15,7 @@ from agents.laws.law import Law
 from agents.lockstep_agent import LockstepAgent
 from agents.realtime.realtime_agent import RealtimeAgent
 from wire.driver.drive import StoppedError, drive, serve
-from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
 from wire.keys import check_name
@@ -54,7 +53,7 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     _check(configs)
     wall = configs[0].clock == "wall"
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
-        configs = tuple(replace(config, epoch=max(config.epoch, time_ns() // 1_000_000)) for config in configs)
+        configs = tuple(replace(config, epoch=new_epoch()) for config in configs)
     else:
         schedule_as_batch()
     with ExitStack() as laws:

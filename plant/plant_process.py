@@ -6,7 +6,7 @@ import gc
 import logging
 import sys
 from collections.abc import Callable
-from time import monotonic, time_ns
+from time import monotonic
 
 import msgspec
 from msgspec.structs import replace
@@ -17,7 +17,7 @@ from plant.plant_interface import LivePlant
 from plant.realtime.realtime_plant import RealtimePlant
 from plant.start_words import COMPILING, LISTENING, READY
 from wire.driver.drive import StoppedError, drive, perform, serve
-from wire.driver.process import ConfigurationError, MakeLinks, no_links
+from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
 from wire.messages import PLANT
@@ -70,7 +70,7 @@ def run_plant(
     log = logging.getLogger("plant")
     wall = config.clock == "wall"
     if wall:  # each process has an epoch of its own, which tells it from its ghost; only equality matters
-        config = replace(config, epoch=max(config.epoch, time_ns() // 1_000_000))
+        config = replace(config, epoch=new_epoch())
     else:
         schedule_as_batch()
     plant: LivePlant | None = None

@@ -11,6 +11,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Mapping
 from types import FrameType, UnionType
 from typing import Any, TypeVar, get_args
@@ -36,6 +37,16 @@ _USAGE = """usage: python -m {module} [{leash} [NAME]] < CONFIG.json
 Runs {what}. The configuration is one JSON object on standard input; see {config}.
 With {leash} it must be on one line, and the process ends when standard input does; NAME is only for `ps`.
 """
+
+
+def new_epoch() -> int:
+    """Return an epoch for this process, which no other process of its name has.
+
+    It is the time, in ms since 1970, and ten random bits: so two processes differ also on a host whose clock stands
+    still, or has gone back. No clock decides anything but this.
+    """
+    return (time.time_ns() // 1_000_000 % 2**43) << 10 | int.from_bytes(os.urandom(2), "little") >> 6
+
 
 C = TypeVar("C")
 
@@ -104,7 +115,7 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
     except (StoppedError, KeyboardInterrupt) as stop:
         log.info("asked to leave: %s", stop)
         return OK
-    except (ConfigurationError, SessionError, msgspec.DecodeError) as error:
+    except (ConfigurationError, SessionError, msgspec.DecodeError, UnicodeDecodeError) as error:
         log.error("configuration: %s", error)
         return BAD_CONFIG
     if broke:

@@ -1,0 +1,101 @@
+"""No host's clock of the day decides anything: it may jump, stand still, or be far off."""
+
+from __future__ import annotations
+
+import ast
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from tests.toy.town import Town
+from wire.bounds import MOST_COUNT
+from wire.driver.process import new_epoch
+
+ROOT = Path(__file__).parents[2]
+
+DAY_CLOCKS = {"time", "time_ns", "now", "utcnow", "today", "localtime", "gmtime", "ctime"}
+
+ALLOWED = {
+    "wire/driver/process.py": "tells two processes of one name apart, with random bits",
+    "wire/trust/key_folder.py": "ends of certificates are dates",
+    "wire/trust/site_authority.py": "the same",
+    "scenarios/run.py": "the record says when a run began",
+    "scenarios/live/live_folders.py": "names of folders, and the same",
+    "scenarios/view/recorded/recorded_run.py": "how long ago a file was written, which only says whether to look again",
+}
+"""Files that may ask for the time of the day, and what for."""
+
+BROKEN = """
+import random
+import time
+
+YEARS = random.Random()
+
+
+def jumping():
+    "Any time from 1970 to 2100."
+    return YEARS.uniform(0.0, 4.1e9)
+
+
+time.time = jumping
+time.time_ns = lambda: int(1e9 * jumping())
+"""
+
+
+def asked_for(path: Path) -> set[str]:
+    """Return the clocks of the day that a file asks."""
+    tree = ast.parse(path.read_text())
+    imported = {
+        alias.asname or alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ImportFrom) and node.module == "time"
+        for alias in node.names
+    }
+    found = set()
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        match node.func:
+            case ast.Name(id=name) if name in DAY_CLOCKS & imported:
+                found.add(name)
+            case ast.Attribute(value=ast.Name(id="time" | "datetime" | "date"), attr=name) if name in DAY_CLOCKS:
+                found.add(name)
+    return found
+
+
+def test_the_processes_of_a_run_ask_only_a_clock_that_never_jumps() -> None:
+    """Deadlines, ages, ticks and leases count on `monotonic`; who asks for the time of the day is listed here."""
+    files = [path for part in ("wire", "agents", "plant", "netem", "scenarios") for path in (ROOT / part).rglob("*.py")]
+    asking = {str(path.relative_to(ROOT)) for path in files if asked_for(path)}
+
+    assert asking == set(ALLOWED)
+
+
+def test_a_run_does_not_notice_clocks_that_jump(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By decades, whenever they are asked: no step is lost, and an agent that comes back is believed."""
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "sitecustomize.py").write_text(BROKEN)
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "broken"))
+    two = ("inv1", "inv2")
+    with Town(2, tmp_path).all() as town:
+        first = town.status["inv2"].epoch
+        town.until(lambda: town.t >= 0.6, "rows")
+        town.children["inv2"].signal(9)
+        town.until_event("inv2", "inv2 died").start("inv2")
+        town.until(lambda: town.status["inv2"].epoch != first, "the new process").together(two)
+        steps = [b[0] - a[0] for a, b in pairwise(town.rows)]
+
+        assert max(steps) == pytest.approx(0.02)
+        assert [event.text for event in town.events if "silent" in event.text] == []
+
+
+def test_an_epoch_is_new_though_the_clock_stands_still(monkeypatch: pytest.MonkeyPatch) -> None:
+    """And it fits into its field, whatever the clock says."""
+    for clock in (0, 10**18, -(10**18), 2**63 - 1):
+        monkeypatch.setattr(time, "time_ns", lambda clock=clock: clock)
+        epochs = {new_epoch() for _ in range(64)}
+
+        assert len(epochs) > 32
+        assert all(0 <= epoch <= MOST_COUNT for epoch in epochs)
