@@ -12,8 +12,9 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from tests.toy.toy_configs import agent_config
 from wire.admission import Admission
+from wire.bounds import MOST
 from wire.codec import RejectedError
-from wire.membership import Membership
+from wire.membership import ASKED_AT_ONCE, MOST_PROCESSES, Membership
 from wire.messages import Nameplate
 
 
@@ -123,3 +124,29 @@ def test_the_process_that_counts_is_there_and_its_nameplate_is_its_own(seed: int
         assert (counts in there) if there else counts == ""
         assert known is None or known.epoch == admission.epoch("inv2")
         assert known is None or chr(known.epoch) in there
+
+
+def test_tokens_of_anybody_cost_no_more_than_so_many_questions() -> None:
+    """Of a name a few processes are noted, of names as many as a run may have; the first ones go on to count."""
+    made, _ = members("a")
+    for i in range(1_000):
+        for name in ("inv2", f"who{i}"):
+            if made.has_room(name):
+                made.appeared(name, f"x{i}")
+    noted = list(made.unmet)
+
+    assert made.instance("inv2") == "a"
+    assert sum(name == "inv2" for name, _ in noted) == MOST_PROCESSES - 1
+    assert len({name for name, _ in noted}) == MOST
+    assert len(made.next_unmet()) == ASKED_AT_ONCE
+
+
+def test_all_who_have_not_answered_are_asked_again_in_turn() -> None:
+    """However many there are, nobody waits for ever for the question."""
+    made, _ = members()
+    for i in range(3 * ASKED_AT_ONCE + 7):
+        made.appeared(f"inv{i}", "a")
+    asked = [process for _ in range(4) for process in made.next_unmet()]
+
+    assert sorted(asked) == sorted(made.unmet)
+    assert made.next_unmet() == asked[:ASKED_AT_ONCE]

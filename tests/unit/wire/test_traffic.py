@@ -11,7 +11,7 @@ from wire.codec import encode
 from wire.journal import AT_ONCE, Entry, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
 from wire.keys import Keys
 from wire.messages import Leave, Measurement, State
-from wire.traffic import SHOWN, TickTraffic, TimedTraffic
+from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
 STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))
@@ -171,3 +171,35 @@ def test_in_one_process_a_tick_has_the_values_of_its_messages(count: int) -> Non
     assert (len(measurements), len(states)) == (count, count)
     assert dict(zip(State.__struct_fields__, states[-1], strict=True))["P_set"] == 5e4
     assert dict(zip(Measurement.__struct_fields__, measurements[-1], strict=True))["to"] == "inv1"
+
+
+def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
+    """In real time some are noted with their bytes, then one now and then, with the number of those left out."""
+    traffic, journal = timed()
+    for i in range(10_000):
+        traffic.received(KEYS.state("inv2"), NOISE, 10.0 + 1e-4 * i, "garbled")
+        traffic.received(KEYS.state("inv2"), STATE, 10.0 + 1e-4 * i, "")
+    entries = noted(journal)
+    kept = [entry for entry in entries if isinstance(entry, Received)]
+    lines = [entry.text for entry in entries if isinstance(entry, Process)]
+
+    assert REJECTED <= len(kept) <= REJECTED + 1.0 / REJECTED_INTERVAL + 1
+    assert sum(isinstance(entry, Heard) for entry in entries) == 10_000
+    assert lines[0].startswith("rejected messages: garbled (")
+    assert lines[0].endswith(" more of this kind left out)")
+
+
+def test_a_flood_of_rejected_messages_in_simulated_time_is_noted_tick_by_tick() -> None:
+    """Of each tick the first ones, and the number of the others."""
+    journal = JournalBuffer()
+    traffic = TickTraffic(KEYS, ("inv2",), journal)
+    for tick in range(2):
+        for _ in range(1_000):
+            traffic.received(KEYS.state("inv2"), NOISE, 0.0, "garbled")
+        traffic.ticked(tick)
+    entries = noted(journal)
+
+    assert sum(isinstance(entry, Received) for entry in entries) == 2 * REJECTED_OF_TICK
+    assert [entry.text for entry in entries if isinstance(entry, Process)] == [
+        f"{1_000 - REJECTED_OF_TICK} more rejected messages left out"
+    ] * 2

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from plant.plant_config import ScheduledAction
-from plant.realtime.realtime_plant import LEAD, RealtimePlant
+from plant.realtime.realtime_plant import COMMANDS, LEAD, RealtimePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
@@ -518,3 +518,19 @@ def test_a_run_is_ended_once() -> None:
     assert [(answer.ok, answer.text) for answer in answers][1] == (False, "the run is ending")
     assert answers[0].ok
     assert [message.final for message in lab.take(Telemetry)].count(True) == 1
+
+
+def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:
+    """Of ten thousand questions between two steps the first are answered, the others counted; another verb is free."""
+    lab = running(3)
+    question = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="status", reply_to="z1")
+    for number in range(10_000):
+        lab.hear(KEYS.request, replace(question, seq=number))
+    lab.do()
+    answers = lab.take(Answer)
+    end = lab.ask("down")
+    lab.step(3)
+
+    assert len(answers) == COMMANDS
+    assert lab.side.rejects.counts["excess"] == 10_000 - COMMANDS
+    assert end.ok
