@@ -8,6 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
+from typing import Any
+
+from msgspec import structs
 
 from scenarios.drivers.free_endpoint import parse_endpoint
 from wire.codec import encode
@@ -35,6 +38,11 @@ class Intruder:
     def __init__(self, endpoint: str, credentials: Credentials | None) -> None:
         listen = ("tcp/127.0.0.1:0",) if credentials is None else ("tls/127.0.0.1:0",)
         self.session = Session("intruder", listen=listen, connect=(endpoint,), clock="wall", credentials=credentials)
+
+    @property
+    def raw(self) -> Any:
+        """Zenoh's own session, for what ours does not do."""
+        return self.session._session  # noqa: SLF001  # a test may say anything
 
     def __enter__(self) -> Intruder:
         return self
@@ -67,9 +75,17 @@ class Intruder:
             self.session.publish(key, encode(message))
 
 
+class Unruly(Credentials, frozen=True, kw_only=True):
+    """Credentials of somebody who has switched off the access rules of the own process: those of others stop him."""
+
+    def zenoh_settings(self, *, star: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return the settings of links, and no access rules."""
+        return super().zenoh_settings(star=star)[0], {"enabled": False}
+
+
 def credentials(folder: Path, name: str) -> Credentials:
     """Return what a member shows, whatever its role."""
-    return open_credentials(folder, ROLES, name)[0]
+    return Unruly(**structs.asdict(open_credentials(folder, ROLES, name)[0]))
 
 
 def handshake(endpoint: str, certificate: Path | None, key: Path | None = None) -> str:

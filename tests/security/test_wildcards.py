@@ -1,0 +1,88 @@
+"""Members that ask for more than is theirs: by wildcards, by tokens and by queryables of others.
+
+Everything on a link keeps its order: what is allowed comes last, and proves that the rest has had its chance.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.security.intruder import Intruder, credentials
+from tests.toy.town import Town
+
+pytest.importorskip("cryptography", reason="certificates need the extra keys")
+zenoh = pytest.importorskip("zenoh")
+
+WIDE = ("**", "gridpeers/**", "gridpeers/*/*/inv1", "gridpeers/toy/measurement/*", "@/**")
+"""What a curious member subscribes to."""
+
+
+def overheard(town: Town, intruder: Intruder, own: str) -> set[str]:
+    """Return the keys of all that others send a curious member, until a message on one key has come."""
+    heard: set[str] = set()
+    inbox = intruder.session.inbox
+
+    def note(sample: Any) -> None:
+        heard.add(str(sample.key_expr))
+        inbox.put(("word", "", b""))
+
+    remote = zenoh.Locality.REMOTE
+    kept = [intruder.raw.declare_subscriber(key, note, allowed_origin=remote) for key in (*WIDE, own)]
+    begun = town.t
+    town.until(lambda: own in heard and town.t >= begun + 0.5, f"a message on {own}")
+    for subscriber in kept:
+        subscriber.undeclare()
+    return heard
+
+
+def test_wildcards_do_not_widen_what_a_member_hears(town: Town, lab: Path) -> None:
+    """An agent hears states of the others, a viewer telemetry and statuses; neither a measurement nor a set-point."""
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as agent:
+        assert overheard(town, agent.linked(4), town.keys.state("inv1")) == {town.keys.state("inv1")}
+    with Intruder(town.endpoint, credentials(lab, "viewer")) as viewer:
+        assert overheard(town, viewer.linked(4), town.keys.telemetry) <= {
+            town.keys.telemetry, *map(town.keys.status, ("inv1", "inv2")),
+        }  # fmt: skip
+
+
+def test_nobody_sees_a_token_that_a_member_holds_for_another(town: Town, lab: Path) -> None:
+    """Neither an agent's nor a plant's nor one with a wildcard; only the member's own appears."""
+    keys = town.keys
+    others = (keys.alive_agent("inv1", "z6"), keys.alive_plant(6), keys.alive_recorder("z6"), keys.any_alive)
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+        intruder.linked(4)
+        held = [intruder.raw.liveliness().declare_token(key) for key in (*others, keys.alive_agent("inv3", "z6"))]
+        town.until(lambda: keys.alive_agent("inv3", "z6") in town.tokens, "the own token")
+        assert town.tokens.isdisjoint(others)
+        for token in held:
+            token.undeclare()
+
+
+def test_nobody_is_asked_in_anothers_place(town: Town, lab: Path) -> None:
+    """A queryable on the nameplate of inv1, on configurations or on everything gets no query; the own one does."""
+    (instance,) = (key.rpartition("/")[2] for key in town.tokens if "/alive/agent/inv1/" in key)
+    asked = (town.keys.nameplate("inv1", instance), town.keys.config("inv1"))
+    own = town.keys.nameplate("inv3", "z6")
+    seen: list[str] = []
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+
+        def answer(query: Any) -> None:
+            with query:
+                seen.append(str(query.key_expr))
+                query.reply(query.key_expr, b"lie")
+
+        intruder.linked(4)
+        kept = [intruder.raw.declare_queryable(key, answer, complete=True) for key in (*asked, "**", own)]
+
+        def ask() -> bool:
+            for key in (*asked, own):
+                town.session.fetch(key)
+            return own in seen
+
+        town.until(ask, "a query on the own nameplate")
+        assert {*seen} == {own}
+        for queryable in kept:
+            queryable.undeclare()
