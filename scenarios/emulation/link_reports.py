@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
@@ -25,7 +27,7 @@ class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
 class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The status of a link while the run goes on."""
 
-    holds: tuple[str, ...] = ()
+    holds: tuple[Text, ...] = ()
     """The faults that it has now, each in words."""
     counts: LinkCounts | None = None
     """Counts of its messages so far; None if none was judged."""
@@ -34,18 +36,33 @@ class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 encode_statuses = msgspec.msgpack.Encoder().encode
 """Encode the `LinkStatus` of a receiver's links, by sender."""
 
-decode_statuses = msgspec.msgpack.Decoder(dict[str, LinkStatus]).decode
-"""Decode them; raise msgspec.DecodeError if the bytes are something else."""
+_statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])
+
+
+def decode_statuses(data: bytes) -> dict[str, LinkStatus]:
+    """Decode them; raise msgspec.DecodeError if the bytes are something else."""
+    return _decoded(_statuses, data)
+
 
 encode_data = msgspec.msgpack.Encoder().encode
 """Encode a `LinkReportData`."""
 
-_decode_data = msgspec.msgpack.Decoder(LinkReportData).decode
+_reports = msgspec.msgpack.Decoder(LinkReportData)
+
+T = TypeVar("T")
+
+
+def _decoded(decoder: msgspec.msgpack.Decoder[T], data: bytes) -> T:
+    """Decode bytes of others; raise msgspec.DecodeError for texts that are no UTF-8, and for depths, too."""
+    try:
+        return decoder.decode(data)
+    except (UnicodeDecodeError, RecursionError) as error:
+        raise msgspec.DecodeError(str(error)) from None
 
 
 def data_of(report: LinkReport) -> LinkReportData:
     """Return the data of a report; raise msgspec.DecodeError if they are not its sender's links."""
-    data = _decode_data(report.data)
+    data = _decoded(_reports, report.data)
     strangers = {trace.dst for trace in data.traces} - {report.sender}
     if strangers:
         raise msgspec.ValidationError(f"{report.sender} reports of links to {', '.join(sorted(strangers))}")

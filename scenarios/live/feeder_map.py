@@ -100,7 +100,7 @@ def read_feeder_map(payload: bytes) -> FeederMap | None:
     """Return the map in a plant's answer; None if the bytes are something else, or name a bus that is not there."""
     try:
         found = msgspec.json.decode(payload, type=FeederMap)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         return None
     numbers = [
         *(end for a, b, _ in found.branches for end in (a, b)),

@@ -27,6 +27,8 @@ def entries_of(data: bytes) -> Iterator[Entry]:
         Where the bytes end within an entry, or make none.
     """
     unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
+    if len(data) > LIMIT:
+        raise ValueError(f"{len(data)} bytes, a part of a journal has at most {LIMIT}")
     unpacker.feed(data)
     while True:
         try:
@@ -35,7 +37,7 @@ def entries_of(data: bytes) -> Iterator[Entry]:
             if unpacker.tell() != len(data):
                 raise ValueError(f"it ends within an entry, at byte {unpacker.tell()} of {len(data)}") from None
             return
-        except (msgpack.UnpackException, ValueError, RecursionError) as error:
+        except (msgpack.UnpackException, ValueError, TypeError, RecursionError) as error:  # of type: a list as a key
             raise ValueError(f"no msgpack at byte {unpacker.tell()}: {error or type(error).__name__}") from None
         yield from _entry(raw)
 
@@ -73,6 +75,6 @@ def values_of(payload: bytes) -> dict[str, Any]:
     """
     try:
         values = msgpack.unpackb(payload[:-CRC], strict_map_key=False)
-    except (ValueError, msgpack.UnpackException, RecursionError):
+    except (ValueError, TypeError, msgpack.UnpackException, RecursionError):  # of type: a list as a key
         return {}
     return {str(name): value for name, value in values.items()} if isinstance(values, dict) else {}

@@ -155,12 +155,12 @@ def _check_certificate(
     own: x509.Certificate, ca: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime
 ) -> datetime:
     """Raise KeysError unless a certificate is valid and names the member; return its end."""
-    from cryptography.exceptions import InvalidSignature
+    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
     from cryptography.x509.oid import NameOID
 
     try:
         own.verify_directly_issued_by(ca)
-    except (InvalidSignature, ValueError, TypeError):
+    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
         raise KeysError(
             f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
         ) from None
@@ -187,6 +187,7 @@ def _check_certificate(
 
 def _check_key(path: Path, certificate: x509.Certificate) -> None:
     """Raise KeysError unless a private key is that of a certificate, and private."""
+    from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     data = _bytes(path)
@@ -195,7 +196,7 @@ def _check_key(path: Path, certificate: x509.Certificate) -> None:
         raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
     try:
         key = load_pem_private_key(data, None)
-    except (ValueError, TypeError) as error:
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
         raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
     if key.public_key() != certificate.public_key():
         raise KeysError(f"{path}: is not the key of {path.with_suffix('.pem').name}; copy both from the same site")
@@ -203,11 +204,14 @@ def _check_key(path: Path, certificate: x509.Certificate) -> None:
 
 def _certificate(path: Path) -> x509.Certificate:
     from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
 
     data = _bytes(path)
     try:
-        return x509.load_pem_x509_certificate(data)
-    except ValueError:
+        certificate = x509.load_pem_x509_certificate(data)
+        certificate.public_key(), certificate.subject, certificate.not_valid_after_utc  # read when they are asked for
+        return certificate
+    except (ValueError, UnsupportedAlgorithm):
         raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
 
 

@@ -1,0 +1,321 @@
+"""All that takes bytes from others: the codec, every core, and the readers of what cores pass on.
+
+Each receiver takes any bytes and raises nothing. Where a function has an error of its own for bad input, its receiver
+catches that error and no other.
+"""
+
+from __future__ import annotations
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from importlib.util import find_spec
+from math import isfinite
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Protocol
+
+import msgspec
+from msgspec.structs import replace
+
+from agents.agent_config import AgentConfig
+from agents.realtime.realtime_agent import RealtimeAgent
+from netem.relay import EndpointError
+from netem.relay.endpoint import Endpoint
+from netem.relay.relay_command import RelayCommandError, new_faults, number
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from plant.plant_config import PlantConfig
+from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
+from scenarios.drivers.telemetry_stream import TelemetryStream
+from scenarios.emulation.emulated_links import links_of
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.emulation.link_reports import data_of, decode_statuses
+from scenarios.live.feeder_map import read_feeder_map
+from scenarios.live.run_client import RunClient
+from scenarios.live.show.link_table import links_text
+from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.record.journal_reader import entries_of, values_of
+from scenarios.results.record import Recorder, RecordError
+from scenarios.view.run_view import Cursor, RunView
+from tests.hostile.scenes import (
+    EPOCH,
+    INSTANCES,
+    KEYS,
+    NAMES,
+    AgentScene,
+    PlantScene,
+    RealtimeAgentScene,
+    RealtimePlantScene,
+    Scene,
+    plate,
+)
+from tests.toy.toy_configs import agent_config
+from wire.codec import CRC, RejectedError, decode, encode
+from wire.keys import Keys, epoch_of, run_of_plant
+from wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
+from wire.trust.key_folder import KeysError, open_credentials
+
+LIFE = 2_000
+"""Messages after which a core is made anew: a false one may have ended what it does."""
+
+TICK = 200
+"""Messages between two ticks of its honest peers."""
+
+
+class Receiver(Protocol):
+    """What takes bytes."""
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take bytes; return the kind of their rejection, empty if they were used."""
+        ...
+
+
+class Codec:
+    """Decode, and encode again what was decoded."""
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take bytes; a message that is believed is the same once encoded and decoded."""
+        try:
+            message = decode(payload)
+        except RejectedError as rejected:
+            return rejected.kind
+        again = encode(message)
+        assert encode(decode(bytes(again))) == again
+        return ""
+
+
+class Core:
+    """A node in the middle of a run, with honest peers beside the one who sends this."""
+
+    def __init__(self, make: Callable[[], Scene]) -> None:
+        self._make = make
+        self._begin()
+
+    def _begin(self) -> None:
+        self._scene, self._taken, self._tick = self._make(), 0, 0
+        self._keys = [*self._scene.side.routes, KEYS.state("inv9"), KEYS.telemetry, "x"]
+        self._counts: Counter[str] = self._scene.side.rejects.counts
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take bytes on one of its keys; now and then its peers go on, and tokens come and go."""
+        side, before = self._scene.side, self._counts.total()
+        kinds = self._counts.copy()
+        side.received(self._key(payload, rng), payload, self._scene.now)
+        if rng.random() < 0.01:
+            self._token(payload, rng)
+        self._taken += 1
+        if self._taken % TICK == 0:
+            self._scene.honest(self._tick)
+            self._tick += 1
+            self._check()
+        if side.finished or self._taken >= LIFE:
+            self._check()
+            self._begin()
+        if self._counts.total() == before:
+            return ""
+        assert self._counts["failed"] == kinds["failed"], side.rejects.take_lines()
+        return next(iter((self._counts - kinds) or {"": 1}))
+
+    def _key(self, payload: bytes, rng: random.Random) -> str:
+        """Return any of its keys, or one on which a message of this type and sender belongs."""
+        try:
+            message = decode(payload)
+        except RejectedError:
+            return rng.choice(self._keys)
+        fitting = [
+            key
+            for key, route in self._scene.side.routes.items()
+            if isinstance(message, route.types) and route.sender in ("", message.sender)
+        ]
+        return rng.choice(fitting if fitting and rng.random() < 0.8 else self._keys)
+
+    def _token(self, payload: bytes, rng: random.Random) -> None:
+        text = payload[:20].decode("latin-1")
+        tails = (f"plant/{EPOCH}", "agent/inv2/b", f"agent/{text}/x", f"agent/inv3/{text}", f"plant/{text}", text)
+        token = f"gridpeers/toy/alive/{rng.choice(tails)}"
+        (self._scene.side.appeared if rng.random() < 0.8 else self._scene.side.vanished)(token, self._scene.now)
+
+    def _check(self) -> None:
+        """Check that whatever it says fits on a terminal, and into a message."""
+        self._scene.take()
+        lines = self._scene.side.rejects.take_lines()
+        assert not self._counts["failed"], lines
+        assert all(len(line) < 1_000 and line.isprintable() for line in lines), lines
+        self._scene.done.clear()
+
+
+LATE = EmulationConfig(
+    netem=Netem(links=(Fault(on="* <-> *", delay=0.03, loss=0.1, corrupt=0.1, duplicate=0.2),)),
+    microgrids={name: "mg1" for name in NAMES},
+).to_tree()
+"""Links that delay, lose, copy and corrupt."""
+
+
+class LinkedAgentScene(RealtimeAgentScene):
+    """inv1 in wall-clock time, behind emulated links, with a journal."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        config = replace(agent_config("inv1"), clock="wall", epoch=EPOCH, links=LATE, record="all")
+        self.side = RealtimeAgent(config, "a", links_of("inv1", LATE))
+        self.side.start(self.now)
+        self.join()
+
+    def join(self) -> None:
+        """Meet the plant and the others."""
+        self.side.appeared(KEYS.alive_plant(EPOCH), self.now)
+        for name in NAMES[1:]:
+            self.side.appeared(KEYS.alive_agent(name, INSTANCES[name]), self.now)
+            self.hear(KEYS.nameplate(name, INSTANCES[name]), plate(name))
+
+
+class Recording:
+    """A recorder of a run: what it takes off the wire, and what it does with it."""
+
+    def __init__(self, stream: bool) -> None:
+        self._stream = stream
+        self._begin()
+
+    def _begin(self) -> None:
+        self._endpoint = TelemetryEndpoint("history", "toy", TelemetryStream() if self._stream else None)
+        self._endpoint.appeared(KEYS.alive_plant(EPOCH))
+        self._recorder: Recorder | None = Recorder(gaps=True)
+        self._keys, self._taken = [*self._endpoint.routes], 0
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take bytes, record what is sound, and ask again as a recorder does."""
+        counts = self._endpoint.rejects.counts
+        before = counts.copy()
+        now = self._taken * 0.01
+        self._endpoint.received(rng.choice(self._keys), payload, now)
+        self._endpoint.question(now)
+        for message in self._endpoint.take():
+            try:
+                if self._recorder is not None:
+                    self._recorder(message)
+            except RecordError:
+                self._recorder = None
+        assert counts["failed"] == 0, self._endpoint.rejects.take_lines()
+        self._taken += 1
+        if self._taken >= LIFE:
+            self._begin()
+        return next(iter(counts - before), "")
+
+
+class View:
+    """A person's view of a run: what `gridpeers view`, `watch` and `link show` make of what comes."""
+
+    def __init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
+        self._client = SimpleNamespace(keys=Keys("toy"), epochs={EPOCH})
+        self._view, self._taken = RunView("toy"), 0
+        self._view.presence(plant=True, agents=NAMES, now=0.0)
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take bytes on a key of those that a client hears, and make a page of them now and then."""
+        keys = (KEYS.telemetry, KEYS.answer("visitor"), *(KEYS.status(name) for name in NAMES))
+        now = self._taken * 0.01
+        message = RunClient.read(self._client, rng.choice(keys), payload)  # type: ignore[arg-type]
+        with_link = {}
+        try:
+            if isinstance(message, Telemetry):
+                self._view.telemetry(message, now)
+            elif isinstance(message, AgentStatus):
+                self._view.status(message, now)
+            elif isinstance(message, Answer):
+                self._view.plant_status(msgspec.convert(message.data, PlantStatus))
+            elif isinstance(message, LinkAcknowledgement):
+                with_link = decode_statuses(message.data)
+                self._view.accounts(message.sender, with_link)
+        except msgspec.DecodeError:
+            return "garbled"
+        self._taken += 1
+        if with_link:
+            text = links_text("toy", 0.0, {(src, "inv1"): status for src, status in with_link.items()})
+            assert text.replace("\n", "").isprintable(), text
+        if self._taken % TICK == 0:
+            self._view.forget_silent(now)
+            msgspec.json.encode(self._view.frame(Cursor(), now))
+        if self._taken >= LIFE:
+            self._begin()
+        return "" if message is not None else "unread"
+
+
+class Readers:
+    """Readers of what cores pass on unread, of configurations and of lines: each has one error for bad input."""
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Give the bytes to one of them."""
+        body = payload[:-CRC]
+        text = body.decode("latin-1")
+        readers: tuple[tuple[Callable[[], Any], tuple[type[Exception], ...]], ...] = (
+            (lambda: list(entries_of(body)), (ValueError,)),
+            (lambda: values_of(payload), ()),
+            (lambda: data_of(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=body)), (msgspec.DecodeError,)),
+            (lambda: decode_statuses(body), (msgspec.DecodeError,)),
+            (lambda: read_feeder_map(body), ()),
+            (lambda: msgspec.json.decode(body, type=AgentConfig), (msgspec.DecodeError, UnicodeDecodeError)),
+            (lambda: msgspec.json.decode(body, type=PlantConfig), (msgspec.DecodeError, UnicodeDecodeError)),
+            (lambda: (epoch_of(text), run_of_plant(text), KEYS.parts(text)), ()),
+            (lambda: new_faults(text), (RelayCommandError,)),
+            (lambda: isfinite(number("delay", text)), (RelayCommandError,)),
+            (lambda: Endpoint.parse(text), (EndpointError,)),
+        )
+        read, errors = rng.choice(readers)
+        try:
+            read()
+        except errors:
+            return "garbled"
+        return ""
+
+
+class Keyring:
+    """A folder of certificates and keys in which somebody has written: a command opens it, or says what is wrong."""
+
+    FILES = ("members.json", "ca.pem", "inv1.pem", "inv1.key")
+
+    def __init__(self, home: Path) -> None:
+        from wire.trust.site_authority import issue, make_site
+
+        self._folder = home / "lab"
+        make_site(self._folder)
+        issue(self._folder, "inv1")
+        self._whole = {name: (self._folder / name).read_bytes() for name in self.FILES}
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Write bytes into one of its files, open it, and mend it."""
+        name = rng.choice(self.FILES)
+        whole = self._whole[name]
+        at = rng.randrange(len(whole))
+        part = payload[: rng.choice((0, 1, 1, 4, 100_000))]
+        (self._folder / name).write_bytes(
+            whole[:at] + part + whole[at + rng.choice((0, len(part), len(part), 100_000)) :]
+        )
+        try:
+            open_credentials(self._folder, ("agent",), "inv1")
+            refused = ""
+        except KeysError as error:
+            refused = str(error)
+        finally:
+            (self._folder / name).write_bytes(whole)
+        assert refused.isprintable(), refused
+        return "refused" if refused else ""
+
+
+def receivers(home: Path) -> dict[str, Receiver]:
+    """Return all receivers by name; one has its files in a folder."""
+    return {
+        "codec": Codec(),
+        "agent, real time": Core(RealtimeAgentScene),
+        "agent, real time, links": Core(LinkedAgentScene),
+        "agent, simulated time": Core(AgentScene),
+        "plant, real time": Core(RealtimePlantScene),
+        "plant, simulated time": Core(PlantScene),
+        "recorder, real time": Recording(stream=True),
+        "recorder, simulated time": Recording(stream=False),
+        "view": View(),
+        "readers": Readers(),
+    } | ({"keys": Keyring(home)} if find_spec("cryptography") else {})

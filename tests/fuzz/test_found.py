@@ -1,0 +1,73 @@
+"""What fuzzing has found: each input once raised an error that nobody caught, or wrote on a terminal."""
+
+from __future__ import annotations
+
+import base64
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from scenarios.emulation.link_reports import data_of, decode_statuses
+from scenarios.live.feeder_map import read_feeder_map
+from scenarios.record.journal_reader import entries_of, values_of
+from tests.hostile.cases import sealed
+from wire.bounds import LIMIT
+from wire.messages import LinkReport
+
+NO_UTF8 = b"\x81\xa4typ\xe5\x01"
+"""A map with a key whose text ends within a character."""
+
+LIST_AS_KEY = b"\x81\x91\x01\x01"
+
+
+def test_a_map_with_a_list_as_key_is_no_message_and_no_journal() -> None:
+    """Python has no such map: msgpack raises a TypeError."""
+    assert values_of(sealed(LIST_AS_KEY)) == {}
+    with pytest.raises(ValueError, match="no msgpack at byte"):
+        list(entries_of(LIST_AS_KEY))
+
+
+def test_a_journal_longer_than_a_message_is_refused_before_it_is_read() -> None:
+    """The buffer of msgpack would overflow with an error of its own."""
+    with pytest.raises(ValueError, match=f"{LIMIT + 1} bytes"):
+        list(entries_of(bytes(LIMIT + 1)))
+
+
+def test_a_text_that_is_no_utf8_is_no_report() -> None:
+    """Here msgspec raises a UnicodeDecodeError, which is none of its own errors."""
+    with pytest.raises(msgspec.DecodeError):
+        data_of(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=NO_UTF8))
+    with pytest.raises(msgspec.DecodeError):
+        decode_statuses(NO_UTF8)
+    assert read_feeder_map(b'{"buses": [["\xe5", 0, 0]]}') is None
+
+
+@pytest.mark.parametrize("statuses", [{"inv2": {"holds": ["\x1b[2Jall is well"]}}, {"\x1b[2J": {"holds": []}}])
+def test_the_state_of_a_link_cannot_write_on_a_terminal(statuses: dict[str, object]) -> None:
+    """`gridpeers link show` prints what a receiver says of its links, and of whose they are."""
+    with pytest.raises(msgspec.DecodeError):
+        decode_statuses(msgspec.msgpack.encode(statuses))
+
+
+def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -> None:
+    """It loads, and only its key fails, when it is asked for."""
+    pytest.importorskip("cryptography", reason="certificates need the extra keys")
+    from cryptography.hazmat.primitives import serialization
+    from cryptography.x509 import load_pem_x509_certificate
+
+    from wire.trust.key_folder import KeysError, open_credentials
+    from wire.trust.site_authority import issue, make_site
+
+    folder = tmp_path / "lab"
+    make_site(folder)
+    issue(folder, "inv1")
+    path = folder / "inv1.pem"
+    der = load_pem_x509_certificate(path.read_bytes()).public_bytes(serialization.Encoding.DER)
+    p256, unknown = bytes.fromhex("2a8648ce3d030107"), bytes.fromhex("2a8648ce3d03017f")
+    assert p256 in der
+    text = base64.encodebytes(der.replace(p256, unknown)).decode()
+    path.write_text(f"-----BEGIN CERTIFICATE-----\n{text}-----END CERTIFICATE-----\n")
+
+    with pytest.raises(KeysError, match=r"inv1\.pem: is no certificate in PEM"):
+        open_credentials(folder, ("agent",), "inv1")
