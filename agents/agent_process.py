@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
+from threading import Timer
 
 from msgspec.structs import replace
 
@@ -14,7 +15,7 @@ from agents.known_agents import KnownAgents
 from agents.laws.law import Law
 from agents.lockstep_agent import LockstepAgent
 from agents.realtime.realtime_agent import RealtimeAgent
-from wire.driver.drive import StoppedError, drive, serve
+from wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
@@ -25,6 +26,10 @@ AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
 AnyAgent = RealtimeAgent | LockstepAgent
+
+RUN_ENDS = 0.1
+"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
+does so first, and an agent that was still there has not left."""
 
 
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
@@ -163,8 +168,20 @@ def _take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: S
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
         leaving = [node for node in nodes if isinstance(node, RealtimeAgent)]
+        if leaving and isinstance(stop, StoppedOnLeashError):
+            _go_on(core, session, log)
         for node in leaving:
             node.asked_to_leave(f"asked to leave: {stop}")
         if leaving:
             serve(core, session, log)  # until the plant has acknowledged
         raise
+
+
+def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
+    """Serve for `RUN_ENDS` more, or until the core has finished."""
+    over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
+    over.daemon = True
+    over.start()
+    with suppress(StoppedError):
+        serve(core, session, log)
+    over.cancel()

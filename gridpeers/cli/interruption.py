@@ -8,16 +8,13 @@ from contextlib import contextmanager
 
 from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
 from scenarios.results.broken_folder import TerminatedError
+from wire.driver.stop_signal import StopSignal
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
     """Have SIGTERM, and a terminal that goes away, end what is inside as Ctrl-C does: by `KeyboardInterrupt`."""
-
-    def terminate(*_: object) -> None:
-        raise TerminatedError
-
-    numbers = [signal.SIGTERM]
+    terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, terminate) for number in numbers}

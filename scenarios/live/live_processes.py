@@ -10,8 +10,6 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
-from typing import NoReturn
 
 from msgspec.structs import replace
 
@@ -35,6 +33,7 @@ from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError
+from wire.driver.stop_signal import StopSignal
 from wire.messages import PLANT, Pacing
 from wire.printable import printable
 
@@ -101,7 +100,7 @@ def plant_here(
     record : RecordInfo, optional
         The run, for its record.
     """
-    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
     _log()
     config = _recorded(config, folder)
 
@@ -110,11 +109,7 @@ def plant_here(
             say(meaning(word, config))
 
     def run(recorder: LiveRecorder) -> str:
-        try:
-            return run_plant(config, make_links=links_of, on_word=on_word)
-        except (StoppedError, KeyboardInterrupt):
-            _say_end(recorder, config)
-            raise
+        return run_plant(config, make_links=links_of, on_word=on_word)
 
     recorder = LiveRecorder(
         config.run,
@@ -126,7 +121,10 @@ def plant_here(
         record=record,
         credentials=config.credentials,
     )
-    return _follow(recorder, run)
+    outcome = _follow(recorder, run)
+    if outcome.interrupted:  # else the plant has said it
+        _say_end(recorder, config)
+    return outcome
 
 
 def all_here(
@@ -154,7 +152,7 @@ def all_here(
     record : RecordInfo, optional
         The run, for its record.
     """
-    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
     config = _recorded(config, folder)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
     plant_ended = threading.Event()
@@ -181,7 +179,6 @@ def all_here(
                 supervisor.children.wait(LEAVING)
             finally:
                 supervisor.end_faults()
-                _say_end(recorder, config)
         plant = supervisor.children[PLANT]
         return "" if plant.status == 0 else plant.report(f"after t = {recorder.client.t:.2f} s")
 
@@ -190,7 +187,9 @@ def all_here(
     recorder = LiveRecorder(
         config.run, endpoint, say, folder, link_log=link_log, record=record, credentials=config.credentials
     )
-    return _follow(recorder, run)
+    outcome = _follow(recorder, run)
+    _say_end(recorder, config)
+    return outcome
 
 
 def agent_here(
@@ -218,7 +217,7 @@ def agent_here(
     UsageError
         If the plant names code that does not come with gridpeers, and is not trusted.
     """
-    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
     _log()
     who = ", ".join(names)
     say(f"{who}: seeks the plant of {where}, for up to {wait:g} s")
@@ -270,10 +269,6 @@ def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:
     """Return the plant with its recorder, for which it waits a moment even if it waits for no agent."""
     wait = config.wait_for_agents if folder is None else max(RECORDER_WAIT, config.wait_for_agents)
     return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
-
-
-def _stop(number: int, frame: FrameType | None) -> NoReturn:
-    raise StoppedError(signal.Signals(number).name)
 
 
 def _signal_of(stop: BaseException) -> str:

@@ -103,6 +103,10 @@ class StoppedError(BaseException):
     """
 
 
+class StoppedOnLeashError(StoppedError):
+    """The same to a process that ends with its parent: perhaps all processes of its run are asked to end."""
+
+
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
     """Perform the actions of a core, in its order."""
     for action in actions:

@@ -13,15 +13,16 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Mapping
-from types import FrameType, UnionType
+from types import UnionType
 from typing import Any, TypeVar, get_args
 
 import msgspec
 
-from wire.driver.drive import StoppedError
+from wire.driver.drive import StoppedError, StoppedOnLeashError
 from wire.driver.leftover import leave
 from wire.driver.output import watch_readers
 from wire.driver.session import SessionError
+from wire.driver.stop_signal import StopSignal
 from wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
@@ -105,7 +106,7 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
     log = logging.getLogger(module)
-    signal.signal(signal.SIGTERM, _stop)
+    signal.signal(signal.SIGTERM, StopSignal(StoppedOnLeashError if options else StoppedError))
     try:
         text = _read_line() if options else sys.stdin.buffer.read()
         config = msgspec.json.decode(text, type=config_type)
@@ -122,10 +123,6 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
         log.error("%s", broke)
         return BROKE
     return OK
-
-
-def _stop(signum: int, frame: FrameType | None) -> None:
-    raise StoppedError(signal.Signals(signum).name)
 
 
 def _read_line() -> bytes:

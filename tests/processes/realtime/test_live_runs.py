@@ -232,6 +232,9 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
             os.kill(child, 0)
     up.expect(r"NOTE  case IV: ended at .* s, before the end of late \(0.6 to 3600 s\): they have no numbers")
     here = desk.folder / "here"
+    events = (here / "IV" / "events.csv").read_text()
+    assert " left" not in events
+    assert " died" not in events
     assert (here / "status.txt").read_text() == "complete\n"
     assert sorted(path.name for path in (here / "IV").iterdir()) == ["events.csv", "history.csv", "run.mcap"]
     metrics = json.loads((here / "metrics.json").read_text())

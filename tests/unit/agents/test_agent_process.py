@@ -1,0 +1,76 @@
+"""An agent's process that is asked to end."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from time import monotonic
+from typing import Any, cast
+
+import pytest
+from msgspec.structs import replace
+
+from agents.agent_process import _take_part
+from agents.realtime.realtime_agent import RealtimeAgent
+from tests.toy.toy_configs import agent_config
+from wire.codec import encode
+from wire.driver.drive import StoppedError, StoppedOnLeashError
+from wire.driver.inbox import Inbox, Stamped
+from wire.driver.session import Session
+from wire.keys import Keys
+from wire.messages import Stop
+
+KEYS = Keys("toy")
+PLANT_TOKEN = KEYS.alive_plant(1)
+LEAVE = KEYS.leave("inv1")
+
+
+class Played:
+    """A session whose events the test plays; once there are none left, the time is over in which a run may end."""
+
+    def __init__(self, *events: Stamped | BaseException) -> None:
+        self._events = list(events)
+        self.inbox = Inbox()
+        self.left = 0
+        """How often the plant was told that the agent leaves."""
+        self._plant_is_there = True
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """Do nothing with keys and tokens."""
+        return lambda *words: ()
+
+    def take(self, needed: int, timeout: float | None) -> list[Stamped]:
+        """Return the next event."""
+        event = self._events.pop(0) if self._events else ("word", "over", b"", monotonic())
+        if isinstance(event, BaseException):
+            raise event
+        self._plant_is_there &= event[0] != "vanished"
+        return [event]
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Have the plant, if it is there, acknowledge that the agent leaves."""
+        if key == LEAVE and self._plant_is_there:
+            self.left += 1
+            stop = encode(Stop(sender="plant", epoch=1, seq=0, t=0.0, reason="it has left"))
+            self._events.insert(0, ("message", KEYS.stop_request("inv1", "me"), stop, monotonic()))
+
+
+def ended(*events: Stamped | BaseException) -> Played:
+    """The session of an agent that was asked to end."""
+    agent = RealtimeAgent(replace(agent_config("inv1"), clock="wall"), "me")
+    session = Played(("appeared", PLANT_TOKEN, b"", monotonic()), *events)
+    with pytest.raises(StoppedError):
+        _take_part(agent, (agent,), cast(Session, session), logging.getLogger("test"))
+    assert agent.finished
+    return session
+
+
+def test_an_agent_whose_run_ends_has_not_left() -> None:
+    """All processes of a run are asked to end: the plant goes first, and there is nobody to be left."""
+    assert ended(StoppedOnLeashError("SIGTERM"), ("vanished", PLANT_TOKEN, b"", monotonic())).left == 0
+
+
+@pytest.mark.parametrize("stop", [StoppedError("SIGTERM"), StoppedOnLeashError("SIGTERM")])
+def test_an_agent_whose_run_goes_on_leaves(stop: StoppedError) -> None:
+    """One that a person started at once, one that its run started when the plant is still there after a moment."""
+    assert ended(stop).left == 1

@@ -1,0 +1,24 @@
+"""A process that is asked to end twice at once."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from wire.driver.drive import StoppedError
+from wire.driver.stop_signal import SAME, StopSignal
+
+
+def test_what_follows_at_once_is_the_same_request() -> None:
+    """`timeout` signals a command and its group: the end of a run is not interrupted by that; a later signal counts."""
+    now = 10.0
+    stop = StopSignal(StoppedError, lambda: now)
+
+    with pytest.raises(StoppedError, match="SIGTERM"):
+        stop(signal.SIGTERM, None)
+    for now in (10.0, 10.0 + 0.9 * SAME):
+        stop(signal.SIGTERM, None)
+    now = 10.0 + SAME
+    with pytest.raises(StoppedError, match="SIGTERM"):
+        stop(signal.SIGTERM, None)
