@@ -12,13 +12,12 @@ from wire.driver.stop_signal import SAME, StopSignal
 
 def test_what_follows_at_once_is_the_same_request() -> None:
     """`timeout` signals a command and its group: the end of a run is not interrupted by that; a later signal counts."""
-    now = 10.0
-    stop = StopSignal(StoppedError, lambda: now)
+    times = [10.0, 10.0, 10.0 + 0.9 * SAME, 10.0 + SAME]
+    stop = StopSignal(StoppedError, lambda: times.pop(0))
 
     with pytest.raises(StoppedError, match="SIGTERM"):
         stop(signal.SIGTERM, None)
-    for now in (10.0, 10.0 + 0.9 * SAME):
-        stop(signal.SIGTERM, None)
-    now = 10.0 + SAME
+    stop(signal.SIGTERM, None)
+    stop(signal.SIGTERM, None)
     with pytest.raises(StoppedError, match="SIGTERM"):
         stop(signal.SIGTERM, None)
