@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from ipaddress import ip_address
 from pathlib import Path
 
 from scenarios.drivers.free_endpoint import parse_endpoint
@@ -56,10 +57,13 @@ def is_loopback_host(host: str) -> bool:
 
     Examples
     --------
-    >>> is_loopback_host("127.0.0.1"), is_loopback_host("[::1]"), is_loopback_host("0.0.0.0")
-    (True, True, False)
+    >>> [is_loopback_host(host) for host in ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")]
+    [True, True, True, False, False]
     """
-    return host.startswith(("127.", "[::1]")) or host == "localhost"
+    try:
+        return host == "localhost" or ip_address(host.strip("[]")).is_loopback
+    except ValueError:  # a name that only begins like an address, as anybody may register it
+        return False
 
 
 def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from scenarios.drivers.free_endpoint import parse_endpoint
-from scenarios.live.access import Access
+from scenarios.live.access import Access, is_loopback_host
 from wire.keys import check_name as check_key_part
 from wire.trust.credentials import Credentials
 
@@ -26,7 +26,6 @@ PROBE = 1.0
 """Longest wait (s) for a TCP connection, to see whether anything listens."""
 
 _PROTOCOLS = ("tcp", "tls", "quic", "udp")
-_LOOPBACKS = ("127.", "localhost", "[::1]")
 
 
 class UsageError(ValueError):
@@ -189,7 +188,7 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
     (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
     """
     protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
-    far = [host for host in _hosts(connect) if not host.startswith(_LOOPBACKS)]
+    far = [host for host in _hosts(connect) if not is_loopback_host(host)]
     if not far:
         return (f"{protocol}/127.0.0.1:0",)
     return (f"{protocol}/[::]:0",) if far[0].startswith("[") else (f"{protocol}/0.0.0.0:0",)
@@ -203,7 +202,7 @@ def is_loopback(connect: tuple[str, ...]) -> bool:
     >>> is_loopback(("tcp/127.0.0.1:7447",)), is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
     (True, False)
     """
-    return all(host.startswith(_LOOPBACKS) for host in _hosts(connect))
+    return all(map(is_loopback_host, _hosts(connect)))
 
 
 def _hosts(connect: tuple[str, ...]) -> list[str]:

@@ -7,6 +7,7 @@ from time import monotonic
 from types import TracebackType
 
 from scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from scenarios.live.access import Access
 from scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -240,21 +241,22 @@ class RunClient:
                 return (
                     f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
                     "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
-                    "--connect where the plant is"
+                    "--connect where the plant is; a plant with certificates asks for --keys DIR and tls/..."
                 )
             return (
                 f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
-                f"({command_line('plant', 'SCENARIO')}), or say by --connect where it is"
+                f"({command_line('plant', 'SCENARIO', *self.where.access.words)}), or say by --connect where it is"
             )
         others = sorted(self._others)
+        start = command_line("plant", "SCENARIO", "--run", self.where.run, *self.where.access.words)
         there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
         return (
             f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
-            f"start one ({command_line('plant', 'SCENARIO', '--run', self.where.run)}), or give another name by --run"
+            f"start one ({start}), or give another name by --run"
         )
 
 
-def endpoint_for_run(listen: str, credentials: Credentials | None = None) -> str:
+def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
 
     Parameters
@@ -263,6 +265,8 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None) -> str
         The endpoint.
     credentials : Credentials or None, optional
         The plant's, to ask another run that is there for its name.
+    access : Access or None, optional
+        The options that gave them, for the commands that the error names.
 
     Raises
     ------
@@ -279,6 +283,7 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None) -> str
         if not there:
             raise
         first = () if (there[0], where) == (RUN, ENDPOINT) else ("--run", there[0], "--connect", where)
+        first = (*first, *(access or Access()).words)
         status, down = command_line("status", *first), command_line("down", *first)
         beside = next_port(listen)
         other = loopback_of(beside)

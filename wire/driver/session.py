@@ -73,7 +73,7 @@ _PROFILES: dict[Clock, _Profile] = {
 FIRST_LINK = 0.5
 """Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
 
-_REFUSED_LINKS = "zenoh_link_tls=warn"
+_REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
 """What of Zenoh's log the rendezvous prints on standard output where links have certificates: each handshake that has
 failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 s after each."""
 

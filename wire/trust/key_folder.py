@@ -119,8 +119,7 @@ def read_list(folder: Path) -> MemberList:
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
 
-    if not folder.is_dir():
-        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one")
+    _require_folder(folder)
     public = _certificate(folder / CA).public_key()
     data = _bytes(folder / LIST)
     try:
@@ -140,9 +139,22 @@ def read_list(folder: Path) -> MemberList:
     return signed.list
 
 
-def is_private(path: Path) -> bool:
-    """Return whether nobody but its owner may read or write a file."""
-    return not stat.S_IMODE(path.stat().st_mode) & 0o077
+def require_private(path: Path) -> None:
+    """Raise KeysError if anybody but its owner may read or write a file."""
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & 0o077:
+        raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
+
+
+def _require_folder(folder: Path) -> None:
+    try:
+        there = stat.S_ISDIR(folder.stat().st_mode)
+    except FileNotFoundError:
+        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one") from None
+    except OSError as error:
+        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
+    if not there:
+        raise KeysError(f"{folder}: is no folder; say the folder that gridpeers keys init has made")
 
 
 def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
@@ -191,9 +203,7 @@ def _check_key(path: Path, certificate: x509.Certificate) -> None:
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     data = _bytes(path)
-    if not is_private(path):
-        mode = stat.S_IMODE(path.stat().st_mode)
-        raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
+    require_private(path)
     try:
         key = load_pem_private_key(data, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import base64
+import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +17,7 @@ import msgspec
 
 from wire.bounds import is_name
 from wire.printable import printable
-from wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, read_list
+from wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, read_list, require_private
 from wire.trust.member import LONGEST_COMMON_NAME, Member, Role
 
 if TYPE_CHECKING:
@@ -58,9 +60,9 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
     site = folder.absolute().name
     if not is_name(site):
         raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
-    if folder.exists():
-        raise KeysError(f"{folder}: is there already; gridpeers keys show {folder} shows it")
     try:
+        if folder.exists() or folder.is_symlink():
+            raise KeysError(f"{folder}: is there already; gridpeers keys show {folder} shows it")
         folder.parent.mkdir(parents=True, exist_ok=True)
         new = Path(tempfile.mkdtemp(prefix=f".{site}-", dir=folder.absolute().parent))  # mode 0700
     except OSError as error:
@@ -70,11 +72,14 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         ca = _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA)
         _write_key(new / CA_KEY, key)
         _write_pem(new / CA, ca)
-        known = _write_list(new, MemberList(site=site, version=0))
+        _write_list(new, MemberList(site=site, version=0), key)
         for name, role in FIRST:
             issue(new, name, role, days=days, now=now)
         known = read_list(new)
-        new.rename(folder)
+        try:
+            new.rename(folder)
+        except OSError as error:
+            raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
     except BaseException:
         shutil.rmtree(new, ignore_errors=True)
         raise
@@ -107,27 +112,37 @@ def issue(
     from cryptography.hazmat.primitives.asymmetric import ec
 
     now = now or datetime.now(UTC)
-    if not is_name(name) or name in ("ca", "members"):
-        raise KeysError(
-            f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", "." and not "ca"'
-        )
-    known, ca, ca_key = _authority(folder)
+    with _changing(folder):
+        known, ca, ca_key = _authority(folder)
+        if problem := objection(known, name, role):
+            raise KeysError(problem)
+        if now >= ca.not_valid_after_utc:
+            raise KeysError(
+                f"{folder / CA}: expired on {ca.not_valid_after_utc:%Y-%m-%d %H:%M} UTC; gridpeers keys init makes a "
+                "new site"
+            )
+        before = known.of(name)
+        generation = 1 if before is None else before.generation + before.revoked
+        ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
+        member = Member(name=name, role=role, generation=generation, expires=f"{ends:%Y-%m-%d}")
+        key = ec.generate_private_key(ec.SECP256R1())
+        certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
+        _write_key(folder / f"{name}.key", key)
+        _write_pem(folder / f"{name}.pem", certificate)
+        _write_list(folder, _with(known, member), ca_key)
+    return member
+
+
+def objection(known: MemberList, name: str, role: Role) -> str:
+    """Return why no certificate of a role can be issued to a name; empty if one can."""
+    if not is_name(name) or name in (Path(CA).stem, Path(LIST).stem):
+        return f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", "."; not "ca", "members"'
     before = known.of(name)
     if before is not None and before.role != role:
-        raise KeysError(f"{name}: has the role {before.role} already; give the {role} another name")
-    generation = 1 if before is None else before.generation + before.revoked
-    ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
-    member = Member(name=name, role=role, generation=generation, expires=f"{ends:%Y-%m-%d}")
-    if len(member.common_name) > LONGEST_COMMON_NAME - 4:  # room for later generations
-        raise KeysError(
-            f"{name}: is too long for a certificate; {role}:NAME has at most {LONGEST_COMMON_NAME - 4} letters"
-        )
-    key = ec.generate_private_key(ec.SECP256R1())
-    certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
-    _write_key(folder / f"{name}.key", key)
-    _write_pem(folder / f"{name}.pem", certificate)
-    _write_list(folder, _with(known, member), ca_key)
-    return member
+        return f"{name}: has the role {before.role} already; give the {role} another name"
+    if len(f"{role}:{name}") > LONGEST_COMMON_NAME - 4:  # room for later generations
+        return f"{name}: is too long for a certificate; {role}:NAME has at most {LONGEST_COMMON_NAME - 4} letters"
+    return ""
 
 
 def revoke(folder: Path, name: str) -> Member:
@@ -138,17 +153,33 @@ def revoke(folder: Path, name: str) -> Member:
     KeysError
         If there is no such certificate, or the authority's key is not here.
     """
-    known, _, ca_key = _authority(folder)
-    member = known.of(name)
-    if member is None:
-        have = ", ".join(each.name for each in known.members)
-        raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
-    if member.revoked:
-        raise KeysError(f"{name}: its certificate is revoked already")
-    revoked = msgspec.structs.replace(member, revoked=True)
-    _write_list(folder, _with(known, revoked), ca_key)
-    (folder / f"{name}.key").unlink(missing_ok=True)
+    with _changing(folder):
+        known, _, ca_key = _authority(folder)
+        member = known.of(name)
+        if member is None:
+            have = ", ".join(each.name for each in known.members)
+            raise KeysError(f'{folder}: no certificate was issued to "{printable(name)}"; there are those of {have}')
+        if member.revoked:
+            raise KeysError(f"{name}: its certificate is revoked already")
+        revoked = msgspec.structs.replace(member, revoked=True)
+        _write_list(folder, _with(known, revoked), ca_key)
+        (folder / f"{name}.key").unlink(missing_ok=True)
     return revoked
+
+
+@contextmanager
+def _changing(folder: Path) -> Iterator[None]:
+    """Keep other commands from changing a site meanwhile: the list of one would lack the members of another."""
+    try:
+        handle = os.open(folder, os.O_RDONLY)
+    except OSError:  # the reading of the list says what is wrong with the folder
+        yield
+        return
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _with(known: MemberList, member: Member) -> MemberList:
@@ -160,22 +191,20 @@ def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurv
     """Return the members, and certificate and private key of the authority."""
     from cryptography import x509
     from cryptography.hazmat.primitives.asymmetric import ec
-
-    known = read_list(folder)
-    if not (folder / CA_KEY).is_file():
-        raise KeysError(f"{folder / CA_KEY}: is missing; certificates are issued and revoked where the site was made")
-    key = _read_key(folder)
-    assert isinstance(key, ec.EllipticCurvePrivateKey)
-    return known, x509.load_pem_x509_certificate((folder / CA).read_bytes()), key
-
-
-def _read_key(folder: Path) -> object:
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
+    known, path = read_list(folder), folder / CA_KEY
+    if not path.is_file():
+        raise KeysError(f"{path}: is missing; certificates are issued and revoked where the site was made")
     try:
-        return load_pem_private_key((folder / CA_KEY).read_bytes(), None)
+        key = load_pem_private_key(path.read_bytes(), None)
     except (ValueError, TypeError, OSError) as error:
-        raise KeysError(f"{folder / CA_KEY}: cannot be read: {printable(str(error), 80)}") from None
+        raise KeysError(f"{path}: cannot be read: {printable(str(error), 80)}") from None
+    require_private(path)
+    ca = x509.load_pem_x509_certificate((folder / CA).read_bytes())
+    if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != ca.public_key():
+        raise KeysError(f"{path}: is not the key of {CA} beside it; copy both from the same site")
+    return known, ca, key
 
 
 def _certificate(
@@ -223,18 +252,13 @@ def _certificate(
     return builder.sign(ca_key, hashes.SHA256())
 
 
-def _write_list(folder: Path, known: MemberList, ca_key: EllipticCurvePrivateKey | None = None) -> MemberList:
+def _write_list(folder: Path, known: MemberList, ca_key: EllipticCurvePrivateKey) -> None:
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
 
-    if ca_key is None:
-        key = _read_key(folder)
-        assert isinstance(key, ec.EllipticCurvePrivateKey)
-        ca_key = key
     signature = ca_key.sign(msgspec.json.encode(known), ec.ECDSA(hashes.SHA256()))
     signed = SignedList(list=known, signature=base64.b64encode(signature).decode())
     _write(folder / LIST, msgspec.json.format(msgspec.json.encode(signed), indent=1) + b"\n", 0o644)
-    return known
 
 
 def _write_key(path: Path, key: EllipticCurvePrivateKey) -> None:

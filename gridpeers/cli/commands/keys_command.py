@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -63,8 +64,13 @@ def issue(
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
     with _errors(days):
-        from wire.trust.site_authority import issue
+        from wire.trust.key_folder import KeysError, read_list
+        from wire.trust.site_authority import issue, objection
 
+        names = list(dict.fromkeys(names))
+        known = read_list(keys)
+        if problems := [problem for name in names if (problem := objection(known, name, role))]:
+            raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
         for name in names:
             member = issue(keys, name, role, days=days)
             typer.echo(f"{keys / name}.pem: certificate of {name}, role {role}, until {member.expires}")
@@ -103,7 +109,8 @@ def show(
         typer.echo(f"site {known.site}, list {known.version}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            state = "revoked" if member.revoked else f"until {member.expires}"
+            ended = member.expires < f"{datetime.now(UTC):%Y-%m-%d}"
+            state = "revoked" if member.revoked else f"{'expired' if ended else 'until'} {member.expires}"
             here = "" if member.revoked or not (site / f"{member.name}.key").is_file() else ", key here"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
 
@@ -119,4 +126,4 @@ def _errors(days: float = 1.0) -> Iterator[None]:
     try:
         yield
     except KeysError as error:
-        fail([str(error)], BAD_INPUT)
+        fail(str(error).splitlines(), BAD_INPUT)

@@ -34,7 +34,9 @@ if TYPE_CHECKING:
 _Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
 _Listen = Annotated[
     str,
-    typer.Option("--listen", metavar="ENDPOINT", help="Where the others connect; tcp/0.0.0.0:7447 for other hosts."),
+    typer.Option(
+        "--listen", metavar="ENDPOINT", help="Where the others connect; with --keys tls/0.0.0.0:7447 for other hosts."
+    ),
 ]
 _Beyond = Annotated[
     list[str] | None,
@@ -87,7 +89,7 @@ def _start(
         for option, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
             if wrong := objection(option, text, keys=keys is not None, insecure=insecure):
                 raise UsageError(wrong)
-        endpoint = endpoint_for_run(listen, credentials)
+        endpoint = endpoint_for_run(listen, credentials, access)
         check_alone(run, beyond, credentials)
     spec, feeder = load(scenario)
     with usage_errors():
@@ -162,7 +164,7 @@ def plant(**options: Any) -> None:
 
     Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
-    Example:  gridpeers plant islanding --run lab --listen tcp/0.0.0.0:7447
+    Example:  gridpeers plant islanding --keys lab --listen tls/0.0.0.0:7447
     """
     _start(**options, agents=False)
 
@@ -202,7 +204,7 @@ def agent(
 
     Exit code: 0 it has left, 2 no plant or no such inverter, 3 it could not go on, 130 Ctrl-C.
 
-    Example:  gridpeers agent inv2 --connect tcp/192.168.1.10:7447
+    Example:  gridpeers agent inv2 --keys lab --connect tls/192.168.1.10:7447
     """
     require({"zenoh": "an agent"})
     with usage_errors():
@@ -258,7 +260,7 @@ def watch(
 ) -> None:
     """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
 
-    Example:  gridpeers watch --connect tcp/192.168.1.10:7447
+    Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
     with usage_errors():
         from scenarios.live.run_address import check_duration

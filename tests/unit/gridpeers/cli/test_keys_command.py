@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -55,6 +56,27 @@ def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
     assert 'no certificate was issued to "inv7"' in refused("keys", "revoke", "inv7", "--keys", "lab")
 
 
+def test_names_are_all_judged_before_any_certificate_is_issued(elsewhere: Path) -> None:
+    """A line for each name that cannot be used; the good one among them gets nothing, until it stands alone."""
+    assert invoke("keys", "init", "lab")[0] == 0
+    text = refused("keys", "issue", "inv1", "a b", "plant", "ca", "--keys", "lab")
+
+    assert [line.partition(": ")[2].split()[0] for line in text.splitlines()] == ['"a', "plant:", '"ca"']
+    assert not (elsewhere / "lab" / "inv1.pem").exists()
+    assert invoke("keys", "issue", "inv1", "inv1", "--keys", "lab")[1].count("inv1.pem") == 1
+
+
+def test_show_says_which_certificates_have_expired(elsewhere: Path) -> None:
+    """One that ended a day ago has "expired" where others have "until"."""
+    from wire.trust.site_authority import issue
+
+    assert invoke("keys", "init", "lab")[0] == 0
+    issue(Path("lab"), "inv1", days=1.0, now=datetime.now(UTC) - timedelta(days=3))
+    rows = {row.split()[1]: row.split()[2] for row in invoke("keys", "show", "lab")[1].splitlines()[1:]}
+
+    assert rows == {"inv1": "expired", "operator": "until", "plant": "until", "viewer": "until"}
+
+
 FAR, NEAR = "tcp/192.0.2.1:7447", "tcp/127.0.0.1:1"
 OPEN = (
     "is not on this host's loopback, and without certificates whoever reaches it reads and commands the run: say "
@@ -72,6 +94,10 @@ OPEN = (
         ),
         (["agent", "inv1", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
         (["agent", "inv1", "--listen", FAR], f"--listen: {FAR} {OPEN}"),
+        (
+            ["agent", "inv1", "--connect", "tcp/127.0.lab.example:7"],
+            "127.0.lab.example:7 is not on this host's loopback",
+        ),
         (["watch", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
         (["link", "cut", "inv1", "inv2", "--connect", FAR], f"--connect: {FAR} {OPEN}"),
         (["down", "--connect", "tls/127.0.0.1:1"], "--connect: tls/127.0.0.1:1 needs certificates: say --keys DIR"),

@@ -1,16 +1,19 @@
 from __future__ import annotations
 
+import os
 import re
 import shutil
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
-from wire.trust.key_folder import KeysError, is_private, open_credentials, read_list
+from wire.trust.key_folder import KeysError, open_credentials, read_list
 from wire.trust.site_authority import issue, make_site, revoke
 
 NOW = datetime(2026, 11, 23, 12, tzinfo=UTC)
@@ -38,7 +41,7 @@ def refusal(folder: Path, name: str = "inv1", now: datetime = NOW) -> str:
 def test_a_site_is_private_and_its_members_are_listed(lab: Path) -> None:
     """The folder is 0700 and each key 0600; the list names plant, operator, viewer and the agents."""
     assert lab.stat().st_mode & 0o777 == 0o700
-    assert all(is_private(key) for key in lab.glob("*.key"))
+    assert {key.stat().st_mode & 0o777 for key in lab.glob("*.key")} == {0o600}
     assert [(member.name, member.role) for member in read_list(lab).members] == [
         ("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"), ("inv1", "agent"), ("inv2", "agent"),
     ]  # fmt: skip
@@ -75,6 +78,10 @@ def of_another_site(lab: Path, name: str) -> None:
 
 WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
     "no folder": (shutil.rmtree, r"lab: there is no such folder of keys; gridpeers keys init .*lab makes one"),
+    "a file": (
+        lambda lab: (shutil.rmtree(lab), lab.write_text("")),
+        r"lab: is no folder; say the folder that gridpeers keys init has made",
+    ),
     "no key": (lambda lab: (lab / "inv1.key").unlink(), r"inv1.key: is missing; copy it"),
     "no certificate": (lambda lab: (lab / "inv1.pem").unlink(), r"inv1.pem: is missing; copy it"),
     "no list": (lambda lab: (lab / "members.json").unlink(), r"members.json: is missing; copy it"),
@@ -107,6 +114,80 @@ WRONG: dict[str, tuple[Callable[[Path], object], str]] = {
         r"inv1.pem: was revoked; gridpeers keys issue inv1 gives inv1 a new one",
     ),
 }
+
+
+def rsa_key(path: Path) -> None:
+    """Put another kind of private key in a file."""
+    from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
+    from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+
+    path.write_bytes(generate_private_key(65537, 2048).private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
+
+
+@pytest.mark.parametrize(
+    ("change", "pattern"),
+    [
+        (lambda lab: (lab / "ca.key").unlink(), r"ca\.key: is missing; certificates are issued and revoked where"),
+        (lambda lab: (lab / "ca.key").write_text("x"), r"ca\.key: cannot be read: "),
+        (lambda lab: (lab / "ca.key").chmod(0o640), r"ca\.key: others may read or change it \(mode 0640\); chmod 600 "),
+        (
+            lambda lab: of_another_site(lab, "ca.key"),
+            r"ca\.key: is not the key of ca\.pem beside it; copy both from the",
+        ),
+        (lambda lab: rsa_key(lab / "ca.key"), r"ca\.key: is not the key of ca\.pem beside it; copy both from the"),
+    ],
+)
+def test_an_authority_with_a_wrong_key_issues_and_revokes_nothing(
+    lab: Path, change: Callable[[Path], object], pattern: str
+) -> None:
+    """The line names the file; the list of members and the certificates stay as they are."""
+    files = ("members.json", "inv1.pem", "inv1.key")
+    before = [(lab / name).read_bytes() for name in files]
+    change(lab)
+
+    for attempt in (issue, revoke):
+        with pytest.raises(KeysError, match=pattern):
+            attempt(lab, "inv1")
+    assert [(lab / name).read_bytes() for name in files] == before
+
+
+def test_an_authority_that_has_expired_issues_nothing(lab: Path) -> None:
+    """Its certificates would have ended before they began."""
+    with pytest.raises(KeysError, match=r"ca\.pem: expired on 2036-11-20 12:00 UTC; gridpeers keys init makes"):
+        issue(lab, "inv3", now=NOW + timedelta(days=3651))
+
+
+def test_certificates_that_are_issued_at_the_same_time_are_all_listed(lab: Path) -> None:
+    """Each command waits for the one before: the list of one would lack the names of the others."""
+    names = [f"inv{k}" for k in range(10, 18)]
+    with ThreadPoolExecutor(len(names)) as threads:
+        list(threads.map(partial(issue, lab), names))
+
+    assert {member.name for member in read_list(lab).members} >= {*names}
+
+
+def test_a_site_is_not_made_where_something_is(tmp_path: Path) -> None:
+    """Neither over a folder, nor over a link that leads nowhere, nor below a file; nothing is left behind."""
+    (tmp_path / "there").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "nowhere")
+    (tmp_path / "file").write_text("")
+    before = sorted(tmp_path.iterdir())
+    for name, text in (("there", "is there already"), ("link", "is there already"), ("file/lab", "cannot be made: ")):
+        with pytest.raises(KeysError, match=text):
+            make_site(tmp_path / name)
+    assert sorted(tmp_path.iterdir()) == before
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can become somebody else")
+def test_a_folder_that_may_not_be_entered_is_told(lab: Path) -> None:
+    """The line names it and the reason of the system."""
+    lab.parent.chmod(0o700)
+    os.seteuid(65534)
+    try:
+        told = refusal(lab)
+    finally:
+        os.seteuid(0)
+    assert re.search(r"lab: cannot be read: Permission denied$", told)
 
 
 @pytest.mark.parametrize("what", WRONG)
