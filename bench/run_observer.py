@@ -17,7 +17,8 @@ from scenarios.drivers.supervisor import Supervisor
 from scenarios.live.live_options import LiveOptions, configure
 from scenarios.live.run_address import RunAddress
 from scenarios.live.run_client import RunClient
-from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
+from scenarios.results.metrics import F_BAND, MPSI_BAND
+from scenarios.results.sharing_index import sharing_index
 from scenarios.schema import load_scenario
 from wire.codec import decode, encode
 from wire.messages import PLANT, AgentStatus, Command, Measurement, PlantEvent, State, Telemetry

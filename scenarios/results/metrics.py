@@ -16,13 +16,11 @@ from numpy.typing import NDArray
 
 from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, Floats, History, Nameplates
+from scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
 from scenarios.results.steadiness import Ends, ends_of, reason
 
 F_BAND, MPSI_BAND = 0.01, 0.01
 """Frequency (Hz) and MPSI below which a microgrid counts as restored."""
-
-NO_LOAD = 0.001
-"""Part of the ratings below which a total power is too small for its sharing to mean anything."""
 
 LOAD_BAND = 0.02
 """Part of the steady total real power within which the load counts as taken over."""
@@ -71,67 +69,6 @@ class Settling:
     """Highest minus lowest frequency (Hz) of a GFM at the end of the window, the largest of all GFM."""
     V_swing_pu: float
     """Highest minus lowest terminal voltage (pu) of an inverter at the end of the window, the largest of all."""
-
-
-def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
-    r"""Return the equal-sharing value of each row, (9).
-
-    .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
-
-    Parameters
-    ----------
-    x : Floats
-        Powers (W or var), shape (T, N).
-    s : Floats
-        Ratings (W), shape (N,).
-    m : Floats
-        Droops (pu per pu), shape (N,).
-    present : Flags, optional
-        Which inverters take part in each row, shape (T, N); all if left out.
-
-    Examples
-    --------
-    >>> eta(np.array([[300.0, 700.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
-    array([0.005])
-    """
-    everybody = np.ones(x.shape, bool) if present is None else present
-    total: Floats = np.where(everybody, x, 0.0).sum(axis=1)
-    capacity: Floats = np.where(everybody, s / m, 0.0).sum(axis=1)
-    return total / np.where(capacity > 0.0, capacity, np.nan)
-
-
-def sharing_index(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
-    r"""Return the mean sharing index of each row: (16) with P and m_p, (17) with Q and m_q.
-
-    .. math:: \frac{1}{N} \sum_i \left| \frac{m_i x_i / s_i - \eta}{\eta} \right|
-
-    N counts the inverters that are present in the row, as the sums do. It is not a number where nothing is shared
-    (eta = 0).
-
-    Examples
-    --------
-    >>> sharing_index(np.array([[300.0, 700.0], [400.0, 600.0]]), np.array([600.0, 1400.0]), np.array([0.01, 0.01]))
-    array([0.        , 0.23809524])
-    """
-    everybody = np.ones(x.shape, bool) if present is None else present
-    equal = eta(x, s, m, everybody)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        index = mean_over(np.abs((m * x / s - equal) / equal), everybody)
-    index[equal[:, 0] == 0.0] = np.nan
-    return index
-
-
-def mean_over(x: Floats, present: Flags) -> Floats:
-    """Return the mean of each row over the inverters that are present in it; nan where there are none.
-
-    Examples
-    --------
-    >>> mean_over(np.array([[1.0, 3.0], [1.0, 3.0]]), np.array([[True, True], [True, False]]))
-    array([2., 1.])
-    """
-    count = present.sum(axis=1)
-    total: Floats = np.where(present, x, 0.0).sum(axis=1)
-    return total / np.where(count > 0, count, np.nan)
 
 
 def mean_voltage(history: History, nameplates: Nameplates) -> Floats:

@@ -9,7 +9,7 @@ from math import isfinite
 import numpy as np
 
 from agents.agent_config import AgentConfig
-from scenarios.results.metrics import sharing_index
+from scenarios.results.sharing_index import sharing_index
 from wire.messages import VALUES
 
 LENGTH = 30.0

@@ -10,7 +10,7 @@ import numpy as np
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
 from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.metrics import NO_LOAD, sharing_index
+from scenarios.results.sharing_index import NO_LOAD, sharing_index
 from scenarios.results.steadiness import ends_of
 from wire.schema.plausible import Plausible, Unit
 

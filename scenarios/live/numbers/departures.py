@@ -1,4 +1,4 @@
-"""Departures of a run from its scenario: what people did or left undone, and the windows that it disturbs. Pure."""
+"""Departures of a run from its scenario: what people did or left undone, and the windows that it disturbs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recognise silences that faults of links and nodes in the scenario cause. Pure."""
+"""Recognise silences that faults of links and nodes in the scenario cause."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Windows of measurement of a live run: of its scenario's events, and of people's on switches and loads. Pure."""
+"""Windows of measurement of a live run: of its scenario's events, and of people's on switches and loads."""
 
 from __future__ import annotations
 

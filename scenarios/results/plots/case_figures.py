@@ -24,6 +24,7 @@ from scenarios.results.plots.style import (
     nominal_line,
     words,
 )
+from scenarios.results.sharing_index import NO_LOAD
 
 
 def _where_shared(index: Floats, x: Floats, history: History, nameplates: Nameplates) -> Floats:
@@ -31,7 +32,7 @@ def _where_shared(index: Floats, x: Floats, history: History, nameplates: Namepl
     sharing = history.present & nameplates.shares
     total = np.abs(np.where(sharing, x, 0.0).sum(axis=1))
     rated = np.where(sharing, nameplates.s, 0.0).sum(axis=1)
-    return np.where(total < metrics.NO_LOAD * rated, np.nan, index)
+    return np.where(total < NO_LOAD * rated, np.nan, index)
 
 
 def _MPSI(history: History, nameplates: Nameplates) -> Floats:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from scenarios.results import metrics
 from scenarios.results.event_windows import Window
 from scenarios.results.history import History, Nameplates
+from scenarios.results.sharing_index import sharing_index
 
 F_NOM = 60.0
 PLATES = Nameplates(
@@ -51,7 +52,7 @@ def test_the_sharing_index_is_equation_16_term_by_term(x: list[float], s: list[f
     for x_i, s_i, m_i in zip(x, s, m, strict=True):
         total += abs((m_i * x_i / s_i - eta) / eta)
 
-    index = metrics.sharing_index(np.array([x]), np.array(s), np.array(m))
+    index = sharing_index(np.array([x]), np.array(s), np.array(m))
 
     assert index[0] == pytest.approx(total / 3)
 
@@ -61,7 +62,7 @@ def test_equal_sharing_has_index_zero(share: float, s: list[float], m: list[floa
     """Where every m_i x_i / s_i is the same, nothing is left to share, (9)."""
     x = [share * s_i / m_i for s_i, m_i in zip(s, m, strict=True)]
 
-    assert metrics.sharing_index(np.array([x]), np.array(s), np.array(m))[0] == pytest.approx(0.0, abs=1e-12)
+    assert sharing_index(np.array([x]), np.array(s), np.array(m))[0] == pytest.approx(0.0, abs=1e-12)
 
 
 @given(x=powers, factor=st.floats(min_value=1e-3, max_value=1e3))
@@ -69,7 +70,7 @@ def test_the_index_does_not_depend_on_the_unit_of_power(x: list[float], factor: 
     """Watts or kilowatts: (16) is the same, as long as ratings are in the same unit."""
     s, m = np.array([600e3, 350e3, 350e3]), np.full(3, 0.01)
 
-    watts, other = (metrics.sharing_index(np.array([x]) * k, s * k, m)[0] for k in (1.0, factor))
+    watts, other = (sharing_index(np.array([x]) * k, s * k, m)[0] for k in (1.0, factor))
 
     assert other == pytest.approx(watts)
 
@@ -79,12 +80,12 @@ def test_the_paper_s_own_case_II_gives_its_MPSI() -> None:
     s = np.array([600e3] * 3 + [350e3] * 6)
     p = np.array([1.0] * 3 + [0.65 + 0.08 / 0.6] * 6)
 
-    assert metrics.sharing_index(np.array([p * s]), s, np.full(9, 0.01))[0] == pytest.approx(0.12, abs=0.005)
+    assert sharing_index(np.array([p * s]), s, np.full(9, 0.01))[0] == pytest.approx(0.12, abs=0.005)
 
 
 def test_nothing_to_share_is_not_a_number() -> None:
     """With no power at all the index has no value, and no warning."""
-    assert np.isnan(metrics.sharing_index(np.zeros((1, 3)), PLATES.s, PLATES.m_p)[0])
+    assert np.isnan(sharing_index(np.zeros((1, 3)), PLATES.s, PLATES.m_p)[0])
 
 
 def test_a_steady_value_is_the_mean_of_the_last_fifth_of_a_second() -> None:
@@ -184,9 +185,9 @@ def test_sharing_among_those_present_is_equation_16_of_them() -> None:
     p = np.array([[0.8, 0.6, 0.0]])
     present = np.array([[True, True, False]])
 
-    index = metrics.sharing_index(p * PLATES.s, PLATES.s, PLATES.m_p, present)
+    index = sharing_index(p * PLATES.s, PLATES.s, PLATES.m_p, present)
 
-    assert index == pytest.approx(metrics.sharing_index(p[:, :2] * PLATES.s[:2], PLATES.s[:2], PLATES.m_p[:2]))
+    assert index == pytest.approx(sharing_index(p[:, :2] * PLATES.s[:2], PLATES.s[:2], PLATES.m_p[:2]))
 
 
 def test_a_GFM_that_is_off_does_not_hold_back_the_frequency() -> None:
