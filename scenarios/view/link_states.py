@@ -13,6 +13,10 @@ from wire.messages import AgentStatus
 State = Literal["used", "old", "apart", "unused"]
 """In the receiver's sums; older than it uses; of another island; left out for another reason."""
 
+AGEING = 0.1
+"""Age (s) beyond which the last state of a sender is shown as ageing, though it is still used: five control periods of
+20 ms."""
+
 AGE_STEP = 0.05
 """Step of the ages of a live run (s): what hardly changes is not sent again."""
 
@@ -24,6 +28,8 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     state: State
     age: float
     """Age (s) of the sender's last state at the receiver, in steps; -1 if none was heard."""
+    ageing: bool = False
+    """Whether it is used though it is older than `AGEING`."""
     rate: float = 0.0
     """Messages per s of wall time that come over it: what the sender sends, less what an emulated link drops."""
     holds: tuple[str, ...] = ()
@@ -119,10 +125,12 @@ class LinkStates:
             holds = (account.holds if account is not None else ()) or ("impaired",)
             lost = _two_digits(self._lost.get((src, receiver), 0.0))
         cut = any(hold.startswith(("cut", "partition")) for hold in holds)
+        shown = -1.0 if age < 0.0 else round(round(age / self._age_step) * self._age_step, 3)
         return LinkView(
             src=src,
             state=state,
-            age=-1.0 if age < 0.0 else round(round(age / self._age_step) * self._age_step, 3),
+            age=shown,
+            ageing=state == "used" and shown > AGEING,
             rate=0.0 if cut or state == "old" else _two_digits(rate * (1.0 - lost)),
             holds=holds,
             cut=cut,

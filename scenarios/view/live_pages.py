@@ -13,7 +13,7 @@ import msgspec
 from scenarios.live.run_address import RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, command_line
-from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json, texts
+from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
 from scenarios.view.scenario_form import scenario_form
@@ -72,8 +72,8 @@ class LivePages:
 
     async def _send(self, socket: WebSocket) -> None:
         """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
-        hello = {"hello": {"run": self._where.run, "where": str(self._where), "control": self._control}}
-        await socket.send_text(as_json(hello))
+        hello = {"run": self._where.run, "where": str(self._where), "control": self._control, "silent_s": SILENT}
+        await socket.send_text(as_json({"hello": hello}))
         cursor, drawn, news = Cursor(), False, asyncio.Event()
         self._news.add(news)
         try:

@@ -42,6 +42,9 @@ FILES = {
 HEARTBEAT = 0.25
 """Longest time (s) between two frames: a page that hears nothing for a second knows that its numbers are old."""
 
+SILENT = 1.0
+"""Time (s) without a word from its server after which a page shows nothing as of now: four heartbeats."""
+
 FASTEST = 0.05
 """Least time (s) between two frames of a page."""
 

@@ -59,6 +59,8 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     t: float | None
     """Run time (s)."""
     pace: str
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
     inverters: tuple[InverterStatus, ...]
     """Present values; those of the plant only if the run is live."""
     reset: bool = False
@@ -194,6 +196,7 @@ class RunView:
             live=live,
             t=snapshot.t,
             pace=snapshot.pace if live.word == "live" else "",
+            speed=snapshot.speed,
             inverters=snapshot.inverters,
             reset=reset,
             names=self._names if points and cursor.t < 0.0 else (),

@@ -15,9 +15,6 @@ from scenarios.short_names import short
 EVENTS = 6
 """Number of the latest events in a view."""
 
-OLD = 0.2
-"""An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""
-
 
 @dataclass(frozen=True)
 class _Column:
@@ -109,7 +106,7 @@ def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
 def _style(column: _Column, inverter: InverterStatus) -> str:
     if inverter.note and not inverter.note.startswith("apart") and column.head in ("agent", ""):
         return "yellow"  # to be in another island is no fault
-    if column.head == "age" and max(inverter.ages.values(), default=0.0) >= OLD:
+    if column.head == "age" and inverter.late:
         return "yellow"
     if (column.head == "lost" and inverter.lost) or column.head == "impaired":
         return "yellow"

@@ -11,7 +11,7 @@ from collections.abc import Collection
 import msgspec
 
 from agents.agent_config import AgentConfig
-from scenarios.live.show.snapshot import InverterStatus, Snapshot, line_of
+from scenarios.live.show.snapshot import OLD, V_HIGH, V_LOW, InverterStatus, Snapshot, line_of
 from scenarios.short_names import in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -145,6 +145,7 @@ class RunMonitor:
             run=self._run,
             t=self._t,
             pace=pace,
+            speed=1.0 if self._plant_status is None else self._plant_status.speed,
             impaired=self._impaired if current else (),
             inverters=tuple(self._inverter(name, name in present, current, now) for name in names),
             events=tuple(line_of(event) for event in self._events),
@@ -161,6 +162,8 @@ class RunMonitor:
         if not present or now - at > SILENT:
             status = None
         ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
+        used = {neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used}
+        V_pu = None if V is None or config is None else V / config.V_nom
         return InverterStatus(
             name=name,
             island=status.island if status else "",
@@ -169,10 +172,12 @@ class RunMonitor:
             P_set=None if P_set is None else P_set / 1e3,
             P_share=None if P is None or config is None else P / config.P_rated,
             Q=None if Q is None else Q / 1e3,
-            V=None if V is None or config is None else V / config.V_nom,
+            V=V_pu,
             V_set=None if V_set is None or config is None else V_set / config.V_nom,
-            ages={neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used},
+            ages=used,
             hears=None if status is None else len(status.used),
+            late=any(age >= OLD for age in used.values()),
+            off_voltage=V_pu is not None and not V_LOW <= V_pu <= V_HIGH,
             received=status.received if status else None,
             sent=status.sent if status else None,
             lost=status.lost if status else None,

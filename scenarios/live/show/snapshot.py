@@ -7,6 +7,12 @@ from dataclasses import dataclass, field
 
 from wire.messages import PlantEvent
 
+OLD = 0.2
+"""An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""
+
+V_LOW, V_HIGH = 0.95, 1.05
+"""Terminal voltages (pu) beyond which one is shown as off: range A of ANSI C84.1."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class InverterStatus:
@@ -33,6 +39,10 @@ class InverterStatus:
     """Age (s) of the latest state of each neighbour that it uses."""
     hears: int | None = None
     """Neighbours that it uses; None if that is not known."""
+    late: bool = False
+    """Whether the latest state of one of them is `OLD`."""
+    off_voltage: bool = False
+    """Whether V is beyond `V_LOW` to `V_HIGH`."""
     received: int | None = None
     """Messages that came in."""
     sent: int | None = None
@@ -54,6 +64,8 @@ class Snapshot:
     """Run time (s)."""
     pace: str = ""
     """The plant's pace in a few words."""
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
     impaired: tuple[str, ...] = ()
     """Agents whose link to or from the plant has an emulated fault."""
     inverters: tuple[InverterStatus, ...] = ()

@@ -104,7 +104,7 @@ export class Diagram {
     element.addEventListener("pointerleave", event => this.look(event, "", ""));
   }
 
-  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V }; loads: name -> [P, Q] of those that were set
+  // links: pair key -> { a, b, kind, rate, text }; switches: name -> closed; states: name -> { absent, V, off }; loads: name -> [P, Q] of those that were set
   update(links, switches, states, pending, lit, loads = {}) {
     this.last = [links, switches, states, pending, lit, loads];
     if (!this.links) return;
@@ -154,7 +154,7 @@ export class Diagram {
     this.shownLoads = shown;
     for (const [name, drawn] of this.inverters) {
       const state = states.get(name) || { absent: true };
-      const off = state.V !== null && state.V !== undefined && (state.V < .95 || state.V > 1.05);
+      const off = !!state.off;
       set(drawn.g, "class", `inverter${state.absent ? " absent" : ""}${off ? " off-voltage" : ""}${pending.has(name) ? " pending" : ""}${name === lit ? " lit" : ""}`);
       set(drawn.g, "aria-label", `inverter ${name}, ${drawn.kind}${state.absent ? ", no agent" : ""}${off ? ", voltage beyond 0.95 to 1.05 pu" : ""}`);
       if (drawn.value) { const text = state.V === null || state.V === undefined ? "" : `${state.V.toFixed(3)} pu`; if (drawn.value.textContent !== text) drawn.value.textContent = text; }

@@ -6,7 +6,7 @@ import { Player } from "./player.js";
 import { Strips } from "./strips.js";
 
 const $ = id => document.getElementById(id);
-const SILENT = 1000; // ms without a frame after which the numbers are old: the server sends four a second
+const silence = () => 1000 * (S.hello?.silent_s ?? 1); // ms without a word after which the numbers are old
 const S = { hello: null, map: null, frame: null, links: new Map(), switches: {}, loads: {}, events: [], inverters: new Map(), pending: new Map(), lit: "", tip: null, heard: 0, socket: null, chosen: "" };
 window.gridpeersView = S;
 
@@ -108,7 +108,7 @@ const RANK = { cut: 6, impaired: 5, old: 4, unused: 3, apart: 2, ageing: 1, used
 function pairs() {
   const found = new Map();
   for (const [dst, links] of S.links) for (const link of links) {
-    const kind = link.cut ? "cut" : link.holds ? "impaired" : link.state === "used" && link.age > 0.1 ? "ageing" : link.state, key = pairOf(link.src, dst);
+    const kind = link.cut ? "cut" : link.holds ? "impaired" : link.ageing ? "ageing" : link.state, key = pairOf(link.src, dst);
     const pair = found.get(key) || { a: key.split("|")[0], b: key.split("|")[1], kind, rate: 0, text: "", ways: [] };
     if (RANK[kind] >= RANK[pair.kind]) pair.kind = kind;
     if (link.holds) pair.text = link.holds.join(", ");
@@ -121,7 +121,7 @@ function pairs() {
 let due = false;
 function render() { if (!due) { due = true; requestAnimationFrame(() => { due = false; draw(); }); } }
 function draw() {
-  const frame = S.frame, lost = S.heard && (performance.now() - S.heard > SILENT || S.socket.readyState !== 1);
+  const frame = S.frame, lost = S.heard && (performance.now() - S.heard > silence() || S.socket.readyState !== 1);
   const live = lost ? "lost" : frame ? S.hello.record ? player.grows ? "recording" : "record" : frame.live.word : "waiting", current = ["live", "record", "recording"].includes(live);
   if (document.body.dataset.live !== live) document.body.dataset.live = live;
   put($("live-text"), lost ? "no word from this page's server: nothing here is of now" : !frame ? "connecting" : S.hello.record ? ["record", player.news?.text, frame.live.text === "record" ? "" : frame.live.text].filter(Boolean).join(". ") : frame.live.text);
@@ -131,20 +131,19 @@ function draw() {
   const islands = [...new Set(inverters.map(one => one.island).filter(Boolean))];
   put($("islands"), islands.length ? `islands: ${islands.join(", ")}` : "");
   S.pairs ||= pairs();
-  const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V }]));
+  const states = new Map(inverters.map(one => [one.name, { absent: one.note === "no agent", V: one.V, off: one.off_voltage }]));
   for (const [key, kind] of S.pending) if (kind === "stop" && states.get(key)?.absent || kind === "start" && states.get(key)?.absent === false) S.pending.delete(key);
   diagram.update(S.pairs, S.switches, states, S.pending, S.lit, S.loads);
   put($("diagram-text"), `${current ? "" : "Not of now, but as it was last. "}${diagramText(S.map, S.pairs, S.switches, frame.inverters, islands, S.loads)}`);
-  const speed = Number((frame.pace.match(/speed ([0-9.]+)/) || [0, 1])[1]);
   const silent = frame.live.since || (lost ? (performance.now() - S.heard) / 1000 : 0);
   // most frames have statuses alone: the strips, which take most of the time, stay as they are
   const now = [strips.latest, strips.end, strips.points.length, S.lit, current ? 0 : silent.toFixed(1), S.events.length, innerWidth, devicePixelRatio, colours.join()].join("|");
-  if (now !== S.drawn) { S.drawn = now; strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * speed), (S.hello.record ? player.events : S.events).map(event => [event.t, event.kind]), colours); }
+  if (now !== S.drawn) { S.drawn = now; strips.lit = S.lit; strips.draw(current ? 0 : Math.min(25, silent * (frame.speed ?? 1)), (S.hello.record ? player.events : S.events).map(event => [event.t, event.kind]), colours); }
   rows(inverters);
   if (S.tip) showTip();
 }
 const acts = () => S.hello.control || S.hello.record;
-const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, hears: null, received: null, sent: null, lost: null, island: "" });
+const stale = one => ({ ...one, f: null, P: null, P_set: null, P_share: null, Q: null, V: null, V_set: null, ages: {}, hears: null, late: false, off_voltage: false, received: null, sent: null, lost: null, island: "" });
 const put = (element, text) => { if (element.textContent !== text) element.textContent = text; };
 function heads() {
   const head = document.querySelector("thead tr"); head.replaceChildren(); document.querySelector("tbody").replaceChildren();
@@ -170,7 +169,7 @@ function rows(inverters) {
       row = { line, cells, text, button }; tableRows.set(one.name, row);
     }
     COLUMNS.forEach(([, , value], c) => put(c ? row.cells[c] : row.text, String(value(one))));
-    row.cells[10].classList.toggle("warn", Math.max(0, ...Object.values(one.ages)) >= 0.2); row.cells[13].classList.toggle("warn", one.lost > 0);
+    row.cells[10].classList.toggle("warn", one.late); row.cells[13].classList.toggle("warn", one.lost > 0);
     row.line.classList.toggle("lit", S.lit === one.name);
     if (row.button && S.hello.record) { put(row.button, "Why"); row.button.setAttribute("aria-label", `Show how ${one.name} decided`); row.button.setAttribute("aria-pressed", String(S.chosen === one.name)); }
     else if (row.button) { const absent = one.note === "no agent"; put(row.button, absent ? "Start" : "Stop"); row.button.setAttribute("aria-label", `${absent ? "Start" : "Stop"} the agent of ${one.name}`); row.button.disabled = S.pending.has(one.name); }
@@ -257,5 +256,5 @@ $("link-form").addEventListener("submit", event => {
 $("switch-form").addEventListener("submit", event => { event.preventDefault(); act({ verb: event.submitter.value, subject: $("switch").value }, $("switch").value); });
 $("load-choice").addEventListener("submit", event => { event.preventDefault(); click("load", $("load").value); });
 
-setInterval(() => { if (performance.now() - S.heard > SILENT) render(); }, 250);
+setInterval(() => { if (performance.now() - S.heard > silence()) render(); }, 250);
 connect();

@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from scenarios.record.record_reader import RecordFileError
 from scenarios.view.link_states import LinkView
-from scenarios.view.page_server import FASTEST, HEARTBEAT, Talk, as_json, texts
+from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.recorded.recorded_run import RecordedRun
 from wire.bounds import Text
@@ -82,7 +82,8 @@ class RecordPages:
         """Answer questions, and tell now and then how far the record has come."""
         loop, told = asyncio.get_running_loop(), float("-inf")
         where = str(self._run.path)
-        await socket.send_text(as_json({"hello": {"run": where, "where": where, "control": False, "record": True}}))
+        hello = {"run": where, "where": where, "control": False, "record": True, "silent_s": SILENT}
+        await socket.send_text(as_json({"hello": hello}))
         while True:
             if (now := loop.time()) - told >= HEARTBEAT:
                 told = now

@@ -117,6 +117,7 @@ class RecordView:
             live=LivenessView(word="record", text=text),
             t=t,
             pace="",
+            speed=1.0,
             inverters=tuple(self._noted(one, agents) for one in frame.inverters),
             reset=since < 0.0 or since < t - LENGTH,
             names=self.record.info.inverters,

@@ -32,6 +32,10 @@ end_s = {end}
 label = "event1"
 t_s = 0.2
 open = ["13-152"]
+[[event]]
+label = "event2"
+t_s = 0.6
+load = {{ 48 = {{ factor = 1.5 }} }}
 [case.one]
 secondary = "all"
 graph = "full"
@@ -88,11 +92,14 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Pa
     assert power(page) == expected(1.0)
     page.wait_for_selector('[data-link="inv1|inv2"] + .link.cut', state="attached")
     page.wait_for_selector('[data-switch="13-152"].open', state="attached")
+    page.wait_for_selector('[data-load="48"].set', state="attached")
+    assert "Loads set: 48 (315 kW, 225 kvar)." in page.locator("#diagram-text").inner_text()
 
     page.locator("#slider").evaluate("slider => { slider.value = 0.3; slider.dispatchEvent(new Event('input')) }")
     shows(page, 0.3)
     assert power(page) == expected(0.3) != expected(1.0)
     page.wait_for_selector('[data-link="inv1|inv2"] + .link.used', state="attached")
+    page.wait_for_selector('[data-load="48"]:not(.set)', state="attached")
 
     page.locator("#slider").focus()
     for key, t in (("ArrowRight", 0.32), ("ArrowLeft", 0.3), ("ArrowLeft", 0.28), ("Home", 0.0), ("End", 1.0)):

@@ -45,6 +45,9 @@ def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk
     assert page.locator("#diagram .inverter:not(.absent)").count() == 3
     assert page.locator("tbody tr").count() == 10
     assert foreign == [], "the page needs nobody but its server"
+    assert page.locator("#run").inner_text() == page.title().removesuffix(" \N{EN DASH} gridpeers view")
+    assert page.title().endswith(" \N{MIDDLE DOT} run lab \N{EN DASH} gridpeers view")
+    assert page.title().startswith("calm, case ")
 
     page.locator('[data-link="inv1|inv2"]').dispatch_event("click")
     for each in (page, other):
@@ -252,10 +255,10 @@ def test_two_views_of_one_run_and_a_token_for_one_of_them(desk: Desk, browser: B
 def test_the_page_is_for_those_who_may_see_it(desk: Desk) -> None:
     """A token is asked for; a page of others reaches it neither by another name nor by another origin."""
     run_of(desk)
-    view, url = view_of(desk, "--token", "mine")
+    view, url = view_of(desk, "--token", "mine & yours: \N{GREEK SMALL LETTER PI}/?#;%")
     bare = url.partition("?")[0]
 
-    assert status(url) == 200
+    assert status(url) == 200, "any letter of a token is quoted in the address"
     assert status(bare) == 401
     assert status(bare + "?token=yours") == 401
     assert status(url, Host="elsewhere.example") == 403

@@ -222,6 +222,14 @@ def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -
     assert command[-len(typed) :] == typed
 
 
+@pytest.mark.parametrize("name", ["--help", "-x"])
+def test_a_name_is_no_option_of_its_command(name: str) -> None:
+    """An agent of that name would be help on the terminal, and exit code 0 here."""
+    for field in ("subject", "other"):
+        with pytest.raises(msgspec.ValidationError, match="is no name of a switch, load, inverter or agent"):
+            msgspec.json.decode(msgspec.json.encode({"verb": "start", field: name}), type=PageAction)
+
+
 def test_every_action_is_here() -> None:
     """An action of the page without a test of its request would be a way to do another one."""
     assert {action.verb for action, _, _ in REQUESTS} | {"start"} == set(get_args(Verb))

@@ -160,6 +160,24 @@ def test_links_say_how_they_are(view: RunView) -> None:
     assert view.frame(Cursor(), 1.3)[0].links["inv1"][0].state == "apart"
 
 
+def test_what_is_late_or_off_is_decided_here(view: RunView) -> None:
+    """The page has no limits of its own: a link that ages, an age and a voltage in colour, and the speed of the run."""
+    pacing = Pacing(steps=10, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
+    view.plant_status(PlantStatus(phase="running", t=1.0, speed=4.0, pacing=pacing))
+    high = (1.0, 60.0, 3e4, 1e3, 277.0, 3e4, 277.0, 60.0, 6e4, 1e3, 1.051 * 277.0, 3e4, 277.0)
+    view.telemetry(msgspec.structs.replace(telemetry(1.0), rows=(high,)), 1.0)
+    seen = {}
+    for age in (0.1, 0.15, 0.2):
+        view.status(status("inv1", used=("inv2",), age=age), 1.0)
+        frame, _ = view.frame(Cursor(), 1.0)
+        (link,), (one, other) = frame.links["inv1"], frame.inverters
+        seen[age] = link.ageing, one.late, one.hears
+
+    assert seen == {0.1: (False, False, 1), 0.15: (True, False, 1), 0.2: (True, True, 1)}
+    assert (one.off_voltage, other.off_voltage, other.hears) == (False, True, None)
+    assert frame.speed == 4.0
+
+
 def test_links_into_a_silent_agent_are_not_shown(view: RunView) -> None:
     """What it said is not of now."""
     view.status(status("inv1", used=("inv2",)), 1.0)
