@@ -77,11 +77,10 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
         for since_start in (False, True) if _has_no_memory(law) else (True,):
             inputs = _since_start(record, decision) if since_start else (decision,)
             try:
-                terms, result = _computed_again(law, inputs)
-            except ANYTHING as error:  # the law is anybody's code
+                step = _parts(decision, *_computed_again(law, inputs))
+            except ANYTHING as error:  # the law, and what it returns, is anybody's code
                 problem = f"computed again, the law raised {named(error)}"
                 continue
-            step = _parts(decision, terms, result)
             if max(abs(step.P_set.rest), abs(step.V_set.rest)) <= TOLERANCE:
                 return step
     return _whole_step(decision, problem)

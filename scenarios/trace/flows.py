@@ -8,6 +8,9 @@ from typing import NamedTuple
 
 from netem.ledger import Outcome, copies_of
 from scenarios.record.record_reader import RunRecord
+from wire.codec import sound
+from wire.journal import Sent
+from wire.journal_keys import EACH_TICK, kind_of
 from wire.messages import PLANT, Measurement, State
 
 
@@ -89,19 +92,30 @@ def _implied(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
 
 def _noted(record: RunRecord, since: float, until: float) -> Iterator[Flow]:
     """Yield the messages of wall-clock time as their receivers noted them; clocks of one host agree."""
-    sent = {
-        (message.sender, message.kind, message.epoch, message.number): message.at
-        for message in record.messages(since=since, until=until)
-        if message.kind in _KINDS
-    }
+    sent = _sent_at(record, since, until)
     for receiver in (*record.agents, PLANT):
         for message in record.heard(receiver, since=since, until=until):
             if message.kind not in _KINDS:
                 continue
-            begun = sent.get((message.sender, message.kind, message.epoch, message.number))
+            begun = sent.get((message.key, message.epoch, message.number))
             way = 0.0 if begun is None or message.at is None else max(0.0, message.at - begun)
             speed = record.info.agents[0].speed if record.info.agents else 1.0
             yield Flow(message.t, message.sender, receiver, message.number, message.t + way * speed, message.rejected)
+
+
+def _sent_at(record: RunRecord, since: float, until: float) -> dict[tuple[str, int, int], float]:
+    """Return when measurements and states were sent (s, monotonic), by key, epoch and number.
+
+    The journals of their senders tell: the plant notes states too, but not when they were sent.
+    """
+    found = {}
+    for sender in (*record.agents, PLANT):
+        for entry in record.entries(sender, since=since, until=until):
+            if isinstance(entry, Sent) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
+                message = sound(entry.payload)
+                if message is not None:
+                    found[entry.key, message.epoch, message.seq] = entry.at
+    return found
 
 
 _KINDS = (State.__name__, Measurement.__name__)

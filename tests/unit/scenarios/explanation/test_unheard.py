@@ -1,0 +1,113 @@
+"""What became of the states that an agent did not hear."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from netem.ledger import LinkTrace, Outcome
+from scenarios.explanation.unheard import WORDS, missed, reason, rejections, verdicts
+from scenarios.record.message_index import MessageOnWire, on_wire
+from tests.toy.toy_configs import ALL_FULL, agent_config
+from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
+from wire.codec import encode
+from wire.journal import Heard, Received
+from wire.messages import OFF
+
+EVERY = decision(neighbour("inv2", 5), state=None)
+
+
+def sent(name: str, *numbers: int, **changes: Any) -> list[MessageOnWire]:
+    """States as their sender sent them."""
+    states = [replace(state(name, number), **changes) for number in numbers]
+    return [on_wire(f"state/{name}", encode(each), None) for each in states]
+
+
+def fate_of(outcome: Outcome, **changes: Any) -> str:
+    """What is said of the state of tick 6, whose verdict this is, after that of tick 5 was heard."""
+
+    def messages(name: str, *, since: float, until: float, kind: str) -> Iterator[MessageOnWire]:
+        found = (*sent("inv2", 4, 5), *sent("inv2", 6, **changes))
+        return (each for each in found if since - 1e-9 <= each.t <= until + 1e-9)
+
+    trace = LinkTrace("inv2", "inv1", (6,), (0.12,), (outcome,))
+    others = LinkTrace("inv2", "inv3", (6,), (0.12,), ("cut",)), LinkTrace("inv4", "inv1", (6,), (0.12,), ("cut",))
+    record = record_of(messages=messages, links=lambda: (trace, *others))
+    fates = verdicts(record, "inv1", 0.0, 1.0)
+    return missed(record, EVERY, EVERY.neighbours[0], fates, {})
+
+
+@pytest.mark.parametrize(
+    ("outcome", "why"),
+    [
+        ("loss", "loss"),
+        ("queue", "queue"),
+        (0.5, "late"),
+        (float("inf"), "kept"),
+        (((0.01, 3),), "damaged"),
+        (((0.01, 3), (0.5, None)), "late"),
+        (((float("inf"), None), (0.01, 3)), "kept"),
+    ],
+)
+def test_the_verdict_of_the_link_says_why_a_state_was_not_heard(outcome: Outcome, why: str) -> None:
+    """Of several copies the sound ones count; those on other links, and of others, do not."""
+    assert fate_of(outcome) == f"1 state since: 1 {WORDS[why]}"
+
+
+@pytest.mark.parametrize(("changes", "why"), [({"quiet": True}, "quiet"), ({"idle": True}, "idle")])
+def test_a_state_that_was_not_meant_to_be_heard_says_so_itself(changes: dict[str, bool], why: str) -> None:
+    """Whatever a link did with it."""
+    assert fate_of("loss", **changes) == f"1 state since: 1 {WORDS[why]}"
+
+
+def test_without_a_verdict_only_the_number_is_told() -> None:
+    """States after the last one heard up to half a period before the decision: those of another life count too."""
+
+    def messages(name: str, *, since: float, until: float, kind: str) -> Iterator[MessageOnWire]:
+        assert (name, kind) == ("inv2", "State")
+        assert (since, until) == (0.1, pytest.approx(0.19))
+        return iter((*sent("inv2", 5, 6, 7), *sent("inv2", 0, epoch=2)))
+
+    record = record_of(messages=messages)
+
+    assert missed(record, EVERY, EVERY.neighbours[0], {}, {}) == "3 states since"
+    rejected = {"inv2": [(7, "ghost"), (4, "stale"), (-1, "corrupt")], "inv3": [(8, "ghost")]}
+    text = missed(record, EVERY, EVERY.neighbours[0], {}, rejected)
+    assert text == '3 states since: 1 rejected as "ghost", 1 rejected as "corrupt"'
+    empty = record_of(messages=lambda *words, **more: iter(()))
+    assert missed(empty, EVERY, EVERY.neighbours[0], {}, {}) == "no state since"
+
+
+def test_what_was_rejected_is_known_by_its_sender() -> None:
+    """States alone; one whose bytes are noted has no number that can be trusted."""
+    entries = [
+        Heard(None, "state/inv2", 1, 5, "stale"),
+        Heard(None, "state/inv2", 1, 6),
+        Received(None, "state/inv3", b"noise", "corrupt"),
+        Received(None, "command", b"noise", "corrupt"),
+    ]
+    record = record_of(entries=lambda agent, *, since, until: iter(entries))
+
+    assert rejections(record, "inv1", 0.0, 1.0) == {"inv2": [(5, "stale")], "inv3": [(-1, "corrupt")]}
+
+
+def test_each_reason_has_its_words() -> None:
+    """Silent, stale, out of service, of another island by its switches or by its angle, and not new."""
+    drifting = replace(
+        ALL_FULL, degraded_communication=replace(ALL_FULL.degraded_communication, islands="frequency", max_age=0.1)
+    )
+    by_switches, by_angle = EVERY, decision(config=agent_config("inv1", drifting), state=None)
+    for decided, each, words in (
+        (by_switches, neighbour("inv2", None), "no state of it was heard"),
+        (by_angle, neighbour("inv2", 2, unused="stale"), "stale: older than max_age = 0.1 s"),
+        (by_switches, neighbour("inv2", 9, unused="island"), "in another island: inv1, not inv1"),
+        (by_angle, neighbour("inv2", 9, unused="island"), "in another island: its angle drifts"),
+        (by_switches, neighbour("inv2", 9, weight=0.0), "its state is not new: weight 0"),
+        (by_switches, neighbour("inv2", 9), ""),
+    ):
+        assert reason(decided, each) == words
+    off = neighbour("inv2", 9, unused="island", state=state("inv2", 9, island=OFF))
+    assert reason(by_switches, off) == "its inverter is out of service"

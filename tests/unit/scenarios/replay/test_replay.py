@@ -1,0 +1,242 @@
+"""Runs of the toy plant on a fake clock, replayed: what differs is named, and what cannot be known is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from scenarios.record.record_reader import RunRecord
+from scenarios.replay.difference import Difference, message_difference, row_difference
+from scenarios.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
+from scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
+from scenarios.replay.replay_error import ReplayError
+from tests.record.fake_clock import FakeClockRun, fake_clock_record
+from tests.toy.toy_plant import ISLANDING, ToyPlant
+from wire.journal import Heard, Process, Received, Token, Woken
+from wire.messages import Measurement, State, Telemetry
+
+STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=5e4, V_set=277.0, Q=1e3, shared={"w": 0.5})
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """Three agents, of which one dies and comes again, with a link that loses messages."""
+
+    def happens(run: FakeClockRun) -> None:
+        run.at(0.4, lambda: run.kill("inv2"))
+        run.at(0.6, lambda: run.start("inv2"))
+
+    netem = Netem(links=(Fault(on="inv1 -> inv3", loss=0.5),))
+    return fake_clock_record(tmp_path_factory.mktemp("run") / "case", netem=netem, happens=happens)
+
+
+def parts_of(record: RunRecord) -> dict[str, list[ReplayedPart]]:
+    """The parts of a replay by their names."""
+    found: dict[str, list[ReplayedPart]] = {}
+    for part in replay(record, ToyPlant).parts:
+        found.setdefault(part.name, []).append(part)
+    return found
+
+
+def test_a_replay_compares_everything(record: RunRecord) -> None:
+    """Each row of the plant and each state of its agents; of a killed one those that its journal has, in both lives."""
+    parts = parts_of(record)
+
+    rows = [row for message in record.telemetry() for row in message.rows]
+    assert (parts["plant"][0].count, parts["plant"][0].t_end) == (len(rows), rows[-1][0])
+    assert list(parts) == ["plant", "inv1", "inv2", "inv3"]
+    assert [len(parts[name]) for name in parts] == [1, 1, 2, 1]
+    for name in ("inv1", "inv2", "inv3"):
+        states = list(record.messages(sender=name, kind="State"))
+        lost = len(states) - sum(part.count for part in parts[name])
+        assert 0 < lost < 10 if name == "inv2" else lost == 0
+        assert parts[name][-1].t_end == pytest.approx(states[-1].t)
+    assert all(part.difference is None for of in parts.values() for part in of)
+
+
+def test_another_gain_is_named_where_it_first_acts(record: RunRecord) -> None:
+    """Nothing of a replay reaches another process: the others, and the plant, are the same."""
+    other = RunRecord.open(record.path)
+    agents = [
+        replace(agent, control=replace(agent.control, gains=replace(agent.control.gains, k_p=0.5)))
+        if agent.name == "inv3"
+        else agent
+        for agent in other.info.agents
+    ]
+    other.info = replace(other.info, agents=tuple(agents))
+
+    done = replay(other, ToyPlant)
+
+    assert {part.name for part in done.parts if part.difference is not None} == {"inv3"}
+    assert done.difference is not None
+    assert (done.difference.name, done.difference.quantity, done.difference.unit) == ("inv3", "P_set", "W")
+    assert ISLANDING <= done.difference.t < 0.2
+
+
+def test_without_a_plant_the_agents_are_replayed_alone(record: RunRecord) -> None:
+    """As those of a run with the plant of another simulator."""
+    done = replay(record, None)
+
+    assert {part.name for part in done.parts} == {"inv1", "inv2", "inv3"}
+    assert done.difference is None
+
+
+def test_of_a_record_that_is_cut_off_what_there_is_is_replayed(record: RunRecord, tmp_path: Path) -> None:
+    """The rest cannot be compared, and is no difference."""
+    whole = record.path.read_bytes()
+    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    cut = RunRecord.open(tmp_path)
+
+    parts = parts_of(cut)
+
+    assert all(part.difference is None for of in parts.values() for part in of)
+    assert 0 < parts["plant"][0].count < parts_of(record)["plant"][0].count
+    assert parts["plant"][0].t_end == pytest.approx(cut.t_end, abs=0.25)
+
+
+@pytest.mark.parametrize("level", ["decisions", "physics"])
+def test_a_record_without_arrivals_is_refused(level: str, record: RunRecord) -> None:
+    """It says which ones are missing."""
+    other = RunRecord.open(record.path)
+    other.info = replace(other.info, level=level)
+
+    with pytest.raises(ReplayError, match=f'recorded with record = "{level}"'):
+        replay(other, ToyPlant)
+
+
+# -------------------------------------------------------------------- the processes of a record
+
+
+def steps_of(record: RunRecord, name: str) -> list[tuple[RecordedProcess, list[RecordedStep]]]:
+    """The lives of a process, with their steps."""
+    return [(each, list(each.steps())) for each in processes_of(record) if each.name == name]
+
+
+def test_the_steps_of_a_process_are_its_calls(record: RunRecord) -> None:
+    """From its start on, in the order of time; each has what was sent in it, and the last one says that it is that."""
+    ((_, steps),) = steps_of(record, "inv1")
+
+    assert isinstance(steps[0].entry, Process)
+    assert steps[0].entry.kind == "start"
+    assert {type(step.entry) for step in steps} == {Process, Token, Heard, Received, Woken}
+    assert [step.due for step in steps] == sorted(step.due for step in steps)
+    assert [step.last for step in steps] == [False] * (len(steps) - 1) + [True]
+    states = [sent.key for step in steps for sent in step.sent]
+    assert set(states) == {"state/inv1"}
+    assert len(states) == len(list(record.messages(sender="inv1", kind="State")))
+    assert all(isinstance(step.entry, Woken) for step in steps if step.sent)
+
+
+def test_the_plant_is_the_first_process(record: RunRecord) -> None:
+    """It sends a measurement to each agent that is there, at each step."""
+    first, *others = processes_of(record)
+
+    assert first.name == "plant"
+    assert sorted(each.name for each in others) == ["inv1", "inv2", "inv2", "inv3"]
+    sent = [message for step in first.steps() for message in step.sent]
+    assert {message.key for message in sent} == {f"measurement/inv{k}" for k in (1, 2, 3)}
+
+
+@pytest.mark.parametrize(("missing", "told"), [(2, "lacks 1 of its parts"), (0, "begins")])
+def test_where_parts_of_a_journal_are_lost_its_steps_end(missing: int, told: str, record: RunRecord) -> None:
+    """What comes behind cannot be given to the node that lacks what was before; it says where, and why."""
+    whole = JournalParts(record.index)
+    process = next(each for each in whole.processes() if each.name == "inv1")
+    count, of = len(list(process.steps())), whole.of
+
+    def with_a_gap(number: int) -> dict[tuple[str, int], list[Any]]:
+        return {key: [each for each in parts if each[0].seq != missing] for key, parts in of(number).items()}
+
+    whole.of = with_a_gap  # type: ignore[assignment]
+
+    assert len(list(process.steps())) < count
+    assert process.ends.startswith(f"the journal of inv1 {told} at t = ")
+
+
+# -------------------------------------------------------------------- differences
+
+
+@pytest.mark.parametrize(
+    ("changes", "found"),
+    [
+        ({}, None),
+        ({"P_set": 5e4 + 1e-10}, None),
+        ({"P_set": 5e4 + 1e-8}, ("P_set", "W")),
+        ({"V_set": 277.1}, ("V_set", "V")),
+        ({"Q": 1001.0}, ("Q", "var")),
+        ({"shared": {"w": 0.5 + 1e-10}}, None),
+        ({"shared": {"w": 0.6}}, ("shared", "")),
+        ({"shared": {"v": 0.5}}, ("shared", "")),
+        ({"quiet": True}, ("quiet", "")),
+    ],
+)
+def test_the_first_field_that_differs_is_named(changes: dict[str, Any], found: tuple[str, str] | None) -> None:
+    """With its unit; numbers are the same within 1e-9."""
+    difference = message_difference(STATE, replace(STATE, **changes))
+
+    assert (None if difference is None else (difference.quantity, difference.unit)) == found
+    assert difference is None or (difference.name, difference.t) == ("inv1", 0.06)
+
+
+def test_a_message_that_is_missing_is_named() -> None:
+    """In the replay, in the record, and one of another kind."""
+    measured = Measurement(
+        sender="plant", epoch=1, seq=3, t=0.06, to="inv1", P=5e4, Q=0.0, V=277.0, f=60.0,
+        P_set=5e4, V_set=277.0, grid_connected=False, island="inv1", roster=(),
+    )  # fmt: skip
+    assert message_difference(STATE, None) == Difference("inv1", 0.06, "the State 3", "there", "missing")
+    assert message_difference(None, measured) == Difference("inv1", 0.06, "the Measurement 3", "missing", "there")
+    assert message_difference(STATE, measured) is not None
+    assert message_difference(None, None) is None
+
+
+def test_the_first_number_of_a_row_that_differs_is_named() -> None:
+    """By inverter, quantity and unit; a row with another number of columns is of another run."""
+    row = (0.5, *(float(k) for k in range(12)))
+    other = (*row[:9], row[9] + 1.0, row[10] + 1.0, *row[11:])
+
+    assert row_difference(("inv1", "inv2"), row, other) == Difference("inv2", 0.5, "Q", 8.0, 9.0, "var")
+    assert row_difference(("inv1", "inv2"), row, row) is None
+    short = row_difference(("inv1", "inv2"), row, row[:-1])
+    assert short is not None
+    assert (short.quantity, short.recorded, short.replayed) == ("the number of columns", 13, 12)
+
+
+def test_rows_are_compared_up_to_a_time(record: RunRecord) -> None:
+    """Each once, though the plant tells them again; the first difference ends it."""
+    messages = list(record.telemetry())
+    rows = ComparedRows(record, until=0.5)
+    for message in (*messages[:3], *messages):
+        rows.take(message)
+    assert (rows.count, rows.t) == (26, pytest.approx(0.5))
+    assert rows.difference is None
+
+    changed = ComparedRows(record)
+    for message in messages:
+        changed.take(raised(message, 0.3))
+    assert changed.difference is not None
+    assert (changed.difference.t, changed.difference.quantity) == (pytest.approx(0.3), "f")
+    assert changed.count == 16
+
+
+def raised(message: Telemetry, t: float) -> Telemetry:
+    """Telemetry whose rows from a time on have a higher frequency of the first inverter."""
+    rows = tuple((row[0], row[1] + 1.0, *row[2:]) if row[0] > t - 1e-9 else row for row in message.rows)
+    return replace(message, rows=rows)
+
+
+def test_the_first_difference_of_all_is_the_earliest() -> None:
+    """And each note is told once."""
+    late, early = (Difference("inv1", t, "P_set", 1.0, 2.0, "W") for t in (2.0, 1.0))
+    parts = [
+        ReplayedPart(name="inv1", count=1, t_end=2.0, difference=difference, note=note)
+        for difference, note in ((late, "x"), (None, ""), (early, "x"))
+    ]
+
+    assert Replay(parts=tuple(parts)).difference is early
+    assert Replay(parts=tuple(parts)).notes == ("x",)
