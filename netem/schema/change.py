@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 from typing import Any
 
 import msgspec
@@ -47,6 +48,42 @@ def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids:
     for change in changes:
         schedule = changed(schedule, change, link, microgrids)
     return schedule
+
+
+class LinkSchedules:
+    """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
+
+    Parameters
+    ----------
+    netem : Netem
+        The scenario's entries.
+    microgrids : Mapping[str, str]
+        Microgrid of each inverter.
+
+    Examples
+    --------
+    >>> schedules = LinkSchedules(Netem(), {"inv1": "MG1", "inv2": "MG1"})
+    >>> schedules.apply(Fault(on="inv1 -> inv2", cut=Cut(), from_s=1.0))
+    >>> [kind for kind in schedules.of(Link("inv1", "inv2")).at(2.0).active]
+    ['cut']
+    """
+
+    def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
+        self._netem, self._microgrids = netem, microgrids
+
+    @cached_property
+    def _schedules(self) -> dict[Link, FaultSchedule]:
+        """Schedule of each link, once one is asked for: most runs have no live changes."""
+        return {link: schedule_of(link, self._netem, (), self._microgrids) for link in links_among(self._microgrids)}
+
+    def apply(self, change: Change) -> None:
+        """Take up a change."""
+        for link, schedule in self._schedules.items():
+            self._schedules[link] = changed(schedule, change, link, self._microgrids)
+
+    def of(self, link: Link) -> FaultSchedule:
+        """Return the schedule of a link after all changes so far."""
+        return self._schedules[link]
 
 
 def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Netem:

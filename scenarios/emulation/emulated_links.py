@@ -10,7 +10,7 @@ from netem.liar import HeardFrom, LiveHearing, lies_about
 from netem.models import INSTANT
 from netem.models.lie import lie_in_words
 from netem.receiver import Receiver
-from netem.schema.change import schedule_of
+from netem.schema.change import LinkSchedules
 from netem.schema.node_fault import NodeFault
 from netem.schema.pattern import Link, links_among, parse
 from scenarios.emulation.emulation_config import EmulationConfig
@@ -108,6 +108,7 @@ class EmulatedLinks:
         links, change = self._concerned(command, t), command.at(t)
         senders = [link.src for link in links if link.dst == self._name]
         self._receiver.apply(change)
+        self._schedules.apply(change)
         if senders:
             self.clear.clear()
         return CommandEffect(
@@ -118,12 +119,11 @@ class EmulatedLinks:
 
     def _concerned(self, command: LinkCommand, t: float) -> list[Link]:
         """Return the links of the whole run that a command changes at t (s); a heal changes those that have a fault."""
-        pattern, netem = parse(command.on), self._config.netem
+        pattern = parse(command.on)
         links = [link for link in links_among(self._microgrids) if pattern.matches(*link, self._microgrids)]
         if command.fault is not None:
             return links
-        schedules = {link: schedule_of(link, netem, self._receiver.changes, self._microgrids) for link in links}
-        return [link for link in links if schedules[link].at(t).active]
+        return [link for link in links if self._schedules.of(link).at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
         """Return the senders whose links have a fault at t (s of run time)."""
@@ -147,6 +147,7 @@ class EmulatedLinks:
         config = self._config
         self.clear.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
+        self._schedules = LinkSchedules(config.netem, config.microgrids)
         self._liars = {
             src: LiveHearing(HeardFrom(config.netem.seed, src, self._name, lies))
             for src in self._senders

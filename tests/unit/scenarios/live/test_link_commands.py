@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from agents.realtime.link_command_receiver import LinkCommandReceiver
 from agents.realtime.realtime_agent import RealtimeAgent
+from netem.schema import change
 from netem.schema.change import Heal, schedule_of
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
@@ -175,6 +176,29 @@ def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> No
         links.offer(state, b"state", state.t)
 
     assert [set(decode_statuses(links.status(t))) for t in (1.9, 2.0, 4.0)] == [set(), {"inv2"}, {"inv2"}]
+
+
+def test_a_late_heal_looks_at_no_command_of_before_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many commands a run has had, the next one is held against each link once: a plant must not pause."""
+    looks: list[object] = []
+    plain = change.changed
+
+    def counted(*given: Any) -> Any:
+        looks.append(given[1])
+        return plain(*given)
+
+    monkeypatch.setattr(change, "changed", counted)
+    links = EmulatedLinks("plant", SETUP)
+    heal = LinkCommand(heal=Heal(on="inv2 -> inv1", from_s=0.0)).to_tree()
+    costs = []
+    for k in range(20):
+        for tree in (CUT, heal):
+            before = len(looks)
+            effect = links.command(tree, 10.0 * k + (5.0 if tree is heal else 0.0))
+            costs.append(len(looks) - before)
+            assert effect.receivers == ("inv1",)
+
+    assert max(costs) == len(links_among(SETUP.microgrids))
 
 
 def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() -> None:
