@@ -1,0 +1,204 @@
+"""The limits of a soak, and whether a run kept them. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from bench.soak.late_steps import LateSteps
+from bench.soak.process_sizes import ProcessSize
+from scenarios.checks.check_verdict import CheckVerdict, summary
+
+FLAT = 0.05
+"""Growth of memory or files, as a part, that counts as none."""
+
+HEAL = 6.0
+"""Longest time (s) from the end of a cut until both sides use each other's new values."""
+
+WARM = 0.2
+"""Part of a run after which memory is compared: caches are full, and every agent was replaced."""
+
+SPAN = 0.15
+"""Part of a run over which sizes are averaged, after the warm-up and at the end."""
+
+LEAST = 300.0
+"""Shortest run (s) whose growth says anything."""
+
+LAST_WORDS = "last_words"
+"""The check that names agents which end for no reason that the run knows."""
+
+NOTICED = 2.0
+"""Longest time (s) between a kill and an agent's last state, as the observer's run time is a message old."""
+
+YOUNG = (10.0, 20.0)
+"""Ages (s) at which agents that were started early and late are compared."""
+
+STARTS = 6
+"""Starts of agents that a comparison by age needs."""
+
+Verdict = Literal["PASS", "FAIL", "-"]
+
+
+class Finding(NamedTuple):
+    """One row of the result."""
+
+    what: str
+    limit: str
+    """In words; empty where a number is told only."""
+    found: str
+    verdict: Verdict
+    """"-": not judged."""
+
+
+class Growth(NamedTuple):
+    """Size of something after the warm-up and at the end."""
+
+    name: str
+    before: float
+    after: float
+
+    @property
+    def part(self) -> float:
+        """Growth as a part.
+
+        Examples
+        --------
+        >>> Growth("plant", 40.0, 42.0).part
+        0.05
+        """
+        return round(self.after / self.before - 1.0, 6)
+
+
+def memory_of(size: ProcessSize) -> float:
+    """Return the memory of a process (MB)."""
+    return size.memory
+
+
+def files_of(size: ProcessSize) -> float:
+    """Return how many files a process has open."""
+    return float(size.files)
+
+
+def growths(sizes: Sequence[ProcessSize], of: Callable[[ProcessSize], float], stays: Iterable[str]) -> list[Growth]:
+    """Return the growth of each process that stays, of young agents, and of all processes together.
+
+    Parameters
+    ----------
+    sizes : Sequence[ProcessSize]
+        All looks, in the order of time; one look at all processes has one time.
+    of : Callable
+        The size that is compared.
+    stays : Iterable[str]
+        Processes that run all the time.
+    """
+    if not sizes:
+        return []
+    begin, end = sizes[0].at, sizes[-1].at
+    length = end - begin
+    spans = (begin + WARM * length, begin + (WARM + SPAN) * length), (end - SPAN * length, end)
+
+    def between(chosen: Iterable[tuple[float, float]]) -> tuple[float, float]:
+        points = list(chosen)
+        before, after = ([x for at, x in points if low <= at <= high] for low, high in spans)
+        return (float(np.median(before)), float(np.median(after))) if before and after else (np.nan, np.nan)
+
+    found = [Growth(name, *between((one.at, of(one)) for one in sizes if one.name == name)) for name in stays]
+    young: dict[tuple[int, float], ProcessSize] = {}
+    for one in sizes:
+        if YOUNG[0] <= one.age <= YOUNG[1] and one.born > begin:
+            young.setdefault((one.pid, one.born), one)
+    ordered = sorted(young.values(), key=lambda one: one.born)
+    if len(ordered) >= STARTS:
+        middle = len(ordered) // 2
+        early, late = ([of(one) for one in half] for half in (ordered[:middle], ordered[middle:]))
+        found.append(Growth("agents of the same age", float(np.median(early)), float(np.median(late))))
+    looks: dict[float, list[ProcessSize]] = {}
+    for one in sizes:
+        looks.setdefault(one.at, []).append(one)
+    usual = Counter(map(len, looks.values())).most_common(1)[0][0]
+    whole = [(at, sum(map(of, look))) for at, look in looks.items() if len(look) == usual]
+    return [*found, Growth("all together", *between(whole))]
+
+
+def judge_growth(what: str, unit: str, found: Sequence[Growth], seconds: float) -> Finding:
+    """Return whether something stayed flat over a run of some length (s)."""
+    known = [one for one in found if one.part == one.part]
+    if not known:
+        return Finding(what, f"flat within {100 * FLAT:g} %", "too short a run", "-")
+    worst = max(known, key=lambda one: one.part)
+    whole = next((one for one in known if one.name == "all together"), worst)
+    text = f"at most {100 * worst.part:+.1f} % ({worst.name}: {worst.before:.1f} to {worst.after:.1f}{unit})"
+    if worst is not whole:
+        text += f"; all together {100 * whole.part:+.1f} % ({whole.before:.1f} to {whole.after:.1f}{unit})"
+    verdict: Verdict = "-" if seconds < LEAST else "PASS" if worst.part <= FLAT else "FAIL"
+    return Finding(what, f"flat within {100 * FLAT:g} %", text, verdict)
+
+
+def judge_late(late: Sequence[LateSteps], steps: int) -> Finding:
+    """Return whether each late step has an explanation."""
+    count = sum(one.steps for one in late)
+    unexplained = [one for one in late if not one.causes]
+    text = f"{count} of {steps} late, {sum(one.steps for one in unexplained)} unexplained"
+    if unexplained:
+        text += ": at " + ", ".join(f"{one.t:.1f} s" for one in unexplained[:10])
+    return Finding("late steps", "none unexplained", text, "FAIL" if unexplained else "PASS")
+
+
+def judge_times(what: str, seconds: Sequence[float], limit: float | None, deaf: int = 0) -> Finding:
+    """Return whether times (s) are below a limit (s); those in which this program was deaf are left out.
+
+    Examples
+    --------
+    >>> judge_times("heal", [0.1, 0.2, 0.3], 6.0)
+    Finding(what='heal', limit='under 6 s', found='3: p50 0.20, p95 0.29, worst 0.30 s', verdict='PASS')
+    """
+    words = "" if limit is None else f"under {limit:g} s"
+    left_out = f"; {deaf} not counted, as this program was deaf" if deaf else ""
+    if not seconds:
+        return Finding(what, words, f"none{left_out}", "-")
+    worst = max(seconds)
+    finite = [s for s in seconds if s < float("inf")]
+    p50, p95 = (float(np.percentile(finite, q)) for q in (50, 95)) if finite else (worst, worst)
+    never = len(seconds) - len(finite)
+    shown = f"{worst:.2f} s" if not never else f"never ({never})"
+    text = f"{len(seconds)}: p50 {p50:.2f}, p95 {p95:.2f}, worst {shown}{left_out}"
+    return Finding(what, words, text, "-" if limit is None else "PASS" if worst < limit else "FAIL")
+
+
+def judge_checks(verdicts: tuple[CheckVerdict, ...], kills: Sequence[tuple[str, float]]) -> Finding:
+    """Return the verdict of the checks.
+
+    Parameters
+    ----------
+    verdicts : tuple[CheckVerdict, ...]
+        Of the run.
+    kills : Sequence[tuple[str, float]]
+        Agents that this program has killed, and when (s of run time): the check of last words names each of them, as
+        nothing in the run tells why they are silent, and no others.
+    """
+    if not verdicts:
+        return Finding("checks", "none fails", "there is no checks.json", "FAIL")
+    words = next((one for one in verdicts if one.check == LAST_WORDS), None)
+    known = words is not None and words.status == "failed" and words.count == len(kills) and _all_killed(words, kills)
+    failed = [one for one in verdicts if one.status == "failed" and not (known and one is words)]
+    text = summary(tuple(one for one in verdicts if not (known and one is words)))
+    if known:
+        text += f"; {LAST_WORDS} names the {len(kills)} agents that were killed, and no others"
+    return Finding("checks", "none fails", text, "FAIL" if failed else "PASS")
+
+
+def _all_killed(words: CheckVerdict, kills: Sequence[tuple[str, float]]) -> bool:
+    """Return whether each agent that fell silent, as far as a verdict shows them, was killed then."""
+    return all(
+        any(one.agent == name and one.t is not None and abs(one.t - t) <= NOTICED for name, t in kills)
+        for one in words.violations
+    )
+
+
+def table(findings: Iterable[Finding]) -> str:
+    """Return the rows as a table of Markdown."""
+    rows = [("what", "limit", "found", ""), ("---",) * 4, *findings]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows)

@@ -1,0 +1,458 @@
+"""The run of a soak: its processes, the commands that disturb it, and what is measured meanwhile.
+
+All processes are started as a user starts them: `gridpeers up` with a record, and `gridpeers agent` for every agent
+that comes back. All disturbances are commands of a user, or signals to a process.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+from collections import deque
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from time import monotonic, sleep
+from types import TracebackType
+from typing import NamedTuple, Self
+
+import numpy as np
+
+from bench.long_runs import COMMAND, processes, processor_time, size
+from bench.soak.disturbances import SETTLE, Disturbance
+from bench.soak.late_steps import LateSteps, Start, late_steps
+from bench.soak.process_sizes import MachineTime, ProcessSize, machine_time, size_of, waiting_times
+from bench.soak.soak_monitor import HOLD, SoakMonitor
+from scenarios.checks.check_verdict import CheckVerdict
+from scenarios.checks.checks_file import FILE as CHECKS
+from scenarios.checks.checks_file import read_verdicts
+from scenarios.drivers.free_endpoint import free_endpoint
+from scenarios.live.run_address import RunAddress
+from scenarios.live.run_client import RunClient
+from scenarios.live.show.watching import RunSubscriber
+from wire.messages import PLANT
+
+BUILD = 300.0
+"""Longest wait (s) for the run to begin: the plant may be compiled first."""
+
+CALM = 6.0
+"""Run time (s) at which both events of the scenario are over."""
+
+PATIENCE = 30.0
+"""Longest wait (s) for anything that a disturbance brings about."""
+
+CONCLUDE = 1800.0
+"""Longest wait (s) for the report of the run after its end."""
+
+LOOK = 5.0
+"""Time (s) between two looks at the sizes of the processes."""
+
+LOAD, ZONE = "48", "60-160"
+"""The load that is set, and the switch of the zone that the scenario drops."""
+
+SAMPLES = 3
+"""Samples of the machine's time, one with each telemetry, over which a late step is explained."""
+
+
+class Timed(NamedTuple):
+    """A time that was measured."""
+
+    what: str
+    """heal, told, joined or restored."""
+    seconds: float
+    """The time (s); infinite if it did not come true within `PATIENCE`."""
+    of: Disturbance
+    t: float
+    """Run time (s)."""
+    deaf: bool
+    """Whether this program opened a new session meanwhile, so that the time may be its own."""
+
+
+class SoakEnd(NamedTuple):
+    """The end of the run."""
+
+    status: int | None
+    """Exit status of `gridpeers up`; None if it had not ended after `CONCLUDE`."""
+    checks: tuple[CheckVerdict, ...]
+    """Verdicts of the checks."""
+    report_s: float
+    """How long its report took (s)."""
+    peak_MB: float
+    """Greatest memory of the command meanwhile (MB)."""
+    files: Mapping[str, int]
+    """Files of the run (bytes)."""
+    printed: str
+    """What `gridpeers up` printed."""
+
+
+class CountingClient(RunClient):
+    """A client that counts its sessions."""
+
+    renewals = 0
+    """How often it opened a new session."""
+
+    def renew(self) -> None:
+        """Open a new session."""
+        self.renewals += 1
+        super().renew()
+
+
+class SoakError(RuntimeError):
+    """The run does not go on; the message says what ended and its last lines."""
+
+
+class SoakRun:
+    """A live run with a record. Use it as a context: no process is left.
+
+    Parameters
+    ----------
+    folder : Path
+        For the record and the logs.
+    microgrids : Mapping[str, str]
+        The microgrid of each agent of the run.
+    spare : str
+        The agent that is not there at first.
+    recorded : bool, optional
+        Whether the run has a record, and with it a report and verdicts.
+    """
+
+    def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
+        self.microgrids, self.agents = microgrids, tuple(microgrids)
+        self.monitor = SoakMonitor()
+        self.monitor.off.add(spare)
+        self.times: list[Timed] = []
+        self.late: list[LateSteps] = []
+        self.sizes: list[ProcessSize] = []
+        self.problems: list[str] = []
+        """What went wrong beside: a command that failed, a process that ended."""
+        self.kills: list[tuple[str, float]] = []
+        """Agents that were killed, and when (s of run time)."""
+        self._recorded = recorded
+        self._folder, self._endpoint, self._name = folder, free_endpoint(), f"soak{os.getpid()}"
+        self._pids: dict[str, tuple[int, float]] = {}
+        """Process and its start (s, monotonic) of the plant, the command and each agent."""
+        self._started: dict[str, subprocess.Popen[bytes]] = {}
+        """Agents that were started alone."""
+        self._others_of_ours: dict[int, float] = {os.getpid(): 0.0}
+        """Further processes, by their starts (s, monotonic): this one, servers of `up`, and commands that run now."""
+        self._starting: dict[int, tuple[str, float]] = {}
+        """Processes that get ready now: text and start (s, monotonic)."""
+        self._spent: dict[tuple[int, float], float] = {}
+        """Processor time (s) of every process so far."""
+        self._waited: dict[int, float] = {}
+        """Time (s) in which each thread of the plant waited for a processor so far."""
+        self._starts: deque[Start] = deque(maxlen=40)
+        self._machine: deque[MachineTime] = deque(maxlen=SAMPLES)
+        self._seen = self._late = self._steps = self._logs = 0
+        self._look = 0.0
+        self._stack = ExitStack()
+
+    @property
+    def here(self) -> Path:
+        """Folder of the run."""
+        return self._folder / "run"
+
+    @property
+    def steps(self) -> int:
+        """Steps of the plant since the run is calm."""
+        return 0 if self.monitor.pacing is None else self.monitor.pacing.steps - self._steps
+
+    def __enter__(self) -> Self:
+        """Start all processes; return once the run is calm."""
+        try:
+            self._log = self._stack.enter_context((self._folder / "up.log").open("wb"))
+            words = ["up", "islanding", "--run", self._name, "--listen", self._endpoint]
+            words += ["--out", str(self.here)] if self._recorded else []
+            born = monotonic()
+            self._up = subprocess.Popen([*COMMAND, *words], stdout=self._log, stderr=self._log, cwd=self._folder)
+            where = RunAddress(run=self._name, connect=(self._endpoint,))
+            self._client = CountingClient(where, meet_agents=True)
+            self._stack.callback(self._client.close)
+            self._client.find_plant(BUILD)
+            self._subscriber = RunSubscriber(self._client, self.monitor)
+            self._need(self._until(lambda: self.monitor.t > CALM and self._calm(), BUILD), "the run is not calm")
+            for name, pid in processes(self._up.pid).items():
+                if name in (PLANT, "command", *self.agents):
+                    self._pids[name] = pid, born
+                else:
+                    self._others_of_ours[pid] = born
+            missing = {PLANT, *self.agents} - self._pids.keys()
+            self._need(not missing, f"no process of {', '.join(sorted(missing))} is found")
+            if self.monitor.pacing is not None:
+                self._late, self._steps = self.monitor.pacing.late, self.monitor.pacing.steps
+        except BaseException:
+            self.__exit__(None, None, None)
+            raise
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End all processes that still run."""
+        for process in (*self._started.values(), *([self._up] if hasattr(self, "_up") else [])):
+            if process.poll() is None:
+                process.send_signal(signal.SIGCONT)
+                process.send_signal(signal.SIGTERM)
+                try:
+                    process.wait(20.0)
+                except subprocess.TimeoutExpired:
+                    process.kill()
+                    process.wait()
+        self._stack.close()
+
+    # ---------------------------------------------------------------- disturbances
+
+    def disturb(self, one: Disturbance) -> None:
+        """Do one disturbance, and wait until all is as before."""
+        self.monitor.restorations.clear()
+        if one.kind in ("load", "zone"):
+            self.rest(SETTLE)
+        getattr(self, f"_{one.kind}")(one)
+        deaf = self._client.renewals
+        if not self._until(self._calm, PATIENCE):
+            self._note("restored", float("inf"), one, deaf)
+        for seconds in self.monitor.restorations:
+            self._note("restored", seconds, one, self._client.renewals)
+        self.rest(one.rest)
+
+    def rest(self, seconds: float) -> None:
+        """Let the run go on for some time (s)."""
+        end = monotonic() + seconds
+        self._until(lambda: monotonic() >= end, seconds + 1.0)
+
+    def _leave(self, one: Disturbance) -> None:
+        (name,) = one.agents
+        self._stop(name)
+        self.rest(one.seconds)
+        self._join(name, one)
+
+    def _spare(self, one: Disturbance) -> None:
+        (name,) = one.agents
+        self._join(name, one)
+        self.rest(one.seconds)
+        self._stop(name)
+
+    def _kill(self, one: Disturbance) -> None:
+        (name,) = one.agents
+        others, began, deaf = self._others(name), monotonic(), self._client.renewals
+        self.kills.append((name, self.monitor.t))
+        os.kill(self._pids[name][0], signal.SIGKILL)
+        self._gone(name)
+        self._wait(
+            "told",
+            lambda: self.monitor.told(name, "died", began) and self.monitor.none_uses(name, others),
+            began,
+            one,
+            deaf,
+        )
+        self.rest(one.seconds)
+        self._join(name, one)
+
+    def _freeze(self, one: Disturbance) -> None:
+        (name,) = one.agents
+        pid, deaf = self._pids[name][0], self._client.renewals
+        os.kill(pid, signal.SIGSTOP)
+        try:
+            self.rest(one.seconds)
+        finally:
+            os.kill(pid, signal.SIGCONT)
+        woken = monotonic()
+        self._wait(
+            "heal",
+            lambda: (
+                all(self.monitor.use(other, name) for other in self._others(name))
+                and all(self.monitor.use(name, other, woken) for other in self._others(name))
+            ),
+            woken,
+            one,
+            deaf,
+        )
+
+    def _cut(self, one: Disturbance) -> None:
+        self._cut_between(one, one.agents, (one.agents[0],), (one.agents[1],))
+
+    def _isolate(self, one: Disturbance) -> None:
+        (name,) = one.agents
+        self._cut_between(one, (f"{name} <-> *",), (name,), self._others(name))
+
+    def _part(self, one: Disturbance) -> None:
+        first, second = (tuple(name for name in self.agents if self.microgrids[name] == group) for group in one.agents)
+        self._cut_between(one, (f"{one.agents[0]} <-> {one.agents[1]}",), first, second)
+
+    def _cut_between(
+        self, one: Disturbance, links: tuple[str, ...], some: tuple[str, ...], others: tuple[str, ...]
+    ) -> None:
+        """Cut links, heal them, and measure how long both sides take to use each other's new values."""
+        deaf = self._client.renewals
+        if one.ends_itself:
+            begin = self._from(self._command("link", "cut", *links, "--for", f"{one.seconds:g}"))
+            healed = self.monitor.wall_time(begin + one.seconds)
+            self.rest(max(0.0, healed - monotonic()))
+        else:
+            self._command("link", "cut", *links)
+            self.rest(one.seconds)
+            healed = self.monitor.wall_time(self._from(self._command("link", "heal", *links)))
+        self._wait("heal", lambda: self.monitor.use_each_other(some, others), healed, one, deaf)
+
+    def _impair(self, one: Disturbance) -> None:
+        options = ["--delay", f"{one.delay:g}", "--loss", f"{one.loss:g}", "--for", f"{one.seconds:g}"]
+        self._command("link", "set", *one.agents, *options)
+        self.rest(one.seconds)
+
+    def _load(self, one: Disturbance) -> None:
+        self._command("load", LOAD, "--factor", f"{one.factor:g}")
+        self.rest(one.seconds)
+        self._command("load", LOAD, "--factor", "1")
+
+    def _zone(self, one: Disturbance) -> None:
+        self._command("event", "close", ZONE)
+        self.rest(one.seconds)
+        self._command("event", "open", ZONE)
+
+    # ---------------------------------------------------------------- processes
+
+    def _join(self, name: str, one: Disturbance) -> None:
+        """Start an agent, and measure how long it takes until it and the others use each other."""
+        began, deaf = monotonic(), self._client.renewals
+        self._logs += 1
+        with (self._folder / f"{name}-{self._logs}.log").open("wb") as log:
+            agent = subprocess.Popen(
+                [*COMMAND, "agent", name, *self._where()], stdout=log, stderr=log, cwd=self._folder
+            )
+        self._started[name], self._pids[name] = agent, (agent.pid, began)
+        self._starting[agent.pid] = f"agent {name}", began
+        others = self._others(name)
+        self._wait("joined", lambda: self.monitor.use_each_other((name,), others, began), began, one, deaf)
+        self._ready(agent.pid)
+        self.monitor.off.discard(name)
+
+    def _stop(self, name: str) -> None:
+        """Have an agent leave."""
+        self.monitor.off.add(name)
+        self._command("stop", name)
+        self._gone(name)
+
+    def _gone(self, name: str) -> None:
+        """Wait for the end of an agent's process."""
+        pid, _ = self._pids.pop(name)
+        process = self._started.pop(name, None)
+        ended = self._until(
+            lambda: not Path(f"/proc/{pid}").exists() if process is None else process.poll() is not None, PATIENCE
+        )
+        if not ended:
+            self.problems.append(f"t = {self.monitor.t:.1f} s: the process of {name} has not ended")
+
+    def _command(self, *words: str) -> str:
+        """Run a command to its end; return what it printed."""
+        began = monotonic()
+        process = subprocess.Popen(
+            [*COMMAND, *words, *self._where()], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=self._folder
+        )
+        self._others_of_ours[process.pid] = began
+        self._starting[process.pid] = f"gridpeers {words[0]}", began
+        if not self._until(lambda: process.poll() is not None, PATIENCE):
+            process.kill()
+        text = process.communicate()[0].decode(errors="replace")
+        self._others_of_ours.pop(process.pid)
+        self._ready(process.pid)
+        if process.returncode:
+            last = text.strip().splitlines()[-1:] or ["it printed nothing"]
+            self.problems.append(
+                f"t = {self.monitor.t:.1f} s: gridpeers {' '.join(words)} ended with {process.returncode}: {last[0]}"
+            )
+        return text
+
+    def _ready(self, pid: int) -> None:
+        """Note that a process that was started is ready, or has ended."""
+        text, began = self._starting.pop(pid)
+        self._starts.append(Start(text, began, monotonic()))
+
+    def finish(self) -> SoakEnd:
+        """End the run, and wait for its report."""
+        self._pids = {"command": self._pids["command"]}  # the others end now
+        down = subprocess.run([*COMMAND, "down", *self._where()], capture_output=True, text=True, timeout=PATIENCE)
+        if down.returncode:
+            self.problems.append(f"gridpeers down ended with {down.returncode}: {down.stdout}{down.stderr}".strip())
+        began, peak = monotonic(), 0.0
+        while self._up.poll() is None and monotonic() < began + CONCLUDE:
+            peak = max(peak, np.nan_to_num(size(self._up.pid, "VmHWM")))
+            sleep(0.05)
+        took = monotonic() - began
+        verdicts = [file for file in self.here.rglob(CHECKS)]
+        return SoakEnd(
+            status=self._up.poll(),
+            checks=read_verdicts(verdicts[0])["IV"] if verdicts else (),
+            report_s=took,
+            peak_MB=float(peak),
+            files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},
+            printed=(self._folder / "up.log").read_text(errors="replace"),
+        )
+
+    def _from(self, text: str) -> float:
+        """Return the run time (s) from which on a link command holds, as it printed."""
+        found = re.search(r"from t = ([\d.]+) s on", text)
+        return float(found[1]) if found else self.monitor.t
+
+    def _where(self) -> list[str]:
+        return ["--run", self._name, "--connect", self._endpoint]
+
+    def _others(self, name: str) -> tuple[str, ...]:
+        return tuple(other for other in self.agents if other != name)
+
+    # ---------------------------------------------------------------- waiting and looking
+
+    def _calm(self) -> bool:
+        """Whether all agents use each other, and the frequency has been in its band for a while."""
+        return self.monitor.use_each_other(self.agents, self.agents) and self.monitor.seconds_in_band >= HOLD
+
+    def _wait(self, what: str, condition: Callable[[], bool], since: float, one: Disturbance, deaf: int) -> None:
+        """Wait until a condition holds, and note how long that took since a time (s, monotonic)."""
+        came = self._until(condition, PATIENCE)
+        self._note(what, max(0.0, monotonic() - since) if came else float("inf"), one, deaf)
+
+    def _note(self, what: str, seconds: float, one: Disturbance, deaf: int) -> None:
+        self.times.append(Timed(what, seconds, one, self.monitor.t, self._client.renewals > deaf))
+
+    def _until(self, condition: Callable[[], bool], patience: float) -> bool:
+        """Take in messages until a condition holds; return whether it does."""
+        end = monotonic() + patience
+        while not condition():
+            left = end - monotonic()
+            if left <= 0.0:
+                return False
+            self._subscriber.take(min(left, 0.05))
+            self._need(self._up.poll() is None, f"gridpeers up ended with status {self._up.returncode}")
+            if self.monitor.telemetries > self._seen and self._pids:
+                self._seen = self.monitor.telemetries
+                self._look_at_machine()
+            if monotonic() >= self._look and self._pids:
+                self._look = monotonic() + LOOK
+                self._look_at_sizes()
+        return True
+
+    def _look_at_machine(self) -> None:
+        """Sample the machine's time, and explain the late steps since the last sample."""
+        for pid, born in (*self._pids.values(), *self._others_of_ours.items()):
+            self._spent[pid, born] = max(self._spent.get((pid, born), 0.0), processor_time(pid))
+        now, pacing = monotonic(), self.monitor.pacing
+        self._waited |= waiting_times(self._pids[PLANT][0])
+        self._machine.append(machine_time(now, sum(self._spent.values()), sum(self._waited.values())))
+        if pacing is not None and (count := pacing.late - self._late) > 0:
+            self._late = pacing.late
+            starts = [*self._starts, *(Start(text, born, now) for text, born in self._starting.values())]
+            self.late.append(late_steps(self.monitor.t, count, self._machine[0], self._machine[-1], starts))
+
+    def _look_at_sizes(self) -> None:
+        at = monotonic()
+        for name, (pid, born) in list(self._pids.items()):
+            found = size_of(name, pid, born, at)
+            if found is not None:
+                self.sizes.append(found)
+
+    def _need(self, sound: bool, why: str) -> None:
+        if not sound:
+            self._log.flush()
+            last = (self._folder / "up.log").read_text(errors="replace").splitlines()[-8:]
+            raise SoakError("\n".join((why, *last)))

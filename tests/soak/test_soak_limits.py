@@ -1,0 +1,201 @@
+"""The limits of a soak on made-up measurements: what grows, is late without a reason, or heals slowly fails."""
+
+from __future__ import annotations
+
+from itertools import islice
+from pathlib import Path
+from typing import Literal
+
+import pytest
+
+from agents.agent_config import AgentConfig, Control
+from bench.soak import __main__ as command
+from bench.soak.disturbances import DECK, Disturbance, disturbances
+from bench.soak.judging import files_of, growths, judge_checks, judge_growth, judge_late, judge_times, memory_of, table
+from bench.soak.late_steps import LateSteps, Start, late_steps
+from bench.soak.process_sizes import MachineTime, ProcessSize
+from bench.soak.soak_monitor import SoakMonitor
+from scenarios.checks.check_verdict import CheckVerdict, Violation
+from wire.messages import AgentStatus, Telemetry
+
+AGENTS = tuple(f"inv{i}" for i in range(1, 10))
+
+HOUR = 3600.0
+
+
+def drawn(seed: int, count: int) -> list[Disturbance]:
+    """The first disturbances of a seed."""
+    return list(islice(disturbances(seed, AGENTS[2:], AGENTS, "inv10", ("MG1", "MG2", "MG3")), count))
+
+
+def looks(growth: float) -> list[ProcessSize]:
+    """An hour of a plant that grows by a part over it, and of an agent that is restarted every two minutes."""
+    found = []
+    for k in range(720):
+        at = 5.0 * k
+        found.append(ProcessSize(at, "plant", 1, 0.0, 100.0 * (1.0 + growth * at / HOUR), 30))
+        birth = at // 120.0
+        found.append(ProcessSize(at, "inv3", int(birth) + 2, 120.0 * birth + 0.1, 40.0, 20))
+    return found
+
+
+def config(name: str, kind: Literal["GFM", "GFL"]) -> AgentConfig:
+    """The configuration of an agent."""
+    return AgentConfig(
+        run="soak", name=name, kind=kind, microgrid="MG1", P_rated=6e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05,
+        T_c=0.02, control=Control(secondary="all", graph="full"), deadline=10.0, connect=(),
+    )  # fmt: skip
+
+
+def status(name: str, *used: str) -> AgentStatus:
+    """A status with these neighbours in the agent's sums."""
+    counts = dict.fromkeys(("received", "sent", "rejected", "lost", "ticks", "missed"), 0)
+    return AgentStatus(
+        sender=name, epoch=1, seq=1, t=1.0, phase="running", waits_for="", island="inv1", neighbours=used,
+        ages=(0.0,) * len(used), used=used, lateness=0.0, **counts,
+    )  # fmt: skip
+
+
+def test_a_seed_decides_all_disturbances_and_a_deal_has_every_kind() -> None:
+    """The same seed gives the same ones, another others; agents that stay are neither replaced nor frozen."""
+    deal = drawn(1, len(DECK))
+
+    assert deal == drawn(1, len(DECK))
+    assert deal != drawn(2, len(DECK))
+    assert sorted(one.kind for one in deal) == sorted(DECK)
+    replaced = [one.agents[0] for one in drawn(1, 10 * len(DECK)) if one.kind in ("leave", "kill", "freeze")]
+    assert set(replaced[:7]) == set(AGENTS[2:])
+    assert not {"inv1", "inv2"} & set(replaced)
+
+
+@pytest.mark.parametrize(("growth", "verdict"), [(0.04, "PASS"), (0.12, "FAIL"), (-0.3, "PASS")])
+def test_memory_that_grows_by_more_than_a_twentieth_fails(growth: float, verdict: str) -> None:
+    """Measured from the warm-up to the end, for the process that grows; a run of minutes is not judged."""
+    found = growths(looks(growth), memory_of, ["plant"])
+
+    assert judge_growth("memory", " MB", found, HOUR).verdict == verdict
+    assert judge_growth("memory", " MB", found, 60.0).verdict == "-"
+    assert {one.name for one in found} == {"plant", "agents of the same age", "all together"}
+    assert judge_growth("files", "", growths(looks(growth), files_of, ["plant"]), HOUR).verdict == "PASS"
+
+
+def test_restarted_agents_are_compared_at_one_age() -> None:
+    """Agents that grow by themselves are as flat as their youngest; those that start larger and larger are not."""
+    grows = [one._replace(memory=40.0 + one.age) for one in looks(0.0)]
+    larger = [one._replace(memory=40.0 + 0.1 * one.pid) for one in looks(0.0)]
+
+    def young(sizes: list[ProcessSize]) -> float:
+        return next(one.part for one in growths(sizes, memory_of, []) if one.name == "agents of the same age")
+
+    assert young(grows) == 0.0
+    assert young(larger) > 0.03
+
+
+def test_a_late_step_counts_as_explained_only_if_the_plant_waited_for_a_processor() -> None:
+    """A process that starts, or other programs, explain nothing while the plant has its processor."""
+    before = MachineTime(at=1.0, whole=0.0, busy=0.0, stolen=0.0, own=0.0, waited=0.0)
+    after = MachineTime(at=1.4, whole=0.8, busy=0.8, stolen=0.0, own=0.2, waited=0.0)
+    start = [Start("agent inv2", 0.9, 1.2)]
+
+    assert late_steps(3.0, 1, before, after, start).causes == ()
+    assert len(late_steps(3.0, 1, before, after._replace(waited=0.03), start).causes) == 2
+    assert late_steps(3.0, 1, before, after._replace(stolen=0.05), []).causes == ("the host took 50 ms",)
+    over = [Start("agent inv2", 0.1, 0.9)]
+    calm = after._replace(busy=0.2, waited=0.03)
+    assert late_steps(3.0, 1, before, calm, over).causes == ()
+
+
+def test_one_unexplained_late_step_fails() -> None:
+    """The row says how many there are, and when."""
+    explained, not_explained = LateSteps(1.0, 2, 0.03, ("start of agent inv2",)), LateSteps(9.0, 1, 0.0, ())
+
+    assert judge_late([explained], 100).verdict == "PASS"
+    found = judge_late([explained, not_explained], 100)
+    assert (found.verdict, found.found) == ("FAIL", "3 of 100 late, 1 unexplained: at 9.0 s")
+
+
+def test_a_heal_that_never_comes_or_is_slow_fails() -> None:
+    """Those in which this program heard nothing itself are told, and not counted."""
+    assert judge_times("heal", [0.1, 5.9], 6.0).verdict == "PASS"
+    assert judge_times("heal", [0.1, 6.1], 6.0).verdict == "FAIL"
+    never = judge_times("heal", [0.1, float("inf")], 6.0)
+    assert never.verdict == "FAIL"
+    assert "worst never (1)" in never.found
+    assert "; 2 not counted" in judge_times("heal", [0.1], 6.0, deaf=2).found
+    assert judge_times("heal", [], 6.0).verdict == "-"
+
+
+def test_two_agents_use_each_other_once_both_say_so() -> None:
+    """One side is not enough, nor a status from before."""
+    monitor = SoakMonitor()
+    monitor.status(status("inv1", "inv2"), 1.0)
+    assert not monitor.use_each_other(["inv1"], ["inv1", "inv2"])
+    monitor.status(status("inv2", "inv1"), 2.0)
+
+    assert monitor.use_each_other(["inv1"], ["inv1", "inv2"])
+    assert not monitor.use_each_other(["inv1"], ["inv2"], since=1.5)
+    assert not monitor.none_uses("inv1", ["inv2"])
+
+
+def test_only_the_silence_of_agents_that_were_killed_is_explained() -> None:
+    """The check of last words may name them and nobody else; every other check has to pass."""
+    dead = Violation(text="sends nothing more", agent="inv3", t=12.0)
+    words = CheckVerdict(check="last_words", status="failed", violations=(dead,), count=1)
+    passed, failed = (CheckVerdict(check="heal", status=status) for status in ("passed", "failed"))
+
+    assert judge_checks((passed, words), [("inv3", 11.9)]).verdict == "PASS"
+    for verdicts, kills in (
+        ((passed, words), []),
+        ((passed, words), [("inv4", 11.9)]),
+        ((passed, words), [("inv3", 50.0)]),
+        ((passed, words), [("inv3", 11.9), ("inv3", 40.0)]),
+        ((failed, words), [("inv3", 11.9)]),
+        ((), []),
+    ):
+        assert judge_checks(verdicts, kills).verdict == "FAIL"
+
+
+def test_a_frequency_is_restored_once_it_holds() -> None:
+    """Out of its band at 1 s, in at 2 s for 0.2 s, and for good at 3 s: restored after 2 s; others do not count."""
+    monitor = SoakMonitor()
+    monitor.config(config("inv1", "GFM"))
+    monitor.config(config("inv2", "GFL"))
+
+    def f(t: float) -> float:
+        return 60.02 if 1.0 <= t < 2.0 or 2.2 <= t < 3.0 else 60.0
+
+    values = ((0.0,) * 5,) * 2
+    times = [round(0.1 * k, 9) for k in range(36)]
+    rows = tuple((t, f(t), *values[0], 50.0, *values[1]) for t in times)
+    monitor.telemetry(
+        Telemetry(
+            sender="plant", epoch=1, seq=1, t=3.5, inverters=("inv1", "inv2"), rows=rows, events=(), final=False,
+            outcome="", reproducible=False,
+        ),
+        9.0,
+    )  # fmt: skip
+
+    assert monitor.restorations == pytest.approx([2.0])
+    assert monitor.seconds_in_band == pytest.approx(0.5)
+    assert monitor.wall_time(4.0) == pytest.approx(9.5)
+
+
+def test_the_result_goes_between_its_lines_of_the_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The rest stays; a page without these lines is refused before anything starts, and so is an impossible length."""
+    page = tmp_path / "page.md"
+    page.write_text(f"before\n{command.BEGIN}\nold\n{command.END}\nafter\n<!-- end -->\n")
+    rows = table([judge_times("heal | told", [0.1], 6.0)])
+    command.write(page, rows)
+
+    assert page.read_text() == f"before\n{command.BEGIN}\n{rows}\n{command.END}\nafter\n<!-- end -->\n"
+    assert "| heal \\| told | under 6 s | 1: p50 0.10, p95 0.10, worst 0.10 s | PASS |" in rows
+    page.write_text("nothing")
+    for words, told in (
+        (["--write", str(page)], "page.md: has no lines <!-- python -m bench.soak --> and <!-- end -->"),
+        (["--write", str(tmp_path / "none.md")], "none.md: No such file or directory"),
+        (["--hours", "0"], "--hours: must be 0.00278 to 48, got 0"),
+        (["--keep", str(tmp_path)], "File exists; name a folder that does not exist yet"),
+    ):
+        with pytest.raises(SystemExit, match="2"):
+            command.main(words)
+        assert told in capsys.readouterr().err
