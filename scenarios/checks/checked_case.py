@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -22,7 +22,10 @@ from scenarios.schema.scenario_model import ScenarioModel
 from wire.messages import PlantEvent
 
 if TYPE_CHECKING:
+    from scenarios.checks.communication.communication_summary import CommunicationSummary
     from scenarios.checks.communication.record_content import RecordContent
+
+Read = TypeVar("Read")
 
 NEAR = 0.02
 """Part of its available power within which an inverter counts as at that limit."""
@@ -87,16 +90,27 @@ class CheckedCase:
         )
 
     @cached_property
+    def communication(self) -> CommunicationSummary:
+        """What one pass over the record, of any size, finds of messages and decisions; `NotJudgedError` without one."""
+        from scenarios.checks.communication.communication_summary import summarise
+
+        return self._of_record(summarise)
+
+    @cached_property
     def content(self) -> RecordContent:
         """States, decisions and accounts of links from the record; `NotJudgedError` where the run has none."""
         from scenarios.checks.communication.record_content import read_content
+
+        return self._of_record(read_content)
+
+    def _of_record(self, read: Callable[[Path], Read]) -> Read:
         from scenarios.record.record_file import RecordFileError
         from scenarios.record.record_info import FILE
 
         if self.folder is None or not (self.folder / FILE).exists():
             raise NotJudgedError("the run has no record run.mcap")
         try:
-            return read_content(self.folder / FILE)
+            return read(self.folder / FILE)
         except RecordFileError as error:
             raise NotJudgedError(str(error)) from error
 

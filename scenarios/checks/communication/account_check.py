@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from math import inf
+from collections.abc import Iterator
 from typing import Annotated
 
 from netem.ledger import LinkCounts
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.record_content import Link, RecordContent, SentState
-from scenarios.checks.communication.used_states import used_states
-from scenarios.record.journal_coverage import inside
-from wire.messages import PLANT
+from scenarios.checks.communication.communication_summary import CommunicationSummary
+from scenarios.checks.communication.link_accounts import Missing
+from scenarios.checks.communication.record_pass import Link
 from wire.schema.plausible import Plausible, Unit
 
 
@@ -28,49 +26,40 @@ class MessageAccount:
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the links whose account does not close."""
-        content = case.content
-        if content.unreadable:
-            yield Violation(
-                text="messages or parts of the record that cannot be read", value=content.unreadable, limit=0
-            )
-        links = 0
-        for link, counts in sorted(content.counts.items()):
-            links += 1
+        found = case.communication
+        if found.unreadable:
+            yield Violation(text="messages or parts of the record that cannot be read", value=found.unreadable, limit=0)
+        for link, counts in sorted(found.counts.items()):
             yield from _closes(link, counts)
-            yield from _all_judged(content, link)
-        for agent in content.agents:
-            for link, missing in self._missing(content, agent):
-                links += 1
-                if missing:
-                    yield Violation(
-                        text=f"states of {link[0]} neither heard nor lost", t=missing[0], agent=agent,
-                        value=len(missing), limit=0,
-                    )  # fmt: skip
-        if not links:
+            text = f"states of {link[0]} without a verdict of the emulated link"
+            yield from _missing(link, found.unjudged.get(link, Missing()), text)
+        links = self._without_account(found)
+        for agent in found.agents:
+            for link, missing in links.items():
+                if link[1] == agent:
+                    yield from _missing(link, missing, f"states of {link[0]} neither heard nor lost")
+        if not (found.counts or links):
             raise NotJudgedError("no agent listens to another")
 
-    def _missing(self, content: RecordContent, agent: str) -> Iterator[tuple[Link, list[float]]]:
-        """Yield the links to an agent, and when (s) states were sent there that are not accounted for."""
-        if content.simulated:
-            yield from _not_used(content, agent)
-            return
-        own: dict[int, list[float]] = {}
-        for state in content.of_agent(agent):
-            own.setdefault(state.epoch, []).append(state.t)
-        for link, arrived in sorted(content.heard.items()):
-            if link[1] == agent and link[0] != PLANT:
-                states = content.states.get(link[0], {})
-                spans = [(times[0], min(times[-1], content.t_end) - self.in_flight_s) for times in own.values()]
-                yield link, [t for span in spans for t in _not_arrived(states, arrived, span)]
+    def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
+        """Return what is missing on each link whose receiver keeps no account of it."""
+        if found.simulated:
+            return {link: missing for link, missing in found.unheard.items() if link not in found.counts}
+        return {link: self._not_arrived(found, link) for link in sorted(found.arrivals)}
+
+    def _not_arrived(self, found: CommunicationSummary, link: Link) -> Missing:
+        missing = Missing()
+        for epoch, account in sorted(found.arrivals[link].items()):
+            until = min(found.sent[link[1]].epochs[epoch][1], found.t_end) - self.in_flight_s
+            for t in (*[account.early.first] * account.early.count, *account.late.values()):
+                if t <= until:
+                    missing.add(t)
+        return missing
 
 
-def _not_arrived(
-    states: Mapping[tuple[int, int], SentState], arrived: Mapping[tuple[int, int], str], span: tuple[float, float]
-) -> list[float]:
-    """Return when (s) states were sent that did not arrive, from the first that did while a process was there."""
-    there = {key: state for key, state in states.items() if span[0] <= state.t <= span[1] and not state.quiet}
-    first = min((state.t for key, state in there.items() if key in arrived), default=inf)
-    return [state.t for key, state in there.items() if state.t >= first and key not in arrived]
+def _missing(link: Link, missing: Missing, text: str) -> Iterator[Violation]:
+    if missing.count:
+        yield Violation(text=text, t=missing.first, agent=link[1], value=missing.count, limit=0)
 
 
 def _closes(link: Link, counts: LinkCounts) -> Iterator[Violation]:
@@ -80,55 +69,3 @@ def _closes(link: Link, counts: LinkCounts) -> Iterator[Violation]:
     if not counts.closes:
         text = f"messages of {src} delivered, dropped or in flight, of {counts.sent + counts.duplicated} sent"
         yield Violation(text=text, agent=dst, value=found, limit=counts.sent + counts.duplicated)
-
-
-def _all_judged(content: RecordContent, link: Link) -> Iterator[Violation]:
-    """Yield the states between the first and the last verdict of a link that have none."""
-    src, dst = link
-    traces = content.traces.get(link, [])
-    judged = {number for trace in traces for number in trace.seq}
-    if not judged or src == PLANT or dst == PLANT or not content.simulated:
-        return
-    first, last = min(judged), max(judged)
-    there = {state.number for state in content.of_agent(dst)}
-    missing = [
-        state.t
-        for state in content.of_agent(src)
-        if first <= state.number <= last
-        and state.number not in judged
-        and not (state.quiet or state.idle)
-        and {state.number, state.number + 1} <= there
-    ]
-    if missing:
-        text = f"states of {src} without a verdict of the emulated link"
-        yield Violation(text=text, t=missing[0], agent=dst, value=len(missing), limit=0)
-
-
-def _not_used(content: RecordContent, agent: str) -> Iterator[tuple[Link, list[float]]]:
-    """Yield the links of simulated time without faults, and the decisions (s) without the state of the tick before.
-
-    The first decision of a process, and the first after a pause, have nothing from before.
-    """
-    for_neighbours, all_sent = {}, {}
-    for name, states in content.states.items():
-        for_neighbours[name] = {state.number for state in states.values() if not (state.quiet or state.idle)}
-        all_sent[name] = {state.number for state in states.values()}
-    own = {state.number for state in content.of_agent(agent) if not state.idle}
-    lost, T_c = content.holes.get(PLANT, ()), content.info.T_c
-    found: dict[Link, list[float]] = {}
-    for each in used_states(content, agent):
-        if each.link in content.counts:
-            continue
-        missing = found.setdefault(each.link, [])
-        sent, there = for_neighbours.get(each.link[0], set()), all_sent.get(each.link[0], set())
-        lag = None if each.number is None else each.states[0].number - each.number
-        if lag == 1 and {state.number - 1 for state in each.states} <= sent:
-            continue
-        for state in each.states:
-            before = state.number - 1
-            newer = before in sent and before in own and lag != 1
-            invented = lag is not None and not each.unused and state.number - lag not in there
-            invented = invented and not inside(lost, (state.number - (lag or 0)) * T_c)
-            if newer or invented:
-                missing.append(state.t)
-    yield from found.items()

@@ -10,7 +10,7 @@ import msgspec
 
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.record_content import RecordContent, SentState
+from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.emulation.emulation_config import EmulationConfig
 from wire.messages import PlantEvent
 from wire.schema.plausible import Plausible, Unit
@@ -30,20 +30,18 @@ class LastWords:
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the agents that stop without a reason."""
-        content = case.content
-        if not content.states:
+        found = case.communication
+        if not any(sent.epochs for sent in found.sent.values()):
             raise NotJudgedError("the record has no states of agents")
         joining = {name for event in case.scenario.events for name in event.join}
-        killed = _killed(content)
-        end = min(float(case.history.t[-1]), content.t_end)
-        for agent in content.agents:
-            epochs: dict[int, list[SentState]] = {}
-            for state in content.of_agent(agent):
-                epochs.setdefault(state.epoch, []).append(state)
-            if not epochs and agent not in joining and content.info.driver != "live":
+        killed = _killed(found)
+        end = min(float(case.history.t[-1]), found.t_end)
+        for agent in found.agents:
+            sent = found.sent.get(agent)
+            epochs = sent.epochs if sent else {}
+            if not epochs and agent not in joining and found.info.driver != "live":
                 yield Violation(text="never sends a state", agent=agent, t=0.0)
-            for states in epochs.values():
-                last = states[-1].t
+            for _, last in epochs.values():
                 if last >= end - self.silent_s or self._explained(case, agent, last, killed):
                     continue
                 yield Violation(
@@ -66,9 +64,9 @@ def _ends(event: PlantEvent, agent: str) -> bool:
     return event.kind == "roster" and event.subject == agent and bool(_SAID.match(event.text))
 
 
-def _killed(content: RecordContent) -> dict[str, float]:
+def _killed(found: CommunicationSummary) -> dict[str, float]:
     """Return when (s) the scenario kills agents."""
-    for tree in (content.info.plant.links, *(config.links for config in content.info.agents)):
+    for tree in (found.info.plant.links, *(config.links for config in found.info.agents)):
         if not tree:
             continue
         try:

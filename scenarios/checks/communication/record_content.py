@@ -1,58 +1,25 @@
-"""What the checks of communication need of a record, taken in one pass over its file.
+"""All that a record has of messages and decisions, for checks of one's own: in memory, so of a record of some size.
 
-`RunRecord` makes every message and decision again, to explain single ones. Checks look at all of them, and only at who
-sent, heard and used which number. So this reads the entries of the journals as they stand.
+The checks that judge every run go through the record once instead (`communication_summary`), whatever its size.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import msgpack
-import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.emulation.link_reports import data_of
-from scenarios.record.decision_entries import is_periodic
-from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage, inside
-from scenarios.record.journal_reader import values_of
-from scenarios.record.record_file import RecordFile
+from scenarios.checks.communication.record_pass import Link, SentState, opened, read_into
+from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
-from wire.bounds import LIMIT
-from wire.codec import sound
 from wire.journal import Decision
-from wire.journal_keys import kind_of, name_of
-from wire.messages import PLANT, Journal, LinkReport, State
-from wire.timing.clock import time_of
 
 MOST_BYTES = 64_000_000
-"""Largest record that is read for a verdict: some ten minutes of nine agents, which take ten seconds."""
-
-Link = tuple[str, str]
-"""Sender and receiver."""
-
-
-class SentState(NamedTuple):
-    """A state that an agent sent."""
-
-    number: int
-    """Its number."""
-    t: float
-    """Run time (s)."""
-    epoch: int
-    """Epoch of its process."""
-    idle: bool
-    """Whether the agent decided nothing: it was paused, or had no measurement."""
-    quiet: bool
-    """Whether it was not for the neighbours: its law kept its last state in force."""
+"""Largest record that is taken into memory: some ten minutes of nine agents."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -99,26 +66,6 @@ class RecordContent:
     def _in_order(self) -> dict[str, list[SentState]]:
         return {agent: sorted(of.values(), key=lambda state: state.t) for agent, of in self.states.items()}
 
-    def segments(self, agent: str) -> Iterator[tuple[Decision, list[SentState]]]:
-        """Yield how an agent decided, each with the states that came out: not those in which it was idle."""
-        holes = self.holes.get(agent, ())
-        own = [state for state in self.of_agent(agent) if not (state.idle or inside(holes, state.t))]
-        entries = self.decisions.get(agent, [])
-        if self.simulated:
-            ticks = [entry.tick for _, entry in entries]
-            parts: list[list[SentState]] = [[] for _ in entries]
-            for state in own:
-                at = bisect_right(ticks, state.number) - 1
-                if at >= 0:
-                    parts[at].append(state)
-            yield from ((entry, part) for (_, entry), part in zip(entries, parts, strict=True) if part)
-            return
-        known = self.states.get(agent, {})
-        for epoch, entry in entries:
-            sent = known.get((epoch, entry.tick))
-            if sent is not None and not sent.idle:
-                yield entry, [sent]
-
 
 def read_content(path: Path) -> RecordContent:
     """Read the file of a record.
@@ -126,137 +73,60 @@ def read_content(path: Path) -> RecordContent:
     Raises
     ------
     NotJudgedError
-        If it has no messages and decisions, or is too large for a verdict.
+        If it has no messages and decisions, or is too large for the memory.
     RecordFileError
         If it is none.
     """
-    file = RecordFile(path)
-    if file.info.level == "physics":
-        raise NotJudgedError('the run was recorded with record = "physics", without decisions')
+    file, all_of_it = opened(path), _Content()
     if (size := path.stat().st_size) > MOST_BYTES:
         raise NotJudgedError(
-            f"its record has {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are read"
+            f"its record has {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are taken into memory"
         )
-    return _Pass(file).content()
+    end = read_into(file, all_of_it)
+    simulated = file.info.clock == "simulated"
+    return RecordContent(
+        info=file.info,
+        t_end=file.t_end,
+        states=all_of_it.states,
+        decisions={agent: _in_order(of, simulated=simulated) for agent, of in all_of_it.decisions.items()},
+        holes=end.holes,
+        heard=all_of_it.arrivals,
+        counts=all_of_it.last_counts,
+        traces=all_of_it.traces,
+        unreadable=end.unreadable,
+        complete=file.complete,
+    )
 
 
-class _Pass:
-    """One pass over the file of a record."""
+class _Content:
+    """Keeps all of a record."""
 
-    def __init__(self, file: RecordFile) -> None:
-        self._file, self._info = file, file.info
-        self._states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
-        self._decisions: dict[str, dict[tuple[int, int], Decision]] = defaultdict(dict)
-        self._coverage: dict[str, JournalCoverage] = {}
-        self._heard: dict[Link, dict[tuple[int, int], str]] = defaultdict(dict)
-        self._counts: dict[Link, LinkCounts] = {}
-        self._traces: dict[Link, list[LinkTrace]] = defaultdict(list)
-        self._unreadable = 0
-        fields = self._info.fields.get(State.__name__, ())
-        self._places = {name: fields.index(name) for name in _VALUES if name in fields}
+    def __init__(self) -> None:
+        self.states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
+        self.decisions: dict[str, dict[tuple[int, int], Decision]] = defaultdict(dict)
+        self.arrivals: dict[Link, dict[tuple[int, int], str]] = defaultdict(dict)
+        self.last_counts: dict[Link, LinkCounts] = {}
+        self.traces: dict[Link, list[LinkTrace]] = defaultdict(list)
 
-    def content(self) -> RecordContent:
-        for record in self._file.messages(("journal", "link_reports")):
-            message = sound(record.data)
-            if isinstance(message, Journal):
-                ticks: list[int] = []
-                for entry in _raw_entries(message.data):
-                    self._take(message, entry)
-                    if entry[0] in ("decision", "exchange"):
-                        ticks.append(entry[1])
-                self._cover(message, ticks)
-            elif isinstance(message, LinkReport):
-                self._report(message)
-            else:
-                self._unreadable += 1
-        return RecordContent(
-            info=self._info,
-            t_end=self._file.t_end,
-            states=self._states,
-            decisions={agent: self._in_order(of) for agent, of in self._decisions.items()},
-            holes=self._holes(),
-            heard=self._heard,
-            counts=self._counts,
-            traces=self._traces,
-            unreadable=self._unreadable + len(self._file.damage),
-            complete=self._file.complete,
-        )
+    def state(self, agent: str, state: SentState) -> None:
+        self.states[agent].setdefault((state.epoch, state.number), state)
 
-    def _in_order(self, of: dict[tuple[int, int], Decision]) -> list[tuple[int, Decision]]:
-        entries = [(epoch, decision) for (epoch, _), decision in of.items()]
-        return sorted(entries, key=lambda each: each[1].tick) if self._info.clock == "simulated" else entries
+    def decision(self, agent: str, epoch: int, decision: Decision) -> None:
+        self.decisions[agent][epoch, decision.tick] = decision
 
-    def _cover(self, journal: Journal, ticks: list[int]) -> None:
-        """Note which part of a journal is there, and the ticks of which it tells."""
-        name = journal.sender
-        if name not in self._coverage:
-            self._coverage[name] = JournalCoverage(periodic=is_periodic(self._info, name))
-        T_c = self._info.T_c
-        times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
-        self._coverage[name].take(journal, lambda: times)
+    def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
+        self.arrivals[link][epoch, number] = rejected
 
-    def _holes(self) -> dict[str, Sequence[Hole]]:
-        """Return the run times (s) between which it is not known how each node decided."""
-        if self._info.clock != "simulated":  # each entry tells all by itself
-            return {}
-        numbered, damaged = self._info.driver != "inprocess", self._file.holes
-        return {
-            name: [*each.holes(damaged, numbered=numbered), (each.known_until + INSTANT, inf)]
-            for name, each in self._coverage.items()
-        }
+    def counts(self, link: Link, counts: LinkCounts) -> None:
+        self.last_counts[link] = counts
 
-    def _take(self, journal: Journal, entry: Any) -> None:
-        kind = entry[0]
-        if kind == "exchange":
-            for raw in entry[3]:
-                self._state(raw)
-        elif (
-            kind in ("sent", "received") and kind_of(entry[2]) in _STATE_KEYS and not (kind == "received" and entry[4])
-        ):
-            self._state(entry[3])
-        elif kind == "heard" and kind_of(entry[2]) == "state":
-            self._heard[name_of(entry[2]), journal.sender][entry[3], entry[4]] = entry[5]
-        elif kind == "decision" and journal.sender != PLANT:
-            decision = msgspec.convert(entry, Decision)
-            self._decisions[journal.sender][journal.epoch, decision.tick] = decision
+    def trace(self, trace: LinkTrace) -> None:
+        self.traces[trace.src, trace.dst].append(trace)
 
-    def _state(self, raw: Any) -> None:
-        if isinstance(raw, bytes):
-            values = values_of(raw)
-        else:
-            values = {name: raw[place] for name, place in self._places.items()}
-        try:
-            state = SentState(
-                int(values["seq"]), float(values["t"]), int(values["epoch"]),
-                bool(values.get("idle")), bool(values.get("quiet")),
-            )  # fmt: skip
-            self._states[str(values["sender"])].setdefault((state.epoch, state.number), state)
-        except (KeyError, TypeError, ValueError):
-            self._unreadable += 1
-
-    def _report(self, report: LinkReport) -> None:
-        try:
-            data = data_of(report)
-        except msgspec.MsgspecError:
-            self._unreadable += 1
-            return
-        self._counts |= {(src, report.sender): counts for src, counts in data.counts.items()}
-        for trace in data.traces:
-            self._traces[trace.src, trace.dst].append(trace)
+    def known_until(self, agent: str, t: float) -> None:
+        """Do nothing: the end of the pass tells all of it."""
 
 
-_VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")
-"""Values of a state that checks need."""
-
-_STATE_KEYS = ("state", "set_points")
-"""First parts of the keys of states; one that is not for the neighbours has a key of its own."""
-
-
-def _raw_entries(data: bytes) -> Iterator[list[Any]]:
-    """Yield the entries of a part of a journal as lists, up to where they cannot be read."""
-    unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
-    unpacker.feed(data)
-    try:
-        yield from unpacker
-    except (msgpack.UnpackException, ValueError, RecursionError):
-        return
+def _in_order(of: dict[tuple[int, int], Decision], *, simulated: bool) -> list[tuple[int, Decision]]:
+    entries = [(epoch, decision) for (epoch, _), decision in of.items()]
+    return sorted(entries, key=lambda each: each[1].tick) if simulated else entries

@@ -14,6 +14,7 @@ from plant.plant_config import PlantSettings
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
+from wire.messages import PlantEvent
 from wire.schema.plausible import Plausible, Unit
 
 _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
@@ -91,7 +92,7 @@ def _rows(case: CheckedCase) -> list[int]:
     for window in case.windows:
         inside = np.flatnonzero(window.rows(t))
         found += [int(inside[inside.size // 2]), int(inside[-1])] if inside.size else []
-    untold = min((e.t for e in case.events if e.kind == "load" and set_power(e.text) is None), default=inf)
+    untold = min((e.t for e in case.events if e.kind == "load" and _power_of(e) is None), default=inf)
     if untold < inf and not any(t[row] <= untold for row in found):
         raise NotJudgedError("loads were changed in the run, and its events do not say to which power")
     return [row for row in found if t[row] <= untold] or [len(t) - 1]
@@ -102,9 +103,14 @@ def _state_at(case: CheckedCase, t: float) -> NetworkState:
     powers = {
         event.subject: S
         for event in case.events
-        if event.kind == "load" and event.t < t - 1e-9 and (S := set_power(event.text)) is not None
+        if event.kind == "load" and event.t < t - 1e-9 and (S := _power_of(event)) is not None
     }
     return NetworkState(_closed_at(case, t), frozenset(powers.items()))
+
+
+def _power_of(event: PlantEvent) -> complex | None:
+    """Return the power (VA, nominal) of a load from its event on; of a table of events, by its words."""
+    return set_power(event.text) if event.P is None or event.Q is None else complex(event.P, event.Q)
 
 
 def _closed_at(case: CheckedCase, t: float) -> frozenset[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ import gridpeers as gp
 from scenarios.checks.check_registry import chosen_checks
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.communication.communication_summary import SummaryPass
 from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.judging import judge_case
 from scenarios.results.history import History
@@ -37,10 +38,30 @@ def changed(case: CheckedCase, edit: Callable[[dict[str, np.ndarray[Any, Any]]],
     return replace(case, history=History(inverters=case.history.inverters, **arrays))
 
 
-def with_content(case: CheckedCase, content: RecordContent) -> CheckedCase:
-    """A case whose record has something else in it."""
+def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0) -> CheckedCase:
+    """A case whose record has something else in it, in the order of time; of agents' journals, some time (s) late."""
     other = replace(case)
-    other.__dict__["content"] = content
+    sums = SummaryPass(content.info, content.t_end, content.holes)
+    of: dict[tuple[str, int, int], float] = {}
+    entries: list[tuple[float, int, Callable[[], None]]] = []
+    for agent, states in content.states.items():
+        for key, state in states.items():
+            of[agent, *key] = state.t
+            entries.append((state.t, 1, partial(sums.state, agent, state)))
+    for agent, decisions in content.decisions.items():
+        for epoch, decision in decisions:
+            t = decision.tick * content.info.T_c if content.simulated else of.get((agent, epoch, decision.tick), 0.0)
+            entries.append((t + late, 0, partial(sums.decision, agent, epoch, decision)))
+    for link, heard in content.heard.items():
+        for (epoch, number), why in heard.items():
+            entries.append((of[link[0], epoch, number] + late, 2, partial(sums.heard, link, epoch, number, why)))
+    for traces in content.traces.values():
+        entries += [(trace.t[-1] + late if trace.t else 0.0, 3, partial(sums.trace, trace)) for trace in traces]
+    for _, _, take in sorted(entries, key=lambda entry: entry[:2]):
+        take()
+    for link, counts in content.counts.items():
+        sums.counts(link, counts)
+    other.__dict__["communication"] = sums.finish(content.unreadable)
     return other
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from dataclasses import replace
 from typing import Any
 
@@ -9,15 +10,28 @@ import msgspec
 import pytest
 
 import gridpeers as gp
+from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.communication import record_content
+from scenarios.checks.communication.communication_summary import SummaryPass
+from scenarios.checks.communication.link_accounts import MOST, ArrivalAccounts
 from scenarios.checks.communication.record_content import RecordContent
+from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.sent_states import SentStates
+from scenarios.checks.communication.state_window import StateWindow
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
+from wire.journal import Decision
 
 COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
 
 LOSSY = (("case.IV.link", repr([{"on": "* <-> *", "loss": 0.2, "delay": 0.03}])),)
 CUT = (("case.IV.link", repr([{"on": "inv2 <-> *", "cut": True, "from_s": 2.0, "to_s": 2.16}])), ("time.end_s", "5.0"))
+QUIET = (("law", repr({"use": "event-triggered"})), ("case.IV.link", repr([{"on": "* <-> inv2", "loss": 0.1}])))
 KILLED = (("node", repr([{"name": "inv2", "kill": True, "from_s": 2.0}])), ("time.end_s", "5.0"))
+
+NAMES = ("inv1", "inv2", "inv3")
+
+Changes = tuple[tuple[str, str], ...]
 
 
 @pytest.fixture(scope="module")
@@ -251,3 +265,109 @@ def test_in_real_time_nothing_is_missed_while_the_receiver_is_away(sound: Checke
     other = replace(content, states=dict(content.states) | {"inv2": states}, heard={("inv1", "inv2"): arrived})
 
     assert verdict(with_content(sound, other), "message_account").status == "passed"
+
+
+# ---------------------------------------------------------------- records of any size, and out of order
+
+
+@pytest.mark.parametrize("changes", [LOSSY, CUT, QUIET], ids=["loss", "cut", "quiet"])
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_journals_that_come_late_change_no_verdict(check: str, changes: Changes) -> None:
+    """Decisions and verdicts of links come into a record a while after the states that they are about."""
+    case = ran_with(changes).checked_case
+    at_once, late = (with_content(case, case.content, late=late) for late in (0.0, 2.0))
+
+    assert verdict(at_once, check) == verdict(late, check) == verdict(case, check)
+
+
+def test_in_real_time_journals_that_come_late_change_no_account(sound: CheckedCase) -> None:
+    """Nor do arrivals; a state that did not arrive is missing all the same."""
+    content = in_real_time(sound)
+    arrived = {key: "" for key, state in content.states["inv1"].items() if state.number % 50}
+    wrong = replace(content, heard=dict(content.heard) | {("inv1", "inv2"): arrived})
+    at_once, late = (with_content(sound, wrong, late=late) for late in (0.0, 2.0))
+
+    assert verdict(at_once, "message_account") == verdict(late, "message_account")
+    assert [one.value for one in verdict(late, "message_account").violations] == [5.0]
+
+
+def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is too much for the memory of a check of one's own is no reason not to judge a run."""
+    monkeypatch.setattr(record_content, "MOST_BYTES", 1000)
+    large = replace(sound)
+
+    assert verdict(large, "message_account").status == "passed"
+    with pytest.raises(NotJudgedError, match="more than the 0 MB that are taken into memory"):
+        _ = large.content
+
+
+@pytest.mark.parametrize("clock", ["simulated", "wall"])
+def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clock: str) -> None:
+    """Three times the run, the same memory: what is done with is forgotten."""
+    info = sound.content.info
+    info = msgspec.structs.replace(info, plant=msgspec.structs.replace(info.plant, clock=clock))
+
+    def memory(ticks: int) -> int:
+        tracemalloc.start()
+        sums = SummaryPass(info, ticks * info.T_c)
+        for number in range(ticks):
+            for agent in NAMES:
+                sums.state(agent, SentState(number, number * info.T_c, 1, idle=False, quiet=number % 3 == 1))
+                said = [2, 1] if clock == "simulated" else [number - 1, number]
+                sums.decision(agent, 1, Decision(number, 0, [n for n in NAMES if n != agent], said, [], []))
+                for other in NAMES:
+                    if other != agent and number % 3 != 1:
+                        sums.heard((other, agent), 1, number, "")
+        size, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert sums.finish(0).used
+        return size
+
+    assert memory(4500) < 1.1 * memory(1500)
+
+
+def test_numbers_of_a_later_process_are_not_those_of_an_earlier_one() -> None:
+    """In wall-clock time every process counts anew: who is asked about a time gets the one that was there."""
+    sent = SentStates(simulated=False)
+    for epoch, since in ((1, 0.0), (2, 10.0)):
+        for number in range(100):
+            assert sent.put(SentState(number, since + 0.02 * number, epoch, idle=False, quiet=False))
+
+    assert sent.window_at(5.0).t(50) == pytest.approx(1.0)
+    assert sent.window_at(12.0).t(50) == pytest.approx(11.0)
+    assert sent.epochs == {1: (0.0, pytest.approx(1.98)), 2: (10.0, pytest.approx(11.98))}
+    assert not sent.put(SentState(50, 1.0, 1, idle=False, quiet=False)), "it came already"
+
+
+def test_a_state_is_kept_in_force_as_long_as_nothing_else_is_sent() -> None:
+    """By quiet states that follow it without a gap, however many they are; an idle or a lost one ends that."""
+    window = StateWindow()
+    for number in range(20_000):
+        if number != 60:
+            window.put(SentState(number, 0.02 * number, 1, idle=number == 40, quiet=number not in (5, 40, 80)))
+
+    assert window.kept_until(80) == 19_999
+    assert (window.kept_until(5), window.is_past(5)) == (5, True)
+    fresh = StateWindow()
+    for number in range(100):
+        if number != 60:
+            fresh.put(SentState(number, 0.02 * number, 1, idle=number == 40, quiet=number not in (5, 40, 80)))
+    assert [fresh.kept_until(number) for number in (5, 41, 80)] == [39, 59, 99]
+
+
+def test_what_never_arrives_is_counted_where_it_is_too_much_to_keep() -> None:
+    """The first and the number of them stay; the last ones stay one by one, as they may still arrive."""
+    sent = {name: SentStates(simulated=False) for name in NAMES}
+    accounts = ArrivalAccounts(sent)
+    accounts.heard(("inv1", "inv2"), 1, 0)
+    for number in range(MOST + 1000):
+        for name in NAMES:
+            state = SentState(number, 0.02 * number, 1, idle=False, quiet=False)
+            sent[name].put(state)
+            accounts.state(name, state)
+    accounts.flush(1e9)
+    account = accounts.accounts["inv1", "inv2"][1]
+
+    assert (account.early.count, account.early.first, len(account.late)) == (999, pytest.approx(0.02), MOST)
+    accounts.heard(("inv1", "inv2"), 1, MOST + 500)
+    assert len(account.late) == MOST - 1

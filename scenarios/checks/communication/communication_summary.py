@@ -1,0 +1,233 @@
+"""What the checks of communication need of a record: counters, found in one pass over its file.
+
+The memory of the pass does not grow with the length of the run: of each agent it keeps its last states and decisions,
+of each link counters, and the numbers of messages that are still on their way. Journals of different nodes come into a
+record with a delay; so a decision is looked at a while after its run time, once all that it came of is there.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import inf
+from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
+
+from netem.ledger import LinkCounts, LinkTrace
+from scenarios.checks.communication.heals import Heal, Heals
+from scenarios.checks.communication.link_accounts import (
+    ArrivalAccount,
+    ArrivalAccounts,
+    Missing,
+    TickAccounts,
+    VerdictAccounts,
+)
+from scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
+from scenarios.checks.communication.record_pass import Link, SentState, opened, read_into
+from scenarios.checks.communication.sent_states import SentStates
+from scenarios.record.journal_coverage import Hole
+from scenarios.record.record_info import RecordInfo
+from wire.journal import Decision
+from wire.messages import PLANT
+
+DELAY_TICKS, DELAY = 300, 5.0
+"""How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100
+ticks at the latest; seconds of wall-clock time, where it comes every 0.2 s."""
+
+
+class OldestUse(NamedTuple):
+    """The oldest value of a neighbour that an agent used."""
+
+    age: float
+    """Its age (s); infinite if there was none."""
+    t: float
+    """Run time of the decision (s)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class CommunicationSummary:
+    """Accounts of links, ages of values, heals, and the last states of each agent."""
+
+    info: RecordInfo
+    """The run."""
+    t_end: float
+    """Latest run time in the record (s)."""
+    unreadable: int
+    """Messages and reports that could not be read."""
+    sent: Mapping[str, SentStates]
+    """States of each agent: when its processes spoke first and last."""
+    counts: Mapping[Link, LinkCounts]
+    """Last account of each emulated link."""
+    unjudged: Mapping[Link, Missing]
+    """Simulated time: states without a verdict of their emulated link."""
+    unheard: Mapping[Link, Missing]
+    """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
+    arrivals: Mapping[Link, Mapping[int, ArrivalAccount]]
+    """Wall-clock time: what came over each link, by the epoch of the receiver's process."""
+    oldest: Mapping[Link, OldestUse]
+    """The oldest value that was used of each link."""
+    used: bool
+    """Whether a decision used a neighbour's value."""
+    heals: list[Heal]
+    """Ends of cuts."""
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the run kept simulated time."""
+        return self.info.clock == "simulated"
+
+    @property
+    def agents(self) -> tuple[str, ...]:
+        """All configured agents."""
+        return tuple(config.name for config in self.info.agents)
+
+
+def summarise(path: Path) -> CommunicationSummary:
+    """Go through the file of a record once; twice if parts of it are lost.
+
+    Raises
+    ------
+    NotJudgedError
+        If it has no messages and decisions.
+    RecordFileError
+        If it is none.
+    """
+    file = opened(path)
+    sums = SummaryPass(file.info, file.t_end)
+    end = read_into(file, sums)
+    if any(end.lost.values()):  # it is damaged: what is lost is known now, and left out the second time
+        sums = SummaryPass(file.info, file.t_end, end.lost)
+        read_into(opened(path), sums)
+    return sums.finish(end.unreadable)
+
+
+class SummaryPass:
+    """One pass over a record; a `RecordSink`.
+
+    Parameters
+    ----------
+    info
+        The run.
+    t_end
+        Latest run time in the record (s).
+    lost
+        Simulated time: run times (s) between which parts of a node's journal are lost.
+    """
+
+    def __init__(
+        self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
+    ) -> None:
+        self._info, self._t_end, self._lost = info, t_end, lost
+        self._simulated = simulated = info.clock == "simulated"
+        self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * max(1.0, info.plant.speed)
+        self._names = frozenset(config.name for config in info.agents)
+        self._sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
+        self._decided: dict[str, DecidedTicks | DecidedStates] = {}
+        self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
+        self._verdicts = VerdictAccounts(self._sent)
+        self._arrivals, self._heals = ArrivalAccounts(self._sent), Heals(info, t_end, self._sent)
+        self._counts: dict[Link, LinkCounts] = {}
+        self._oldest: dict[Link, OldestUse] = {}
+        self._used = False
+        self._t = self._flushed = 0.0
+
+    def state(self, agent: str, state: SentState) -> None:
+        """Take a state that an agent sent."""
+        if agent not in self._names or not self._sent[agent].put(state):
+            return
+        self._of(agent).state(state)
+        if self._simulated:
+            self._ticks.state(agent, state)
+        else:
+            self._arrivals.state(agent, state)
+        self._t = max(self._t, state.t)
+        if self._t > self._flushed + 1.25 * self._delay:
+            self._flush(self._t - self._delay)
+
+    def decision(self, agent: str, epoch: int, decision: Decision) -> None:
+        """Take how an agent decided."""
+        if agent in self._names:
+            self._of(agent).decision(epoch, decision)
+
+    def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
+        """Take a state that arrived in wall-clock time."""
+        if not self._simulated and self._names.issuperset(link):
+            self._arrivals.heard(link, epoch, number)
+
+    def counts(self, link: Link, counts: LinkCounts) -> None:
+        """Take the account of an emulated link up to now."""
+        self._counts[link] = counts
+
+    def trace(self, trace: LinkTrace) -> None:
+        """Take further verdicts of an emulated link."""
+        self._heals.trace(trace)
+        if self._simulated:
+            self._verdicts.trace(trace)
+
+    def known_until(self, agent: str, t: float) -> None:
+        """Take the run time (s) up to which it is known how an agent decided."""
+        if agent in self._names and isinstance(decided := self._of(agent), DecidedTicks):
+            decided.known_until = t
+
+    def finish(self, unreadable: int) -> CommunicationSummary:
+        """Return what was found, once the record is at its end."""
+        self._flush(inf)
+        return CommunicationSummary(
+            info=self._info,
+            t_end=self._t_end,
+            unreadable=unreadable,
+            sent=self._sent,
+            counts=self._counts,
+            unjudged=self._verdicts.missing() if self._simulated else {},
+            unheard=self._ticks.missing,
+            arrivals=self._arrivals.accounts,
+            oldest=self._oldest,
+            used=self._used,
+            heals=self._heals.found(),
+        )
+
+    def _of(self, agent: str) -> DecidedTicks | DecidedStates:
+        if agent not in self._decided:
+
+            def tell(state: SentState, uses: Uses, new: bool) -> None:
+                self._use(agent, state, uses, new=new)
+
+            T_c = self._info.T_c
+            if self._simulated:
+                self._decided[agent] = DecidedTicks(agent, T_c, tell, self._lost.get(agent, ()))
+            else:
+                self._decided[agent] = DecidedStates(agent, T_c, self._sent[agent].window_of, tell)
+        return self._decided[agent]
+
+    def _flush(self, until: float) -> None:
+        self._flushed = until
+        for decided in self._decided.values():
+            decided.flush(until)
+        if not self._simulated:
+            self._arrivals.flush(until)
+
+    def _use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
+        """Look at the states of neighbours that an own state came of."""
+        if new:
+            for use in uses.each:
+                if not use.unused:
+                    self._used = True
+                    self._note_age(state, use)
+        if self._simulated:
+            self._ticks.use(agent, state, uses, new=new)
+        self._heals.use(agent, state, uses, new=new)
+
+    def _note_age(self, state: SentState, use: NeighbourUse) -> None:
+        """Note the age of a value, counted from the last tick at which its sender kept it in force."""
+        before = self._oldest.get(use.link, OldestUse(0.0, 0.0)).age
+        age = inf if use.age is None else use.age
+        if age <= before:
+            return
+        number = use.number_at(state.number)
+        if use.age is not None and number is not None:
+            kept = self._sent[use.link[0]].window_at(state.t).kept_until(number)
+            age = max(0.0, age - (kept - number) * self._info.T_c)
+        if age > before:
+            self._oldest[use.link] = OldestUse(age, state.t)

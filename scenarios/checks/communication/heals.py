@@ -1,0 +1,122 @@
+"""How soon agents that a cut parted use each other's values again, found while a pass over a record goes on."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import msgspec
+
+from netem.ledger import LinkTrace
+from netem.schema.pattern import Link as LinkEnds
+from scenarios.checks.communication.neighbour_use import Uses
+from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.sent_states import SentStates
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_info import RecordInfo
+
+CUTS = ("cut", "partition")
+"""Faults with an end, and reasons of dropped messages, that part two agents."""
+
+
+@dataclass
+class Heal:
+    """The end of a cut of one link."""
+
+    link: Link
+    t: float
+    """When (s)."""
+    took: float | None = None
+    """After what time (s) the receiver used something that the sender has sent since; None if it never did."""
+
+
+class Heals:
+    """The heals of all links over which agents listen.
+
+    Parameters
+    ----------
+    info
+        The run; it has the planned cuts.
+    t_end
+        Latest run time in the record (s).
+    sent
+        States of each agent.
+    """
+
+    def __init__(self, info: RecordInfo, t_end: float, sent: Mapping[str, SentStates]) -> None:
+        self._sent = sent
+        self._coming: dict[Link, deque[Heal]] = defaultdict(deque)
+        """Heals of each link, in the order of time."""
+        self._waiting: dict[str, list[Heal]] = defaultdict(list)
+        """Those that have happened, by receiver, after which nothing new has been used yet."""
+        self._healed: dict[Link, list[Heal]] = defaultdict(list)
+        self._known: set[tuple[Link, int]] = set()
+        self._was_cut: set[Link] = set()
+        self._listens: set[Link] = set()
+        self._receivers: set[str] = set()
+        """Receivers of links with a heal."""
+        for heal in sorted(_planned(info, t_end), key=lambda heal: heal.t):
+            self._add(heal)
+
+    def trace(self, trace: LinkTrace) -> None:
+        """Take verdicts of a link: the first message that gets through again is the end of a cut."""
+        link = trace.src, trace.dst
+        for t, outcome in zip(trace.t, trace.outcome, strict=True):
+            if outcome in CUTS:
+                self._was_cut.add(link)
+            elif link in self._was_cut:
+                self._was_cut.discard(link)
+                self._add(Heal(link, t))
+
+    def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
+        """Note the states that an own state came of."""
+        if new:
+            self._listens.update(use.link for use in uses.each)
+        if agent not in self._receivers:
+            return
+        for use in uses.each:
+            coming = self._coming.get(use.link)
+            while coming and coming[0].t <= state.t:
+                self._waiting[agent].append(coming.popleft())
+        waiting = self._waiting[agent]
+        if not waiting:
+            return
+        number = {use.link: use.number_at(state.number) for use in uses.each if use.unused not in ("silent", "stale")}
+        for heal in waiting:
+            used = number.get(heal.link)
+            sent_at = None if used is None else self._sent[heal.link[0]].window_at(state.t).t(used)
+            if sent_at is not None and sent_at >= heal.t - 1e-9:
+                heal.took = state.t - heal.t
+        self._waiting[agent] = [heal for heal in waiting if heal.took is None]
+
+    def found(self) -> list[Heal]:
+        """Return the heals of links over which an agent listens, in the order of links and time."""
+        return [heal for link in sorted(self._listens) for heal in sorted(self._healed[link], key=lambda one: one.t)]
+
+    def _add(self, heal: Heal) -> None:
+        key = heal.link, round(1e3 * heal.t)
+        if key in self._known:
+            return
+        self._known.add(key)
+        self._receivers.add(heal.link[1])
+        self._healed[heal.link].append(heal)
+        coming = self._coming[heal.link]
+        coming.append(heal)
+        if len(coming) > 1 and coming[-2].t > heal.t:
+            self._coming[heal.link] = deque(sorted(coming, key=lambda one: one.t))
+
+
+def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
+    """Yield the ends of the cuts that the scenario plans."""
+    names = [config.name for config in info.agents]
+    for tree in (config.links for config in info.agents if config.links):
+        try:
+            setup = EmulationConfig.of_tree(tree)
+        except msgspec.ValidationError:
+            continue
+        for link in ((src, dst) for src in names for dst in names if src != dst):
+            for span in setup.netem.spans(LinkEnds(*link), setup.microgrids):
+                if span.kind in CUTS and span.to_s < t_end:
+                    yield Heal(link, span.to_s)
+        return

@@ -1,0 +1,200 @@
+"""Accounts of what was sent over links, kept while a pass over a record goes on: what is missing, and since when."""
+
+from __future__ import annotations
+
+from collections import defaultdict, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf
+
+from netem.ledger import LinkTrace
+from scenarios.checks.communication.neighbour_use import Uses
+from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.sent_states import SentStates
+from scenarios.record.journal_coverage import Hole, inside
+from wire.messages import PLANT
+
+WAIT = 1000
+"""Verdicts of an emulated link after which a state without one has none: a link judges what it gets at once."""
+
+MOST = 6000
+"""Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
+
+
+@dataclass
+class Missing:
+    """States that are missing on a link."""
+
+    count: int = 0
+    """Number of them."""
+    first: float = 0.0
+    """Run time of the first one (s)."""
+
+    def add(self, t: float) -> None:
+        """Count one, of a run time (s)."""
+        if not self.count:
+            self.first = t
+        self.count += 1
+
+
+class TickAccounts:
+    """Simulated time without emulated links: every decision has the neighbours' states of the tick before."""
+
+    def __init__(self, sent: Mapping[str, SentStates], T_c: float, lost: Sequence[Hole] = ()) -> None:
+        self._sent, self._T_c, self._lost = sent, T_c, lost
+        self._spoken: dict[int, set[str]] = {}
+        """Agents that told their neighbours something, by tick."""
+        self.missing: dict[Link, Missing] = {}
+        """What each link over which an agent listens lacks."""
+
+    def state(self, agent: str, state: SentState) -> None:
+        """Note a state."""
+        if not (state.quiet or state.idle):
+            if state.number not in self._spoken:
+                self._spoken[state.number] = set()
+                if len(self._spoken) > WAIT:
+                    del self._spoken[next(iter(self._spoken))]
+            self._spoken[state.number].add(agent)
+
+    def use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
+        """Note the states that an own state came of."""
+        if new:
+            for use in uses.each:
+                self.missing.setdefault(use.link, Missing())
+        before = state.number - 1
+        if uses.last_tick is not None and uses.last_tick <= self._spoken.get(before, frozenset()):
+            return
+        own = self._sent[agent].window_at(state.t).decided(before)
+        for use in uses.each:
+            window = self._sent[use.link[0]].window_at(state.t)
+            spoke = window.spoke(before)
+            if use.ticks == 1 and spoke:
+                continue
+            newer = spoke and own and use.ticks != 1
+            number = use.number_at(state.number)
+            invented = number is not None and not use.unused and not (window.has(number) or window.is_past(number))
+            invented = invented and not inside(self._lost, (number or 0) * self._T_c)
+            if newer or invented:
+                self.missing[use.link].add(state.t)
+
+
+class VerdictAccounts:
+    """Simulated time with emulated links: every state between the first and the last verdict of a link has one."""
+
+    def __init__(self, sent: Mapping[str, SentStates]) -> None:
+        self._sent = sent
+        self._links: dict[Link, _Verdicts] = {}
+
+    def trace(self, trace: LinkTrace) -> None:
+        """Take verdicts of a link."""
+        link = trace.src, trace.dst
+        if PLANT in link or not trace.seq:
+            return
+        of = self._links.setdefault(link, _Verdicts(done=min(trace.seq) - 1))
+        of.ahead.update(number for number in trace.seq if number > of.done)
+        of.highest = max(of.highest, *trace.seq)
+        self._advance(link, of, of.highest - WAIT)
+
+    def missing(self) -> dict[Link, Missing]:
+        """Return the states without a verdict, by link, once all verdicts are there."""
+        for link, of in self._links.items():
+            self._advance(link, of, of.highest)
+        return {link: of.missing for link, of in self._links.items()}
+
+    def _advance(self, link: Link, of: _Verdicts, until: int) -> None:
+        src, dst = (self._sent[name].window_at(inf) for name in link)
+        while of.done < until:
+            of.done += 1
+            number = of.done
+            if number in of.ahead:
+                of.ahead.discard(number)
+            elif src.spoke(number) and dst.has(number) and dst.has(number + 1):
+                of.missing.add(src.t(number) or 0.0)
+
+
+@dataclass
+class _Verdicts:
+    """Verdicts of one link."""
+
+    done: int
+    """Number up to which all is decided."""
+    highest: int = -1
+    """Highest number with a verdict."""
+    ahead: set[int] = field(default_factory=set)
+    """Numbers with a verdict that are not decided yet."""
+    missing: Missing = field(default_factory=Missing)
+
+
+@dataclass
+class ArrivalAccount:
+    """Wall-clock time: what came over a link while one process of the receiver was there."""
+
+    began: bool = False
+    """Whether anything came."""
+    early: Missing = field(default_factory=Missing)
+    """States that did not come, of which only the number is kept."""
+    late: dict[tuple[int, int], float] = field(default_factory=dict)
+    """Run time (s) of the last ones, by epoch and number."""
+
+
+class ArrivalAccounts:
+    """Wall-clock time: every state that was sent arrives, from the first one on that does."""
+
+    def __init__(self, sent: Mapping[str, SentStates]) -> None:
+        self._sent = sent
+        self._states: dict[str, deque[SentState]] = defaultdict(deque)
+        self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
+        self._links_of: dict[str, list[Link]] = defaultdict(list)
+        self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=2))
+        """The last accounts of each link: what comes later than others did is still missing there."""
+        self.accounts: dict[Link, dict[int, ArrivalAccount]] = {}
+        """Accounts of each link, by the epoch of the receiver's process."""
+
+    def state(self, agent: str, state: SentState) -> None:
+        """Note a state."""
+        if not state.quiet:
+            self._states[agent].append(state)
+
+    def heard(self, link: Link, epoch: int, number: int) -> None:
+        """Note that a state has arrived."""
+        if link not in self._arrived:
+            self._arrived[link], self.accounts[link] = {}, {}
+            self._links_of[link[0]].append(link)
+        for account in self._open[link]:
+            if account.late and account.late.pop((epoch, number), None) is not None:
+                return
+        arrived = self._arrived[link]
+        arrived[epoch, number] = None
+        if len(arrived) > MOST:
+            del arrived[next(iter(arrived))]
+
+    def flush(self, until: float) -> None:
+        """Close the accounts of what was sent up to a run time (s), as far as it has come."""
+        for src, states in self._states.items():
+            links = self._links_of.get(src, ())
+            while states and states[0].t <= until:
+                state = states.popleft()
+                key = state.epoch, state.number
+                for link in links:
+                    arrived = self._arrived[link]
+                    came = key in arrived
+                    if came:
+                        del arrived[key]
+                    epoch = self._sent[link[1]].epoch_at(state.t)
+                    if epoch is None:
+                        continue
+                    account = self.accounts[link].get(epoch)
+                    if account is None:
+                        account = self.accounts[link][epoch] = ArrivalAccount()
+                        self._open[link].append(account)
+                    if came:
+                        account.began = True
+                    elif account.began:
+                        _miss(account, key, state.t)
+
+
+def _miss(account: ArrivalAccount, key: tuple[int, int], t: float) -> None:
+    account.late[key] = t
+    if len(account.late) > MOST:
+        oldest = next(iter(account.late))
+        account.early.add(account.late.pop(oldest))

@@ -1,0 +1,129 @@
+"""Which state of which neighbour an agent's decisions used, told in order while a pass over a record goes on."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+from math import inf
+from typing import NamedTuple
+
+from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.state_window import StateWindow
+from scenarios.record.journal_coverage import INSTANT, Hole, inside
+from wire.journal import Decision
+
+MOST = 20_000
+"""States of an agent that wait for its journal at most: it may be lost, and the agent go on."""
+
+
+class NeighbourUse(NamedTuple):
+    """A neighbour at one decision, or at several that treat it alike."""
+
+    link: Link
+    """The neighbour, and the agent."""
+    ticks: int | None
+    """Simulated time: age of its state (ticks); None if there was none."""
+    number: int | None
+    """Wall-clock time: number of its state; None if there was none."""
+    age: float | None
+    """Age of that state (s); None if there was none."""
+    unused: str
+    """Why it was left out (`wire.journal.UNUSED`); empty if it was used."""
+
+    def number_at(self, own: int) -> int | None:
+        """Return the number of the neighbour's state at the decision from which the own state `own` came."""
+        return self.number if self.ticks is None else own - self.ticks
+
+
+class Uses(NamedTuple):
+    """All neighbours at one decision, or at several that treat them alike."""
+
+    each: tuple[NeighbourUse, ...]
+    """Each neighbour."""
+    last_tick: frozenset[str] | None
+    """The neighbours, if the states of all are of the tick before; None else."""
+
+
+def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> Uses:
+    """Return the neighbours of an agent's decision."""
+    found = []
+    unused, weights, ages = decision.unused, decision.weights, decision.ages
+    for i, name in enumerate(decision.neighbours):
+        said = decision.states[i] if i < len(decision.states) else None
+        why = unused[i] if i < len(unused) else ""
+        if not why and i < len(weights) and weights[i] == 0.0:
+            why = "weight 0"
+        if simulated:
+            age = None if said is None else said * T_c
+            found.append(NeighbourUse((name, agent), said, None, age, why))
+        else:
+            found.append(NeighbourUse((name, agent), None, said, ages[i] if i < len(ages) else None, why))
+    alike = simulated and all(use.ticks == 1 for use in found)
+    return Uses(tuple(found), frozenset(decision.neighbours) if alike else None)
+
+
+TellUse = Callable[[SentState, Uses, bool], None]
+"""Takes a state of an agent that was not idle, the decision that it came out of, and whether that is a new one."""
+
+
+class DecidedTicks:
+    """The states of one agent in simulated time, each with the decision in force."""
+
+    def __init__(self, agent: str, T_c: float, tell: TellUse, holes: Sequence[Hole] = ()) -> None:
+        self._agent, self._T_c, self._tell, self._holes = agent, T_c, tell, holes
+        self.known_until = inf
+        """Run time (s) behind which it is not known yet how the agent decided."""
+        self._states: deque[SentState] = deque(maxlen=MOST)
+        self._coming: deque[Decision] = deque()
+        self._uses: Uses | None = None
+        self._new = False
+
+    def state(self, state: SentState) -> None:
+        """Note a state, in the order of their numbers."""
+        self._states.append(state)
+
+    def decision(self, epoch: int, decision: Decision) -> None:
+        """Note how the agent decides from a tick on."""
+        self._coming.append(decision)
+
+    def flush(self, until: float) -> None:
+        """Tell all states up to a run time (s), as far as it is known how the agent decided."""
+        until = min(until, self.known_until + INSTANT)
+        while self._states and self._states[0].t <= until:
+            state = self._states.popleft()
+            while self._coming and self._coming[0].tick <= state.number:
+                self._uses = uses_of(self._agent, self._coming.popleft(), self._T_c, simulated=True)
+                self._new = True
+            if self._uses is not None and not state.idle and not inside(self._holes, state.t):
+                self._tell(state, self._uses, self._new)
+                self._new = False
+
+
+class DecidedStates:
+    """The decisions of one agent in wall-clock time, each with the state that came out."""
+
+    def __init__(self, agent: str, T_c: float, window: Callable[[int], StateWindow | None], tell: TellUse) -> None:
+        self._agent, self._T_c, self._tell, self._window = agent, T_c, tell, window
+        self._decisions: deque[tuple[float, int, Decision]] = deque()
+        self._now = 0.0
+
+    def state(self, state: SentState) -> None:
+        """Note how far the agent is."""
+        self._now = max(self._now, state.t)
+
+    def decision(self, epoch: int, decision: Decision) -> None:
+        """Note a decision."""
+        self._decisions.append((self._now, epoch, decision))
+
+    def flush(self, until: float) -> None:
+        """Tell all decisions whose states are of before a run time (s); all that was sent by then is known."""
+        while self._decisions:
+            came, epoch, decision = self._decisions[0]
+            window = self._window(epoch)
+            t = None if window is None else window.t(decision.tick)
+            if (came if t is None else t) > until:
+                return
+            self._decisions.popleft()
+            if window is not None and t is not None and window.decided(decision.tick):
+                state = SentState(decision.tick, t, epoch, idle=False, quiet=False)
+                self._tell(state, uses_of(self._agent, decision, self._T_c, simulated=False), True)
