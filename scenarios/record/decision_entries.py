@@ -12,7 +12,7 @@ from collections import defaultdict
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
-from scenarios.record.journal_coverage import Hole, JournalCoverage, inside
+from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage, inside
 from scenarios.record.message_index import MessageIndex
 from scenarios.record.record_info import RecordInfo
 from wire.journal import Decision, Exchange
@@ -75,6 +75,18 @@ class DecisionEntries:
                 found = sorted({*found, *((since, until + later) for since, until in self.holes(PLANT))})
             self._holes[node] = found
         return self._holes[node]
+
+    def lost_at(self, agent: str, t: float, last: float | None) -> bool:
+        """Return whether the decision of an agent in force at a run time (s) is lost.
+
+        `last` is the run time (s) of its last one up to then that is there; None if there is none. A decision is in
+        force for a control period.
+        """
+        T_c = self._info.T_c
+        at = time_of(int(t / T_c + 1e-6), T_c) if self._simulated else t - T_c + INSTANT
+        return any(
+            begin < at <= until and (last is None or last <= begin + INSTANT) for begin, until in self.holes(agent)
+        )
 
     # ---------------------------------------------------------------- inner
 

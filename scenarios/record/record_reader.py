@@ -28,7 +28,6 @@ from scenarios.short_names import short
 from wire.journal import Entry
 from wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
 from wire.schema.suggestion import suggestion
-from wire.timing.clock import time_of
 
 __all__ = ["RecordFileError", "RunRecord"]
 
@@ -174,8 +173,8 @@ class RunRecord:
             Type of the messages, such as "State" or "Measurement"; by default all.
         """
         _check_times(since=since, until=until)
-        if not isinstance(sender, str | None):
-            raise RecordFileError(f'sender: needs the name of an agent, or "plant", got {sender!r:.60}')
+        if sender is not None:
+            _check_name("sender", sender)
         if kind is not None and kind not in KINDS:
             raise RecordFileError(f"kind: no message is a {kind!r:.60}; {suggestion(str(kind), KINDS, 'types')}")
         return self._index.messages(sender, since, until, kind)
@@ -200,6 +199,7 @@ class RunRecord:
 
         An entry has no run time of its own: `since` and `until` (s) choose the parts of the journal, of 0.2 s or so.
         """
+        _check_name("node", node)
         _check_times(since=since, until=until)
         return self._index.entries(node, since, until)
 
@@ -267,9 +267,7 @@ class RunRecord:
         while found is None and back < 4.0 * (t + 1.0):
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
             back *= 4.0
-        T_c = self.info.T_c
-        at = time_of(int(t / T_c + 1e-6), T_c) if self.info.clock == "simulated" else t
-        if any(a < at <= b and (found is None or found.t <= a + 1e-9) for a, b in self.holes(agent)):
+        if self._decisions.entries.lost_at(agent, t, None if found is None else found.t):
             raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self._lost()}")
         if found is None:
             raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{self._first(agent)}")
@@ -287,6 +285,12 @@ class RunRecord:
     def _require(self, agent: object) -> None:
         if agent != "plant" and agent not in self.agents:
             raise RecordFileError(f"{self.path}: there was no agent {agent!s:.64}; agents are {short(self.agents)}")
+
+
+def _check_name(argument: str, name: object) -> None:
+    """Refuse what is no name of a node."""
+    if not isinstance(name, str):
+        raise RecordFileError(f'{argument}: needs the name of an agent, or "plant", got {name!r:.60}')
 
 
 def _check_times(**times: object) -> None:

@@ -5,15 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from math import inf
+from pathlib import Path
 
 import pytest
 from mcap.reader import make_reader
 
 from scenarios.checks.communication.record_content import read_content
-from scenarios.record.journal_coverage import JournalCoverage
+from scenarios.record.journal_coverage import JournalCoverage, inside
 from scenarios.record.record_reader import RecordFileError, RunRecord
 from scenarios.replay.replay import replay
 from scenarios.view.recorded.record_view import RecordView
+from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks
 from wire.messages import Journal
 
@@ -38,6 +40,11 @@ def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecord, RunRec
     """A record, and the same with one bit of a chunk in its middle flipped."""
     folder = tmp_path_factory.mktemp("damaged")
     whole = recorded_in_chunks(FAULTS, folder, "IV", chunk=40_000)
+    return whole, with_damage(whole, folder)
+
+
+def with_damage(whole: RunRecord, folder: Path) -> RunRecord:
+    """The same record with one bit of a chunk in its middle flipped."""
     with whole.path.open("rb") as stream:
         summary = make_reader(stream).get_summary()
     assert summary is not None
@@ -48,7 +55,7 @@ def damaged(tmp_path_factory: pytest.TempPathFactory) -> tuple[RunRecord, RunRec
     data[middle.chunk_start_offset + middle.chunk_length // 2] ^= 1
     other = folder / "flipped.mcap"
     other.write_bytes(data)
-    return whole, RunRecord.open(other)
+    return RunRecord.open(other)
 
 
 def test_what_a_damaged_chunk_held_is_not_invented(damaged: tuple[RunRecord, RunRecord]) -> None:
@@ -93,7 +100,7 @@ def test_the_page_draws_no_link_of_a_decision_that_is_lost(damaged: tuple[RunRec
     whole, flipped = (RunRecord.open(each.path) for each in damaged)
     shown, known = RecordView(flipped), RecordView(whole)
     content = read_content(flipped.path)
-    checked = {state.number for _, states in content.segments("inv4") for state in states}
+    checked = {state.number for state in content.of_agent("inv4") if not inside(content.holes["inv4"], state.t)}
     told = {decision.tick: decision for decision in flipped.decisions("inv4")}
     drawn = []
     edges = [round(t / 0.02) for hole in flipped.holes("inv4") for t in hole if t < 4.0]
@@ -119,6 +126,26 @@ def test_the_page_draws_no_link_of_a_decision_that_is_lost(damaged: tuple[RunRec
     assert checked >= set(drawn)
     assert len(checked - set(drawn)) <= 1, "which has no set-points before it; no check needs them"
     assert 8 < len(drawn) < len(ticks)
+
+
+def test_in_real_time_each_decision_tells_all_and_the_lost_ones_are_missed(tmp_path: Path) -> None:
+    """Page and `why` agree at each period; a decision is in force for one, and not until the next that is there."""
+    whole = fake_clock_record(tmp_path / "case", end=3.0)
+    flipped = with_damage(whole, tmp_path)
+    shown, lacking = RecordView(flipped), 0
+    for k in range(5, 150, 3):
+        t = 0.02 * k
+        frame, decision = shown.frame(t), whole.decision("inv2", t)
+        (row,) = (one for one in frame.inverters if one.name == "inv2")
+        try:
+            assert flipped.decision("inv2", t).tick == decision.tick
+            assert (row.hears, row.note, len(frame.links["inv2"])) == (2, "", 2)
+        except RecordFileError:
+            lacking += 1
+            assert (row.hears, frame.links["inv2"]) == (None, ())
+            assert row.note == "how it decided is not known: the record is damaged there"
+
+    assert 3 < lacking < 40
 
 
 def test_a_record_without_damage_lacks_nothing_however_its_parts_are_numbered() -> None:

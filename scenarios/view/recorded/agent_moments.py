@@ -109,7 +109,9 @@ class AgentMoments:
                         continue
                     last[journal.sender] = own, entry
         return [
-            _moment(name, own.t, own.island, entry, tuple(-1.0 if age is None else age for age in entry.ages))
+            _unknown(name, own.t, own.island, damaged=True)
+            if self._entries.lost_at(name, t, own.t)
+            else _moment(name, own.t, own.island, entry, tuple(-1.0 if age is None else age for age in entry.ages))
             for name, (own, entry) in last.items()
         ]
 
