@@ -57,6 +57,11 @@ class Resilient(Consensus):
 
     def __init__(self, **parameters: Any) -> None:
         super().__init__(**parameters)
+        if self.T_out and not self.tolerance:
+            raise ValueError(
+                f"has T_out = {self.T_out:g} s and no tolerance, so that nobody is ever implausible; give "
+                "tolerance, e.g. 0.1 (pu), or leave T_out out"
+            )
         self._memory: dict[str, _Memory] = {}
 
     def start(self, own: Own) -> None:

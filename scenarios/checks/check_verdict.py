@@ -10,7 +10,10 @@ CheckStatus = Literal["passed", "failed", "not judged"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about."""
 
 SHOWN = 20
-"""Most violations that a verdict keeps; it counts all."""
+"""Most violations that a verdict keeps; it counts up to `MOST`."""
+
+MOST = 1_000_000
+"""Violations after which a check is asked for no more: some seconds, and a check that never ends yields ever more."""
 
 
 class NotJudgedError(Exception):
@@ -63,7 +66,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     violations: tuple[Violation, ...] = ()
     """The violations, the first `SHOWN` as the check gave them."""
     count: int = 0
-    """Number of all violations."""
+    """Number of all violations, at most `MOST`."""
 
     @property
     def sentence(self) -> str:

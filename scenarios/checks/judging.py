@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from scenarios.checks.check_registry import CHECKS
-from scenarios.checks.check_verdict import SHOWN, CheckVerdict, NotJudgedError, Violation
+from scenarios.checks.check_verdict import MOST, SHOWN, CheckVerdict, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, made
@@ -38,7 +39,12 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
         found = made(CHECKS, plugin)(case)
         if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
             raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
-        violations = [_checked(violation) for violation in found]
+        violations: list[Violation] = []
+        count = 0
+        for count, violation in enumerate(islice(found, MOST), 1):
+            checked = _checked(violation)
+            if count <= SHOWN:
+                violations.append(checked)
     except NotJudgedError as error:
         return CheckVerdict(check=name, status="not judged", reason=printable(str(error), 300) or "no reason given")
     except PluginError as error:
@@ -48,8 +54,8 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
     return CheckVerdict(
         check=name,
         status="failed" if violations else "passed",
-        violations=tuple(violations[:SHOWN]),
-        count=len(violations),
+        violations=tuple(violations),
+        count=count,
     )
 
 

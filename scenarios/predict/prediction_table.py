@@ -85,8 +85,7 @@ def _rows(case: CasePrediction) -> list[TextRow]:
 def _robustness(inverters: InverterGroup) -> tuple[str, str, str]:
     """Return the r-robustness of the graph of those that run the law, and the liars that it bears."""
     found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
-    r = f"r {found.least}" if found.least == found.most else f"r {found.least}..{found.most}"
-    return r, "", f"of the graph; W-MSR bears F = {found.F} liars around each agent"
+    return str(found), "", f"of the graph; W-MSR bears F = {found.F} liars around each agent"
 
 
 def _event(step: IslandStep) -> str:

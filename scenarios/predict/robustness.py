@@ -34,6 +34,16 @@ class Robustness(NamedTuple):
         """Liars among the neighbours of each agent that W-MSR bears for certain."""
         return max(0, (self.least - 1) // 2)
 
+    def __str__(self) -> str:
+        """Return it as tables and sentences have it.
+
+        Examples
+        --------
+        >>> print(Robustness(5, 5), Robustness(2, 4))
+        r 5 r 2..4
+        """
+        return f"r {self.least}" if self.least == self.most else f"r {self.least}..{self.most}"
+
 
 def robustness(A: Floats, exact: int = EXACT) -> Robustness:
     """Return the largest r for which a graph is r-robust.

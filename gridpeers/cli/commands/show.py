@@ -32,7 +32,8 @@ def check(
     """Check a scenario file and its feeder for problems.
 
     All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
-    Notes tell what its events de-energise, and which agents lie.
+    Notes tell what its events de-energise, which agents lie, and where a graph bears fewer liars than
+    its law should.
 
     Exit code: 0 it can be run, 2 it has problems.
 
@@ -42,6 +43,7 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from gridpeers.cli.progress import TRYING, explained_work
+    from scenarios.predict.robustness_notes import robustness_notes
     from scenarios.results.file_sizes import file_sizes
     from scenarios.schema.liar_notes import liar_notes
     from scenarios.schema.supply import supply_notes
@@ -51,7 +53,7 @@ def check(
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
-    for note in (*supply_notes(spec, feeder), *liar_notes(spec)):
+    for note in (*supply_notes(spec, feeder), *liar_notes(spec), *robustness_notes(spec, feeder)):
         typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "

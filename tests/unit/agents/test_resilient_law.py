@@ -139,6 +139,12 @@ def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
 
 
+def test_distrust_without_a_tolerance_is_refused() -> None:
+    """Nobody would ever be implausible, so that T_out did nothing."""
+    with pytest.raises(ValueError, match=r"has T_out = 0\.5 s and no tolerance, so that nobody is ever implausible"):
+        Resilient(T_out=0.5, rate=1.0)
+
+
 def test_why_names_the_trimmed_and_the_implausible() -> None:
     """They have terms of 0 with their names; the others have the paper's."""
     around = [neighbour("low", 0.1), neighbour("mid", 0.55), neighbour("high", 0.9), neighbour("mad", 50.0)]

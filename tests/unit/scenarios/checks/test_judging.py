@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
+from scenarios.checks import judging
 from scenarios.checks.check_registry import ALWAYS, CHECKS
 from scenarios.checks.check_verdict import SHOWN, CheckVerdict, NotJudgedError, Violation, summary
 from scenarios.checks.checked_case import CheckedCase
@@ -79,6 +81,16 @@ def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest
     assert (found.count, len(found.violations)) == (100, SHOWN)
     assert (found.violations[1].t, found.violations[1].value) == (1.0, None)
     assert found.sentence == "mine failed: x: at t = 0.00 s, and 99 more"
+
+
+def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has failed, with as many violations as were counted, of which the first are kept."""
+    monkeypatch.setattr(judging, "MOST", 1000)
+    numbers = count()
+    found = judged(lambda case: (Violation(text=f"x{k}") for k in numbers), monkeypatch)
+
+    assert (found.status, found.count, found.violations[-1].text) == ("failed", 1000, f"x{SHOWN - 1}")
+    assert next(numbers) == 1000
 
 
 def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
