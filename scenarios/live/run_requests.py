@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import secrets
+from collections.abc import Callable, Iterator, Mapping
 from time import monotonic
 from typing import Any, Literal
 
@@ -14,6 +15,7 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.run_client import NobodyError, RunClient
 from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.short_names import in_order
+from wire.bounds import MOST_COUNT
 from wire.codec import encode
 from wire.driver.command_line import command_line
 from wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
@@ -57,28 +59,41 @@ def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | N
 def request(
     client: RunClient, receivers: Callable[[Answer], set[str]], *, verb: Verb, **command_fields: Any
 ) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
-    """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it."""
-    command = Command(sender="visitor", epoch=0, seq=0, t=0.0, reply_to=client.id, verb=verb, **command_fields)
+    """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it.
+
+    Anybody who may ask the plant anything may have its answer sent to this client. So the command has a number that
+    nobody else knows, which the plant repeats; acknowledgements have the number that the plant's answer names.
+    """
+    number = secrets.randbelow(MOST_COUNT)
+    command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
     client.publish(client.keys.for_verb(verb), encode(command))
     answer: Answer | None = None
-    answers: dict[str, LinkAcknowledgement] = {}
+    acknowledgements: dict[int, dict[str, LinkAcknowledgement]] = {}
     end = monotonic() + ANSWER
     while (left := end - monotonic()) > 0.0:
         for key, payload, _ in client.take(left):
             message = client.read(key, payload)
             if isinstance(message, LinkAcknowledgement):
-                answers[message.sender] = message
-            elif isinstance(message, Answer):
+                acknowledgements.setdefault(message.seq, {})[message.sender] = message
+            elif isinstance(message, Answer) and message.seq == number:
                 if not message.ok:
                     raise RefusedError(message.text)
                 answer, end = message, monotonic() + ACKNOWLEDGED
-        if answer is not None and answers.keys() >= receivers(answer):
+        if answer is not None and _of_number(answer, acknowledgements).keys() >= receivers(answer):
             break
     if answer is None:
         raise NobodyError(
             f"the plant of {client.where} is there but has not answered within {ANSWER:g} s; is it frozen?"
         )
-    return answer, answers
+    return answer, _of_number(answer, acknowledgements)
+
+
+def _of_number(
+    answer: Answer, acknowledgements: Mapping[int, dict[str, LinkAcknowledgement]]
+) -> dict[str, LinkAcknowledgement]:
+    """Return the acknowledgements of the number that an answer names."""
+    number = answer.data.get("number")
+    return acknowledgements.get(number, {}) if isinstance(number, int) else {}
 
 
 def plant_status(client: RunClient) -> PlantStatus:

@@ -65,8 +65,8 @@ class Plant:
             pacing = Pacing(steps=1, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0.0)
             data = {"phase": "running", "t": 2.0, "speed": 1.0, "pacing": msgspec.to_builtins(pacing)}
         else:
-            self.commands.append(command)
-        answer = Answer(sender="plant", epoch=1, seq=0, t=2.0, ok=True, text="done", data=data)
+            self.commands.append(msgspec.structs.replace(command, seq=0))  # its number is drawn anew each time
+        answer = Answer(sender="plant", epoch=1, seq=command.seq, t=2.0, ok=True, text="done", data=data)
         self._waiting.append((self.keys.answer(self.id), encode(answer)))
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
