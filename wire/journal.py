@@ -50,7 +50,7 @@ class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
     """The same of `State`, in the order in which they came."""
 
 
-class Sent(Entry, frozen=True, array_like=True, tag="sent"):
+class SentMessage(Entry, frozen=True, array_like=True, tag="sent"):
     """A message that the node sent."""
 
     at: float | None
@@ -61,7 +61,7 @@ class Sent(Entry, frozen=True, array_like=True, tag="sent"):
     """Its bytes."""
 
 
-class Heard(Entry, frozen=True, array_like=True, tag="heard"):
+class MessageReference(Entry, frozen=True, array_like=True, tag="heard"):
     """A sound message off the wire whose bytes are in its sender's journal."""
 
     at: float | None
@@ -76,7 +76,7 @@ class Heard(Entry, frozen=True, array_like=True, tag="heard"):
     """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
 
 
-class Received(Entry, frozen=True, array_like=True, tag="received"):
+class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
     """A message off the wire, with its bytes: nobody else has noted them, or they are not sound."""
 
     at: float | None
@@ -100,7 +100,7 @@ class Token(Entry, frozen=True, array_like=True, tag="token"):
     """Whether it appeared."""
 
 
-class Woken(Entry, frozen=True, array_like=True, tag="woken"):
+class WakeUp(Entry, frozen=True, array_like=True, tag="woken"):
     """The node acted because its clock said so, after all entries before this one and before those that follow."""
 
     at: float
@@ -109,7 +109,7 @@ class Woken(Entry, frozen=True, array_like=True, tag="woken"):
     """Whether it did its piece of work (`Node.work`: the plant advances), not what was due (`Node.expire`)."""
 
 
-class Process(Entry, frozen=True, array_like=True, tag="process"):
+class ProcessEvent(Entry, frozen=True, array_like=True, tag="process"):
     """An event of the process: its start, a new session, a request from outside to leave, a line of its log."""
 
     at: float | None
@@ -161,7 +161,10 @@ UNUSED = {
 """Reasons why an agent leaves out an in-neighbour."""
 
 
-ENTRIES = (Exchange, Sent, Heard, Received, Token, Woken, Process, Decision)
+AnyEntry = Exchange | SentMessage | MessageReference | ReceivedMessage | Token | WakeUp | ProcessEvent | Decision
+"""An entry of any kind."""
+
+ENTRIES: tuple[type[Entry], ...] = AnyEntry.__args__
 """All kinds of entries."""
 
 _encode_into = msgspec.msgpack.Encoder().encode_into
@@ -202,7 +205,7 @@ class JournalBuffer:
     def take_parts(self) -> list[bytes]:
         """Take out all entries, in parts of about `LOT` bytes."""
         if self._lost:
-            _encode_into(Process(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"), self._bytes, -1)
+            _encode_into(ProcessEvent(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"), self._bytes, -1)
             self._lost = 0
         parts, begin = [], 0
         for end in (*self._ends, len(self._bytes)):

@@ -8,7 +8,17 @@ from typing import Any, Protocol
 from msgspec.structs import astuple
 
 from wire.codec import sound
-from wire.journal import AT_ONCE, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
+from wire.journal import (
+    AT_ONCE,
+    Exchange,
+    JournalBuffer,
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    SentMessage,
+    Token,
+    WakeUp,
+)
 from wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
 from wire.keys import Keys
 from wire.messages import Measurement, State
@@ -82,7 +92,7 @@ class TickTraffic:
         if of_tick is not None:
             of_tick.append(payload)
         elif key not in self._elsewhere:
-            self._journal.add(Sent(None, key[self._cut :], payload))
+            self._journal.add(SentMessage(None, key[self._cut :], payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         """Note a message off the wire, and the kind of its rejection, if it was rejected."""
@@ -92,9 +102,9 @@ class TickTraffic:
         elif rejected:
             self._rejected += 1
             if self._rejected <= REJECTED_OF_TICK:
-                self._journal.add(Received(None, key[self._cut :], payload[:SHOWN], rejected))
+                self._journal.add(ReceivedMessage(None, key[self._cut :], payload[:SHOWN], rejected))
         elif key not in self._elsewhere:
-            self._journal.add(Received(None, key[self._cut :], payload))
+            self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""
@@ -102,7 +112,7 @@ class TickTraffic:
 
     def line(self, text: str) -> None:
         """Note a line of the log."""
-        self._journal.add(Process(None, "line", text))
+        self._journal.add(ProcessEvent(None, "line", text))
 
     def exchanged(self, tick: int, measurements: Sequence[Measurement], states: Sequence[State]) -> None:
         """Note a tick in which plant and agents share a process, and send nothing.
@@ -163,7 +173,7 @@ class TimedTraffic:
         """Note a message that the node sends."""
         name = key[self._cut :]
         if kind_of(name) not in _NOT_NOTED:
-            self._journal.add(Sent(self.now, name, payload))
+            self._journal.add(SentMessage(self.now, name, payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         """Note a message off the wire, and the kind of its rejection, if it was rejected."""
@@ -181,15 +191,15 @@ class TimedTraffic:
             and rejected in ("", "stale")  # any other may be of somebody who keeps no journal
             and (message := sound(payload)) is not None
         ):
-            self._journal.add(Heard(at, name, message.epoch, message.seq, rejected))
+            self._journal.add(MessageReference(at, name, message.epoch, message.seq, rejected))
             return
-        self._journal.add(Received(at, name, payload[:SHOWN] if rejected else payload, rejected))
+        self._journal.add(ReceivedMessage(at, name, payload[:SHOWN] if rejected else payload, rejected))
 
     def _is_noted(self, rejected: str) -> bool:
         """Return whether a rejected message is noted; one of many is not, and their number is."""
         line = (self._stale if rejected == "stale" else self._rejected).admit(rejected, self.now)
         if line is not None and line != rejected:
-            self._journal.add(Process(self.now, "line", f"rejected messages: {line}"))
+            self._journal.add(ProcessEvent(self.now, "line", f"rejected messages: {line}"))
         return line is not None
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
@@ -202,16 +212,16 @@ class TimedTraffic:
         """Note that the node acts by its clock."""
         self.now = at
         if self._arrivals:
-            self._journal.add(Woken(at, work))
+            self._journal.add(WakeUp(at, work))
 
     def process(self, kind: str, text: str, at: float) -> None:
         """Note an event of the process."""
         self.now = at
-        self._journal.add(Process(at, kind, text))
+        self._journal.add(ProcessEvent(at, kind, text))
 
     def line(self, text: str) -> None:
         """Note a line of the log."""
-        self._journal.add(Process(self.now, "line", text))
+        self._journal.add(ProcessEvent(self.now, "line", text))
 
 
 _NOT_NOTED = IN_TELEMETRY + CONDITION

@@ -10,7 +10,7 @@ from netem.ledger import Outcome, copies_of
 from scenarios.record.message_index import MessageOnWire
 from scenarios.record.record_reader import RunRecord
 from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from wire.journal import Heard, Received
+from wire.journal import MessageReference, ReceivedMessage
 from wire.journal_keys import kind_of, name_of
 from wire.messages import OFF, PlantEvent, State
 
@@ -49,8 +49,8 @@ def rejections(record: RunRecord, agent: str, since: float, until: float) -> Map
     """Return the number and the kind of each message of a neighbour that an agent rejected, by the neighbour."""
     found: dict[str, list[tuple[int, str]]] = {}
     for entry in record.entries(agent, since=since, until=until):
-        if isinstance(entry, Heard | Received) and entry.rejected and kind_of(entry.key) == "state":
-            number = entry.seq if isinstance(entry, Heard) else -1
+        if isinstance(entry, MessageReference | ReceivedMessage) and entry.rejected and kind_of(entry.key) == "state":
+            number = entry.seq if isinstance(entry, MessageReference) else -1
             found.setdefault(name_of(entry.key), []).append((number, entry.rejected))
     return found
 

@@ -18,7 +18,7 @@ from scenarios.record.decision_entries import DecisionEntries
 from scenarios.record.heard_lies import StatesInRecord, hearing_of
 from scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
 from scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
-from wire.journal import Decision, Heard, Received
+from wire.journal import Decision, MessageReference, ReceivedMessage
 from wire.messages import OFF, PLANT, Measurement, Nameplate, State
 from wire.timing.clock import time_of
 
@@ -48,7 +48,7 @@ class DecisionReader:
         config = self._info.agent(agent)
         if config is None:
             return iter(())
-        return (self._in_ticks if self._info.clock == "simulated" else self._live)(config, since, until)
+        return (self._in_ticks if self._info.clock == "simulated" else self._in_real_time)(config, since, until)
 
     # ---------------------------------------------------------------- simulated time
 
@@ -87,7 +87,7 @@ class DecisionReader:
 
     # ---------------------------------------------------------------- wall-clock time
 
-    def _live(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
+    def _in_real_time(self, config: AgentConfig, since: float, until: float) -> Iterator[RecordedDecision]:
         name = config.name
         for index in self._index.near(since, until):
             for journal, entry in self._index.part(index).entries:
@@ -192,7 +192,7 @@ class DecisionReader:
     def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
         """Yield messages as they were heard; see `RunRecord.heard`."""
         if self._info.clock == "wall":
-            return self._heard_live(receiver, since, until)
+            return self._heard_in_real_time(receiver, since, until)
         return self._heard_by_plant(since, until) if receiver == PLANT else self._heard_in_ticks(receiver, since, until)
 
     def _heard_by_plant(self, since: float, until: float) -> Iterator[MessageOnWire]:
@@ -210,15 +210,15 @@ class DecisionReader:
                     yield on_wire(f"state/{each.name}", None, None, receiver=receiver, message=each.state)
                 last[each.name] = each.number
 
-    def _heard_live(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
+    def _heard_in_real_time(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
         for index in self._index.near(since, until):
             for journal, entry in self._index.part(index).entries:
                 if journal.sender != receiver:
                     continue
-                if isinstance(entry, Heard):
+                if isinstance(entry, MessageReference):
                     found = self._index.named_by(entry, journal.t)
                     message = heard_of(receiver, found, entry, journal.t)
-                elif isinstance(entry, Received):
+                elif isinstance(entry, ReceivedMessage):
                     message = on_wire(entry.key, entry.payload, entry.at, receiver=receiver, rejected=entry.rejected)
                 else:
                     continue

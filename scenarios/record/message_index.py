@@ -14,7 +14,7 @@ from scenarios.record.journal_reader import entries_of, message_of, values_of
 from scenarios.record.record_channels import Topic
 from scenarios.record.record_file import RecordFile, RecordMessage
 from wire.codec import encode, sound
-from wire.journal import Entry, Exchange, Heard, Received, Sent
+from wire.journal import Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
 from wire.journal_keys import kind_of, name_of, sender_of
 from wire.links import REPORT_TICKS
 from wire.messages import AnyMessage, Journal, Measurement, State
@@ -162,7 +162,7 @@ class MessageIndex:
         parts = (self.part(i).measurements for i in self._about(t))
         return _nearest((each for part in parts for each in part.get((to, number), ())), t, epoch)
 
-    def named_by(self, entry: Heard, t: float) -> State | Measurement | None:
+    def named_by(self, entry: MessageReference, t: float) -> State | Measurement | None:
         """Return the message of about run time t (s) that an entry names by its number, as `state` does."""
         find = self.measurement if kind_of(entry.key) == "measurement" else self.state
         return find(name_of(entry.key), entry.seq, t, entry.epoch)
@@ -198,9 +198,9 @@ class MessageIndex:
                         yield on_wire(f"measurement/{message.to}", raw, None, message=message)
                     elif isinstance(message, State):
                         yield on_wire(f"state/{message.sender}", raw, None, message=message)
-        elif isinstance(entry, Sent):
+        elif isinstance(entry, SentMessage):
             yield on_wire(entry.key, entry.payload, entry.at)
-        elif isinstance(entry, Received) and not entry.rejected:
+        elif isinstance(entry, ReceivedMessage) and not entry.rejected:
             yield on_wire(entry.key, entry.payload, None)
 
     def _read_part(self, index: int) -> _Part:
@@ -222,7 +222,7 @@ class MessageIndex:
                 self._keep(part, message_of(raw, Measurement, self.info))
             for raw in entry.states:
                 self._keep(part, message_of(raw, State, self.info))
-        elif isinstance(entry, Sent) or (isinstance(entry, Received) and not entry.rejected):
+        elif isinstance(entry, SentMessage) or (isinstance(entry, ReceivedMessage) and not entry.rejected):
             self._keep(part, sound(entry.payload))
 
     def _keep(self, part: _Part, message: AnyMessage | None) -> None:
@@ -272,7 +272,7 @@ def on_wire(
     )
 
 
-def heard_of(receiver: str, message: AnyMessage | None, entry: Heard, t: float) -> MessageOnWire:
+def heard_of(receiver: str, message: AnyMessage | None, entry: MessageReference, t: float) -> MessageOnWire:
     """Return a message as it was heard, whose bytes are in its sender's journal."""
     kind = Measurement if kind_of(entry.key) == "measurement" else State
     return MessageOnWire(

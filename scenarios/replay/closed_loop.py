@@ -27,7 +27,7 @@ from scenarios.replay.replay_error import ReplayError
 from scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
 from scenarios.replay.sent_statuses import SentStatuses
 from wire.codec import decode
-from wire.journal import Heard, Process, Received, Sent, Woken
+from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, WakeUp
 from wire.journal_keys import EACH_TICK, TO_LINKS, kind_of, name_of, sender_of, stream_of
 from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
 
@@ -158,19 +158,19 @@ class ClosedLoop:
     def _change_if_due(self, process: LoopProcess, step: RecordedStep) -> None:
         """Make the change before the plant measures at its time."""
         node, since = process.plant, self._making.is_due
-        if since is None or node is None or not isinstance(step.entry, Woken) or step.entry.work:
+        if since is None or node is None or not isinstance(step.entry, WakeUp) or step.entry.work:
             return
         if node.phase == "running" and node.t >= since - 1e-9:
             self._making.change(list(self._processes.values()))
 
     def _settle(self, process: LoopProcess, step: RecordedStep) -> None:
         """Undo what a step must not do to a process under the changes."""
-        if isinstance(step.entry, Received) and kind_of(step.entry.key) in TO_LINKS:
+        if isinstance(step.entry, ReceivedMessage) and kind_of(step.entry.key) in TO_LINKS:
             self._making.cut_again(process, self._t)
         node, head = process.agent, process.head
         if node is None or head is None or not node.session_broken:
             return
-        if not (isinstance(head.entry, Process) and head.entry.kind == "session"):
+        if not (isinstance(head.entry, ProcessEvent) and head.entry.kind == "session"):
             node.session_broken = False
             self._note(f"{process.name} would have opened a new session; what that would have brought is not known")
 
@@ -179,7 +179,7 @@ class ClosedLoop:
     def _heard(self, process: LoopProcess, step: RecordedStep) -> Message | None:
         """Return what a process hears in a step: as the replay sent it, or as recorded where nobody sends it there."""
         entry = step.entry
-        if not isinstance(entry, Heard | Received):
+        if not isinstance(entry, MessageReference | ReceivedMessage):
             return None
         kind = kind_of(entry.key)
         if kind not in EACH_TICK:
@@ -188,7 +188,7 @@ class ClosedLoop:
                 return self._statuses.as_sent(recorded)
             is_command = kind in TO_LINKS and not entry.rejected
             return self._making.command(recorded) if is_command and recorded is not None else recorded
-        if isinstance(entry, Heard):
+        if isinstance(entry, MessageReference):
             epoch, number = entry.epoch, entry.seq
         else:
             known = tick_message(Message(entry.key, entry.payload))
@@ -208,7 +208,9 @@ class ClosedLoop:
             return None  # the record has it, and the replay does not
         return message_of(process.recorded, step) if by.head is None else _NOT_YET
 
-    def _publish(self, process: LoopProcess, recorded: tuple[Sent, ...], sent: list[Message], due: float) -> None:
+    def _publish(
+        self, process: LoopProcess, recorded: tuple[SentMessage, ...], sent: list[Message], due: float
+    ) -> None:
         """Bring what a process sent in a step to those who hear it, beside those of whom the record has it."""
         theirs = {(each.key, state.seq) for each in recorded if (state := tick_message(each)) is not None}
         for message in sent:
@@ -279,9 +281,9 @@ def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
         last: dict[tuple[str, int], int] = {}
         for step in process.steps():
             entry = step.entry
-            if not isinstance(entry, Heard | Received) or kind_of(entry.key) not in EACH_TICK:
+            if not isinstance(entry, MessageReference | ReceivedMessage) or kind_of(entry.key) not in EACH_TICK:
                 continue
-            if isinstance(entry, Heard):
+            if isinstance(entry, MessageReference):
                 epoch, number = entry.epoch, entry.seq
             elif (message := tick_message(Message(entry.key, entry.payload))) is not None:
                 epoch, number = message.epoch, message.seq

@@ -89,7 +89,7 @@ def _both(
     """Run the record under the rule; write what was and what would have been."""
     changes = rule.changes
     rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
-    run = _in_ticks if record.info.clock == "simulated" else _live
+    run = _in_simulated_time if record.info.clock == "simulated" else _in_real_time
     with Recorder(would_be / rule.case, gaps=True) as recorder:
 
         def take(message: Telemetry | LinkReport) -> None:
@@ -113,13 +113,13 @@ def _both(
 Take = Callable[[Telemetry | LinkReport], None]
 
 
-def _live(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
+def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
     loop = ClosedLoop(record, rule if rule.changes else None, take, make_plant)
     loop.run()
     return loop.notes
 
 
-def _in_ticks(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
+def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
     """Run a scenario in simulated time again: messages are late and lost by their numbers, so as they were."""
     info = record.info
     links = {} if rule.links is None else {"links": rule.links}

@@ -9,7 +9,7 @@ from agents.realtime.realtime_agent import RealtimeAgent
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
-from wire.journal import Heard, Received
+from wire.journal import MessageReference, ReceivedMessage
 from wire.journal_keys import stream_of
 
 
@@ -63,4 +63,4 @@ class LoopProcess:
 
 def is_arrival(step: RecordedStep) -> bool:
     """Return whether a message arrives in a step."""
-    return isinstance(step.entry, Heard | Received)
+    return isinstance(step.entry, MessageReference | ReceivedMessage)

@@ -11,14 +11,22 @@ from scenarios.record.message_index import MessageIndex
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.replay_error import ReplayError
 from wire.codec import sound
-from wire.journal import Decision, Entry, Exchange, Heard, Process, Received, Sent, Token, Woken
+from wire.journal import (
+    Entry,
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    SentMessage,
+    Token,
+    WakeUp,
+)
 from wire.journal_keys import EACH_TICK, kind_of
 from wire.messages import PLANT, AnyMessage, Journal
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
 
-Input = Token | Heard | Received | Woken | Process
+Input = Token | MessageReference | ReceivedMessage | WakeUp | ProcessEvent
 """An entry that is a call of the node."""
 
 
@@ -29,7 +37,7 @@ class RecordedStep(NamedTuple):
     """When it was called (s, monotonic): a message waits from its arrival until the calls before are done."""
     entry: Input
     """The call."""
-    sent: tuple[Sent, ...]
+    sent: tuple[SentMessage, ...]
     """Measurements and states that it sent in this call."""
     t: float
     """Run time at which its journal was sent (s); 0 before the run begins."""
@@ -62,16 +70,15 @@ class RecordedProcess:
     def steps(self) -> Iterator[RecordedStep]:
         """Yield its calls, in their order."""
         held: tuple[float, Input, float] | None = None
-        sent: list[Sent] = []
+        sent: list[SentMessage] = []
         due = -inf
         for journal, entry in self._entries():
-            if isinstance(entry, Sent):
+            if isinstance(entry, SentMessage):
                 if kind_of(entry.key) in EACH_TICK:
                     sent.append(entry)
                 continue
-            if isinstance(entry, Decision | Exchange) or (isinstance(entry, Process) and entry.kind not in CALLS):
+            if not isinstance(entry, Input) or (isinstance(entry, ProcessEvent) and entry.kind not in CALLS):
                 continue
-            assert isinstance(entry, Token | Heard | Received | Woken | Process)
             if held is not None:
                 yield RecordedStep(held[0], held[1], tuple(sent), held[2])
             due = max(due, -inf if entry.at is None else entry.at)
@@ -91,12 +98,12 @@ class RecordedProcess:
                     return
                 number = journal.seq + 1
                 for entry in entries:
-                    if isinstance(entry, Process) and entry.kind == "lost":
+                    if isinstance(entry, ProcessEvent) and entry.kind == "lost":
                         self.ends = f"the journal of {self.name} was full at t = {journal.t:.2f} s: {entry.text}"
                         return
                     yield journal, entry
 
-    def message(self, entry: Heard, t: float) -> AnyMessage | None:
+    def message(self, entry: MessageReference, t: float) -> AnyMessage | None:
         """Return a message that it heard by its number, about run time t (s); None if the record does not have it."""
         return self._parts.index.named_by(entry, t)
 

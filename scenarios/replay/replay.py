@@ -39,7 +39,7 @@ from scenarios.replay.replayed_process import (
 )
 from scenarios.short_names import in_order
 from wire.codec import decode
-from wire.journal import Heard, Received
+from wire.journal import MessageReference, ReceivedMessage
 from wire.messages import PLANT, AnyMessage, Telemetry
 
 
@@ -101,7 +101,11 @@ def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Rep
         make_plant = None
         note = "the physics was not replayed: it was not that of our plant alone"
         notes.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
-    parts = _ticks(record, make_plant) if record.info.clock == "simulated" else _live(record, make_plant)
+    parts = (
+        _in_simulated_time(record, make_plant)
+        if record.info.clock == "simulated"
+        else _in_real_time(record, make_plant)
+    )
     found = [*notes, *parts]
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
     return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
@@ -110,7 +114,7 @@ def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Rep
 # -------------------------------------------------------------------- wall-clock time
 
 
-def _live(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
+def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
     """Replay all processes side by side, so that the file is read once."""
     replays = [
         _PlantReplay(record, process, make_plant) if process.name == PLANT else _AgentReplay(record, process)
@@ -160,7 +164,7 @@ class _AgentReplay:
                 return
             self._again = agent_again(self.process, config, instance, self._laws, recorded_links(self._info, name))
         message = message_of(self.process, step)
-        if message is None and isinstance(step.entry, Heard | Received):
+        if message is None and isinstance(step.entry, MessageReference | ReceivedMessage):
             self._note = f"the record lacks a message that {name} heard at t = {step.t:.2f} s; it was replayed to there"
             return
         ours = [decoded for sent in self._again.take(step, message) if (decoded := tick_message(sent)) is not None]
@@ -266,7 +270,7 @@ class ComparedRows:
 # -------------------------------------------------------------------- simulated time
 
 
-def _ticks(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
+def _in_simulated_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
     if make_plant is not None:
         yield _physics(record, make_plant)
     for agent in record.agents:

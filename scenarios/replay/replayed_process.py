@@ -22,7 +22,7 @@ from scenarios.record.record_info import RecordInfo
 from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from scenarios.replay.replay_error import ReplayError
 from wire.codec import encode, sound
-from wire.journal import Heard, Process, Received, Sent, Token, Woken
+from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, Token, WakeUp
 from wire.journal_keys import EACH_TICK, kind_of
 from wire.links import Links
 from wire.messages import PLANT, Measurement, State
@@ -40,7 +40,7 @@ class Message(NamedTuple):
     """Its bytes."""
 
 
-class _Sent:
+class _Outbox:
     """Takes what a node sends (`wire.traffic.Traffic`)."""
 
     def __init__(self, cut: int) -> None:
@@ -77,7 +77,7 @@ class ReplayedProcess:
     def __init__(self, recorded: RecordedProcess, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
         self.recorded, self.node, self.links = recorded, node, links
         self._root = node.keys.prefix
-        self._sent = _Sent(len(self._root))
+        self._sent = _Outbox(len(self._root))
         node.traffic = self._sent
 
     @property
@@ -105,14 +105,14 @@ class ReplayedProcess:
             The message that it hears in this step, if it hears one.
         """
         node, entry = self.node, step.entry
-        if isinstance(entry, Heard | Received):
+        if isinstance(entry, MessageReference | ReceivedMessage):
             assert message is not None
             return self.hear(message, entry.at or 0.0)
         if isinstance(entry, Token):
             (node.appeared if entry.appeared else node.vanished)(self._root + entry.key, entry.at or 0.0)
-        elif isinstance(entry, Woken):
+        elif isinstance(entry, WakeUp):
             (node.work if entry.work else node.expire)(entry.at)
-        elif isinstance(entry, Process):
+        elif isinstance(entry, ProcessEvent):
             self._control(entry)
         return self._take()
 
@@ -132,7 +132,7 @@ class ReplayedProcess:
             node.interrupt("its record ends", 0.0)
         return self._take()
 
-    def _control(self, entry: Process) -> None:
+    def _control(self, entry: ProcessEvent) -> None:
         node = self.node
         if entry.kind != "leave":
             if entry.kind == "session" and isinstance(node, RealtimeAgent):
@@ -203,21 +203,21 @@ def recorded_links(info: RecordInfo, name: str) -> Links | None:
 def instance_of(step: RecordedStep) -> str:
     """Return the instance of a process from its first step, which is its start."""
     entry = step.entry
-    return entry.text.rpartition(" ")[2] if isinstance(entry, Process) and entry.kind == "start" else ""
+    return entry.text.rpartition(" ")[2] if isinstance(entry, ProcessEvent) and entry.kind == "start" else ""
 
 
 def message_of(process: RecordedProcess, step: RecordedStep) -> Message | None:
     """Return the message that a process heard in a step; None if it heard none, or the record does not have it."""
     entry = step.entry
-    if isinstance(entry, Received):
+    if isinstance(entry, ReceivedMessage):
         return Message(entry.key, entry.payload)
-    if isinstance(entry, Heard):
+    if isinstance(entry, MessageReference):
         found = process.message(entry, step.t)
         return None if found is None else Message(entry.key, encode(found))
     return None
 
 
-def tick_message(message: Message | Sent) -> State | Measurement | None:
+def tick_message(message: Message | SentMessage) -> State | Measurement | None:
     """Return a state, or a measurement; None of anything else."""
     decoded = sound(message.payload) if kind_of(message.key) in EACH_TICK else None
     return decoded if isinstance(decoded, State | Measurement) else None

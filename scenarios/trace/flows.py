@@ -9,7 +9,7 @@ from typing import NamedTuple
 from netem.ledger import Outcome, copies_of
 from scenarios.record.record_reader import RunRecord
 from wire.codec import sound
-from wire.journal import Sent
+from wire.journal import SentMessage
 from wire.journal_keys import EACH_TICK, kind_of
 from wire.messages import PLANT, Measurement, State
 
@@ -111,7 +111,7 @@ def _sent_at(record: RunRecord, since: float, until: float) -> dict[tuple[str, i
     found = {}
     for sender in (*record.agents, PLANT):
         for entry in record.entries(sender, since=since, until=until):
-            if isinstance(entry, Sent) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
+            if isinstance(entry, SentMessage) and entry.at is not None and kind_of(entry.key) in EACH_TICK:
                 message = sound(entry.payload)
                 if message is not None:
                     found[entry.key, message.epoch, message.seq] = entry.at

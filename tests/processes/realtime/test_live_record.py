@@ -23,7 +23,7 @@ from scenarios.record.record_reader import RunRecord
 from scenarios.results.record import Recorder
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import TOY
-from wire.journal import Process, Token, Woken
+from wire.journal import ProcessEvent, Token, WakeUp
 from wire.messages import Telemetry
 
 
@@ -122,9 +122,9 @@ def test_a_journal_has_what_a_core_is_to_be_given_again(record: RunRecord) -> No
     """Start, tokens and each time at which it was woken, in the order in which they came."""
     entries = list(record.entries("inv1"))
     first = entries[0]
-    assert isinstance(first, Process)
+    assert isinstance(first, ProcessEvent)
     assert first.kind == "start"
-    assert sum(isinstance(entry, Woken) for entry in entries) > 100
+    assert sum(isinstance(entry, WakeUp) for entry in entries) > 100
     assert {entry.key.split("/")[1] for entry in entries if isinstance(entry, Token)} >= {"agent", "plant"}
     assert [entry.appeared for entry in entries if isinstance(entry, Token) and "inv4" in entry.key] == [True, False]
 

@@ -18,7 +18,7 @@ from scenarios.replay.replay import replay
 from tests.command_line import invoke
 from tests.processes.terminals import Desk
 from tests.record.killed_commands import killed
-from wire.journal import Process
+from wire.journal import ProcessEvent
 
 ISLANDING = {"label": "islanding", "t_s": 0.5, "open": ["13-152"]}
 ALL = {"secondary": "all", "graph": "full"}
@@ -202,7 +202,7 @@ def test_who_was_stopped_from_outside_leaves_again(desk: Desk) -> None:
     assert (alone.end(), others.end(), plant.end()) == (130, 0, 0)
 
     record = RunRecord.open(desk.folder / "out")
-    assert "leave" in {entry.kind for entry in record.entries("inv2") if isinstance(entry, Process)}
+    assert "leave" in {entry.kind for entry in record.entries("inv2") if isinstance(entry, ProcessEvent)}
     done = gp.replay(record)
     assert done.difference is None
     assert {part.name for part in done.parts} == {"plant", *(f"inv{k}" for k in range(1, 10))}

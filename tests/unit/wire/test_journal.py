@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from scenarios.record.journal_reader import entries_of
-from wire.journal import LOT, ROOM, Entry, Exchange, JournalBuffer, Process, Sent, Token
+from wire.journal import LOT, ROOM, Entry, Exchange, JournalBuffer, ProcessEvent, SentMessage, Token
 
 
 def read(parts: list[bytes]) -> list[Entry]:
@@ -16,7 +16,7 @@ def test_entries_come_back_as_they_were_noted() -> None:
     noted = [
         Token(None, "alive/agent/inv1/a", True),
         Exchange(3, [b"measured"], [b"state", b"other"]),
-        Sent(1.25, "control", bytes(range(256))),
+        SentMessage(1.25, "control", bytes(range(256))),
     ]
     journal = JournalBuffer()
     for entry in noted:
@@ -29,7 +29,7 @@ def test_entries_come_back_as_they_were_noted() -> None:
 def test_a_part_ends_with_an_entry() -> None:
     """Many entries make several parts, each within the longest message, each readable on its own."""
     journal = JournalBuffer()
-    noted = [Sent(None, f"key/{i}", bytes(1000)) for i in range(200)]
+    noted = [SentMessage(None, f"key/{i}", bytes(1000)) for i in range(200)]
     for entry in noted:
         journal.add(entry)
     parts = journal.take_parts()
@@ -44,11 +44,11 @@ def test_a_flood_is_counted_and_not_kept() -> None:
     """A journal that nobody takes holds `ROOM` and says how many entries it has lost."""
     journal = JournalBuffer()
     for _ in range(3000):
-        journal.add(Sent(None, "key", bytes(1000)))
+        journal.add(SentMessage(None, "key", bytes(1000)))
 
     assert ROOM <= len(journal) < ROOM + 2000
     entries = read(journal.take_parts())
     lost = entries[-1]
-    assert isinstance(lost, Process)
+    assert isinstance(lost, ProcessEvent)
     assert lost.kind == "lost"
     assert lost.text.startswith(f"{3000 - len(entries) + 1} entries")

@@ -8,7 +8,18 @@ import pytest
 
 from scenarios.record.journal_reader import entries_of
 from wire.codec import encode
-from wire.journal import AT_ONCE, Entry, Exchange, Heard, JournalBuffer, Process, Received, Sent, Token, Woken
+from wire.journal import (
+    AT_ONCE,
+    Entry,
+    Exchange,
+    JournalBuffer,
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    SentMessage,
+    Token,
+    WakeUp,
+)
 from wire.keys import Keys
 from wire.messages import Leave, Measurement, State
 from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN, TickTraffic, TimedTraffic
@@ -44,14 +55,14 @@ def test_in_real_time_each_call_has_its_time() -> None:
     traffic.token(KEYS.alive_agent("inv2", "b"), 11.5, appeared=False)
 
     assert noted(journal) == [
-        Process(9.0, "start", "instance a"),
+        ProcessEvent(9.0, "start", "instance a"),
         Token(9.5, "alive/agent/inv2/b", True),
-        Heard(10.0, "state/inv2", 3, 5),
-        Sent(10.0, "state/inv1", STATE),
-        Woken(10.5),
-        Process(10.5, "line", "joins"),
-        Woken(11.0, True),
-        Sent(11.0, "leave/inv1", LEAVE),
+        MessageReference(10.0, "state/inv2", 3, 5),
+        SentMessage(10.0, "state/inv1", STATE),
+        WakeUp(10.5),
+        ProcessEvent(10.5, "line", "joins"),
+        WakeUp(11.0, True),
+        SentMessage(11.0, "leave/inv1", LEAVE),
         Token(11.5, "alive/agent/inv2/b", False),
     ]
 
@@ -59,11 +70,11 @@ def test_in_real_time_each_call_has_its_time() -> None:
 def test_the_bytes_of_a_message_are_noted_once() -> None:
     """By its sender, and by the plant; whoever else hears a sound one notes its number, also of one that is stale."""
     for whole, rejected, entry in (
-        (False, "", Heard(1.0, "state/inv2", 3, 5)),
-        (False, "stale", Heard(1.0, "state/inv2", 3, 5, "stale")),
-        (False, "ghost", Received(1.0, "state/inv2", STATE, "ghost")),
-        (True, "", Received(1.0, "state/inv2", STATE)),
-        (True, "stale", Received(1.0, "state/inv2", STATE, "stale")),
+        (False, "", MessageReference(1.0, "state/inv2", 3, 5)),
+        (False, "stale", MessageReference(1.0, "state/inv2", 3, 5, "stale")),
+        (False, "ghost", ReceivedMessage(1.0, "state/inv2", STATE, "ghost")),
+        (True, "", ReceivedMessage(1.0, "state/inv2", STATE)),
+        (True, "stale", ReceivedMessage(1.0, "state/inv2", STATE, "stale")),
     ):
         traffic, journal = timed(whole=whole)
         traffic.received(KEYS.state("inv2"), STATE, 1.0, rejected)
@@ -77,8 +88,8 @@ def test_of_a_rejected_message_the_beginning_is_noted() -> None:
     traffic.received(KEYS.link_request("inv1"), NOISE, 2.0, "")
 
     assert noted(journal) == [
-        Received(1.0, "state/inv2", NOISE[:SHOWN], "corrupt"),
-        Received(2.0, "link_request/inv1", NOISE),
+        ReceivedMessage(1.0, "state/inv2", NOISE[:SHOWN], "corrupt"),
+        ReceivedMessage(2.0, "link_request/inv1", NOISE),
     ]
 
 
@@ -93,7 +104,10 @@ def test_what_the_record_has_anyway_is_not_noted() -> None:
         assert noted(journal) == []
         traffic.received(KEYS.journal("inv2"), b"it", 1.0, "corrupt")
         traffic.received(KEYS.status("inv2"), b"it", 2.0, "")
-        assert noted(journal) == [Received(1.0, "journal/inv2", b"it", "corrupt"), Received(2.0, "status/inv2", b"it")]
+        assert noted(journal) == [
+            ReceivedMessage(1.0, "journal/inv2", b"it", "corrupt"),
+            ReceivedMessage(2.0, "status/inv2", b"it"),
+        ]
 
 
 def test_without_arrivals_a_node_notes_what_it_sends() -> None:
@@ -105,7 +119,9 @@ def test_without_arrivals_a_node_notes_what_it_sends() -> None:
         traffic.received(KEYS.state("inv2"), STATE, 2.0, "")
         traffic.received(KEYS.status("inv2"), b"it", 2.0, "")
         traffic.sent(KEYS.state("inv1"), STATE)
-        assert noted(journal) == [Received(2.0, "state/inv2", STATE)] * whole + [Sent(2.0, "state/inv1", STATE)]
+        assert noted(journal) == [ReceivedMessage(2.0, "state/inv2", STATE)] * whole + [
+            SentMessage(2.0, "state/inv1", STATE)
+        ]
 
 
 def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
@@ -127,11 +143,11 @@ def test_in_ticks_the_plant_notes_a_tick_as_one_entry() -> None:
     traffic.ticked(5)
 
     assert noted(journal) == [
-        Received(None, "state/inv1", b"bad", "corrupt"),
-        Sent(None, "control", b"go"),
-        Received(None, "ready/inv1", b"ready"),
+        ReceivedMessage(None, "state/inv1", b"bad", "corrupt"),
+        SentMessage(None, "control", b"go"),
+        ReceivedMessage(None, "ready/inv1", b"ready"),
         Token(None, "alive/agent/inv2/b", True),
-        Process(None, "line", "all are there"),
+        ProcessEvent(None, "line", "all are there"),
         Exchange(4, [b"m1", b"m2"], [b"s2", b"s1"]),
     ]
 
@@ -180,11 +196,11 @@ def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
         traffic.received(KEYS.state("inv2"), NOISE, 10.0 + 1e-4 * i, "garbled")
         traffic.received(KEYS.state("inv2"), STATE, 10.0 + 1e-4 * i, "")
     entries = noted(journal)
-    kept = [entry for entry in entries if isinstance(entry, Received)]
-    lines = [entry.text for entry in entries if isinstance(entry, Process)]
+    kept = [entry for entry in entries if isinstance(entry, ReceivedMessage)]
+    lines = [entry.text for entry in entries if isinstance(entry, ProcessEvent)]
 
     assert REJECTED <= len(kept) <= REJECTED + 1.0 / REJECTED_INTERVAL + 1
-    assert sum(isinstance(entry, Heard) for entry in entries) == 10_000
+    assert sum(isinstance(entry, MessageReference) for entry in entries) == 10_000
     assert lines[0].startswith("rejected messages: garbled (")
     assert lines[0].endswith(" more of this kind left out)")
 
@@ -199,7 +215,7 @@ def test_a_flood_of_rejected_messages_in_simulated_time_is_noted_tick_by_tick() 
         traffic.ticked(tick)
     entries = noted(journal)
 
-    assert sum(isinstance(entry, Received) for entry in entries) == 2 * REJECTED_OF_TICK
-    assert [entry.text for entry in entries if isinstance(entry, Process)] == [
+    assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 2 * REJECTED_OF_TICK
+    assert [entry.text for entry in entries if isinstance(entry, ProcessEvent)] == [
         f"{1_000 - REJECTED_OF_TICK} more rejected messages left out"
     ] * 2

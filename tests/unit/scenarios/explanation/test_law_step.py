@@ -99,7 +99,7 @@ def test_a_limit_takes_what_is_beyond_it() -> None:
 
 
 def test_a_law_with_a_memory_is_made_again_from_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the last start before: what was before that it has forgotten, and on hold it was not asked."""
+    """From its last start: what was before it has forgotten, on hold it was not asked, and another process is another."""
     of_law(Counting(), monkeypatch)
     first = [decision(tick=tick, state=None) for tick in (1, 2)]
     hold = decision(tick=3, action="hold", state=None)
@@ -116,8 +116,14 @@ def test_a_law_with_a_memory_is_made_again_from_its_start(monkeypatch: pytest.Mo
 
     assert step.problem == ""
     assert step.P_set.step == pytest.approx(0.003)
+    wrong = "computed again, the law makes another step"
     restarted = [RecordedDecision(**vars(each) | {"restarted": each.tick == 5}) for each in before]
-    assert step_of(third, *restarted).problem.startswith("computed again, the law makes another step")
+    assert step_of(third, *restarted).problem.startswith(wrong)
+    others = [
+        RecordedDecision(**vars(each) | {"state": replace(each.state, epoch=2)}) if each.tick > 3 else each
+        for each in before
+    ]
+    assert step_of(third, *others).problem.startswith(wrong)
 
 
 def test_a_law_that_names_no_terms_has_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from scenarios.record.message_index import MessageOnWire, on_wire
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
 from wire.codec import encode
-from wire.journal import Heard, Received
+from wire.journal import MessageReference, ReceivedMessage
 from wire.messages import OFF
 
 EVERY = decision(neighbour("inv2", 5), state=None)
@@ -26,14 +26,15 @@ def sent(name: str, *numbers: int, **changes: Any) -> list[MessageOnWire]:
     return [on_wire(f"state/{name}", encode(each), None) for each in states]
 
 
-def fate_of(outcome: Outcome, **changes: Any) -> str:
+def fate_of(outcome: Outcome, *later: Outcome, **changes: Any) -> str:
     """What is said of the state of tick 6, whose verdict this is, after that of tick 5 was heard."""
 
     def messages(name: str, *, since: float, until: float, kind: str) -> Iterator[MessageOnWire]:
         found = (*sent("inv2", 4, 5), *sent("inv2", 6, **changes))
         return (each for each in found if since - 1e-9 <= each.t <= until + 1e-9)
 
-    trace = LinkTrace("inv2", "inv1", (6,), (0.12,), (outcome,))
+    count = 1 + len(later)
+    trace = LinkTrace("inv2", "inv1", (6,) * count, (0.12,) * count, (outcome, *later))
     others = LinkTrace("inv2", "inv3", (6,), (0.12,), ("cut",)), LinkTrace("inv4", "inv1", (6,), (0.12,), ("cut",))
     record = record_of(messages=messages, links=lambda: (trace, *others))
     fates = verdicts(record, "inv1", 0.0, 1.0)
@@ -53,8 +54,9 @@ def fate_of(outcome: Outcome, **changes: Any) -> str:
     ],
 )
 def test_the_verdict_of_the_link_says_why_a_state_was_not_heard(outcome: Outcome, why: str) -> None:
-    """Of several copies the sound ones count; those on other links, and of others, do not."""
+    """Of several copies the sound ones count, of several verdicts the last; other links, and other senders, do not."""
     assert fate_of(outcome) == f"1 state since: 1 {WORDS[why]}"
+    assert fate_of("cut", outcome) == fate_of(outcome)
 
 
 @pytest.mark.parametrize(("changes", "why"), [({"quiet": True}, "quiet"), ({"idle": True}, "idle")])
@@ -84,10 +86,10 @@ def test_without_a_verdict_only_the_number_is_told() -> None:
 def test_what_was_rejected_is_known_by_its_sender() -> None:
     """States alone; one whose bytes are noted has no number that can be trusted."""
     entries = [
-        Heard(None, "state/inv2", 1, 5, "stale"),
-        Heard(None, "state/inv2", 1, 6),
-        Received(None, "state/inv3", b"noise", "corrupt"),
-        Received(None, "command", b"noise", "corrupt"),
+        MessageReference(None, "state/inv2", 1, 5, "stale"),
+        MessageReference(None, "state/inv2", 1, 6),
+        ReceivedMessage(None, "state/inv3", b"noise", "corrupt"),
+        ReceivedMessage(None, "command", b"noise", "corrupt"),
     ]
     record = record_of(entries=lambda agent, *, since, until: iter(entries))
 

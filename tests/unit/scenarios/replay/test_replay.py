@@ -17,7 +17,7 @@ from scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
 from scenarios.replay.replay_error import ReplayError
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_plant import ISLANDING, ToyPlant
-from wire.journal import Heard, Process, Received, Token, Woken
+from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, Token, WakeUp
 from wire.messages import Measurement, State, Telemetry
 
 STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=5e4, V_set=277.0, Q=1e3, shared={"w": 0.5})
@@ -121,15 +121,15 @@ def test_the_steps_of_a_process_are_its_calls(record: RunRecord) -> None:
     """From its start on, in the order of time; each has what was sent in it, and the last one says that it is that."""
     ((_, steps),) = steps_of(record, "inv1")
 
-    assert isinstance(steps[0].entry, Process)
+    assert isinstance(steps[0].entry, ProcessEvent)
     assert steps[0].entry.kind == "start"
-    assert {type(step.entry) for step in steps} == {Process, Token, Heard, Received, Woken}
+    assert {type(step.entry) for step in steps} == {ProcessEvent, Token, MessageReference, ReceivedMessage, WakeUp}
     assert [step.due for step in steps] == sorted(step.due for step in steps)
     assert [step.last for step in steps] == [False] * (len(steps) - 1) + [True]
     states = [sent.key for step in steps for sent in step.sent]
     assert set(states) == {"state/inv1"}
     assert len(states) == len(list(record.messages(sender="inv1", kind="State")))
-    assert all(isinstance(step.entry, Woken) for step in steps if step.sent)
+    assert all(isinstance(step.entry, WakeUp) for step in steps if step.sent)
 
 
 def test_the_plant_is_the_first_process(record: RunRecord) -> None:

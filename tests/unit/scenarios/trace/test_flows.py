@@ -15,7 +15,7 @@ from scenarios.trace.flows import Flow, flows
 from tests.record.fake_clock import fake_clock_record
 from tests.unit.scenarios.explanation.decisions import state
 from wire.codec import encode
-from wire.journal import Sent
+from wire.journal import SentMessage
 
 
 def judged(*rows: tuple[float, Outcome], clock: str = "simulated") -> list[Flow]:
@@ -93,7 +93,7 @@ def test_in_real_time_messages_arrive_when_their_receivers_noted_them(tmp_path: 
 
 def test_with_speed_the_way_of_a_message_is_run_time() -> None:
     """A millisecond by the clock is ten of a run at ten times real time; a rejected message says so."""
-    sent = Sent(10.0, "state/inv2", encode(state("inv2", 5)))
+    sent = SentMessage(10.0, "state/inv2", encode(state("inv2", 5)))
     heard = on_wire("state/inv2", encode(state("inv2", 5)), 10.001, receiver="inv1", rejected="stale")
     info = SimpleNamespace(T_c=0.02, clock="wall", agents=(SimpleNamespace(speed=10.0),))
     record = SimpleNamespace(
