@@ -99,7 +99,7 @@ def test_a_limit_takes_what_is_beyond_it() -> None:
 
 
 def test_a_law_with_a_memory_is_made_again_from_its_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From its last start: what was before it has forgotten, on hold it was not asked, and another process is another."""
+    """From its last start: what was before it has forgotten, and on hold, or in another process, it was not asked."""
     of_law(Counting(), monkeypatch)
     first = [decision(tick=tick, state=None) for tick in (1, 2)]
     hold = decision(tick=3, action="hold", state=None)
