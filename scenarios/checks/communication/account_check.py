@@ -18,11 +18,13 @@ class MessageAccount:
     """Every state that was sent is accounted for at its receiver, link by link.
 
     Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision
-    has the neighbours' states of the tick before; in wall-clock time every number arrives.
+    has the neighbours' states of the tick before; in wall-clock time every number arrives, from the first one on that
+    does between two processes. A process that is silent for long, as it is frozen, begins anew: its links are given up.
     """
 
     in_flight_s: Annotated[float, Unit("s"), Plausible("the time of a message on its way", 0.0, 60.0)] = 1.0
-    """Time (s) before the end of the run, or of an agent, from which on a message may still be on its way."""
+    """Time (s) before the end of the run, or before an agent ends or is frozen, from which on a message may still be
+    on its way."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the links whose account does not close."""
@@ -49,8 +51,8 @@ class MessageAccount:
 
     def _not_arrived(self, found: CommunicationSummary, link: Link) -> Missing:
         missing = Missing()
-        for epoch, account in sorted(found.arrivals[link].items()):
-            until = min(found.sent[link[1]].epochs[epoch][1], found.t_end) - self.in_flight_s
+        for account in found.arrivals[link]:
+            until = min(account.until, found.t_end) - self.in_flight_s
             for t in (*[account.early.first] * account.early.count, *account.late.values()):
                 if t <= until:
                     missing.add(t)

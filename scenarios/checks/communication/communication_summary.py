@@ -37,6 +37,10 @@ DELAY_TICKS, DELAY = 300, 5.0
 ticks at the latest; seconds of wall-clock time, where it comes every 0.2 s."""
 
 
+PAUSE = 1.5
+"""Silence of a process (s of wall time) after which its links may be given up: Zenoh gives them 2 s."""
+
+
 class OldestUse(NamedTuple):
     """The oldest value of a neighbour that an agent used."""
 
@@ -64,8 +68,8 @@ class CommunicationSummary:
     """Simulated time: states without a verdict of their emulated link."""
     unheard: Mapping[Link, Missing]
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
-    arrivals: Mapping[Link, Mapping[int, ArrivalAccount]]
-    """Wall-clock time: what came over each link, by the epoch of the receiver's process."""
+    arrivals: Mapping[Link, Sequence[ArrivalAccount]]
+    """Wall-clock time: what came over each link, for each time in which both of its ends were there."""
     oldest: Mapping[Link, OldestUse]
     """The oldest value that was used of each link."""
     used: bool
@@ -127,7 +131,10 @@ class SummaryPass:
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
         self._verdicts = VerdictAccounts(self._sent)
-        self._arrivals, self._heals = ArrivalAccounts(self._sent), Heals(info, t_end, self._sent)
+        self._arrivals, self._heals = (
+            ArrivalAccounts(PAUSE * max(1.0, info.plant.speed)),
+            Heals(info, t_end, self._sent),
+        )
         self._counts: dict[Link, LinkCounts] = {}
         self._oldest: dict[Link, OldestUse] = {}
         self._used = False

@@ -126,9 +126,23 @@ class _Verdicts:
 
 
 @dataclass
-class ArrivalAccount:
-    """Wall-clock time: what came over a link while one process of the receiver was there."""
+class Presence:
+    """A time in which one process of an agent spoke without a long pause."""
 
+    epoch: int
+    """Its epoch."""
+    since: float
+    """Run time (s) of its first state."""
+    until: float
+    """Run time (s) of its last one."""
+
+
+@dataclass
+class ArrivalAccount:
+    """Wall-clock time: what came over a link while both of its ends were there."""
+
+    ends: tuple[Presence, Presence]
+    """Sender and receiver."""
     began: bool = False
     """Whether anything came."""
     early: Missing = field(default_factory=Missing)
@@ -136,29 +150,46 @@ class ArrivalAccount:
     late: dict[tuple[int, int], float] = field(default_factory=dict)
     """Run time (s) of the last ones, by epoch and number."""
 
+    @property
+    def until(self) -> float:
+        """Run time (s) at which the first of both ends fell silent: what it sent then may not have left it."""
+        return min(end.until for end in self.ends)
+
 
 class ArrivalAccounts:
-    """Wall-clock time: every state that was sent arrives, from the first one on that does."""
+    """Wall-clock time: every state that was sent arrives, from the first one on that does.
 
-    def __init__(self, sent: Mapping[str, SentStates]) -> None:
-        self._sent = sent
+    Parameters
+    ----------
+    pause : float
+        Silence of a process (s of run time) after which its links are given up, so that they have to be made anew.
+    """
+
+    def __init__(self, pause: float) -> None:
+        self._pause = pause
+        self._there: dict[str, list[Presence]] = defaultdict(list)
+        """When each agent was there, in the order of time."""
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
         self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
         self._links_of: dict[str, list[Link]] = defaultdict(list)
-        self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=2))
+        self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=3))
         """The last accounts of each link: what comes later than others did is still missing there."""
-        self.accounts: dict[Link, dict[int, ArrivalAccount]] = {}
-        """Accounts of each link, by the epoch of the receiver's process."""
+        self.accounts: dict[Link, list[ArrivalAccount]] = {}
+        """Accounts of each link."""
 
     def state(self, agent: str, state: SentState) -> None:
         """Note a state."""
+        there = self._there[agent]
+        if not there or there[-1].epoch != state.epoch or state.t > there[-1].until + self._pause:
+            there.append(Presence(state.epoch, state.t, state.t))
+        there[-1].until = max(there[-1].until, state.t)
         if not state.quiet:
             self._states[agent].append(state)
 
     def heard(self, link: Link, epoch: int, number: int) -> None:
         """Note that a state has arrived."""
         if link not in self._arrived:
-            self._arrived[link], self.accounts[link] = {}, {}
+            self._arrived[link], self.accounts[link] = {}, []
             self._links_of[link[0]].append(link)
         for account in self._open[link]:
             if account.late and account.late.pop((epoch, number), None) is not None:
@@ -174,23 +205,37 @@ class ArrivalAccounts:
             links = self._links_of.get(src, ())
             while states and states[0].t <= until:
                 state = states.popleft()
+                sender = self._at(src, state.t, state.epoch)
                 key = state.epoch, state.number
                 for link in links:
                     arrived = self._arrived[link]
                     came = key in arrived
                     if came:
                         del arrived[key]
-                    epoch = self._sent[link[1]].epoch_at(state.t)
-                    if epoch is None:
+                    receiver = self._at(link[1], state.t)
+                    if sender is None or receiver is None:
                         continue
-                    account = self.accounts[link].get(epoch)
-                    if account is None:
-                        account = self.accounts[link][epoch] = ArrivalAccount()
-                        self._open[link].append(account)
+                    account = self._account(link, (sender, receiver))
                     if came:
                         account.began = True
                     elif account.began:
                         _miss(account, key, state.t)
+
+    def _at(self, agent: str, t: float, epoch: int | None = None) -> Presence | None:
+        """Return the time in which an agent, or one process of it, was there at a run time (s)."""
+        return next(
+            (one for one in reversed(self._there[agent]) if one.since <= t <= one.until and epoch in (None, one.epoch)),
+            None,
+        )
+
+    def _account(self, link: Link, ends: tuple[Presence, Presence]) -> ArrivalAccount:
+        for account in reversed(self._open[link]):
+            if account.ends[0] is ends[0] and account.ends[1] is ends[1]:
+                return account
+        account = ArrivalAccount(ends)
+        self.accounts[link].append(account)
+        self._open[link].append(account)
+        return account
 
 
 def _miss(account: ArrivalAccount, key: tuple[int, int], t: float) -> None:

@@ -357,16 +357,13 @@ def test_a_state_is_kept_in_force_as_long_as_nothing_else_is_sent() -> None:
 
 def test_what_never_arrives_is_counted_where_it_is_too_much_to_keep() -> None:
     """The first and the number of them stay; the last ones stay one by one, as they may still arrive."""
-    sent = {name: SentStates(simulated=False) for name in NAMES}
-    accounts = ArrivalAccounts(sent)
+    accounts = ArrivalAccounts(1.5)
     accounts.heard(("inv1", "inv2"), 1, 0)
     for number in range(MOST + 1000):
         for name in NAMES:
-            state = SentState(number, 0.02 * number, 1, idle=False, quiet=False)
-            sent[name].put(state)
-            accounts.state(name, state)
+            accounts.state(name, SentState(number, 0.02 * number, 1, idle=False, quiet=False))
     accounts.flush(1e9)
-    account = accounts.accounts["inv1", "inv2"][1]
+    (account,) = accounts.accounts["inv1", "inv2"]
 
     assert (account.early.count, account.early.first, len(account.late)) == (999, pytest.approx(0.02), MOST)
     accounts.heard(("inv1", "inv2"), 1, MOST + 500)

@@ -1,0 +1,86 @@
+"""The account of what arrives in wall-clock time: over joins, kills and freezes, and one message that is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+
+from scenarios.checks.communication.link_accounts import ArrivalAccounts
+from scenarios.checks.communication.record_pass import SentState
+
+LINK = ("inv1", "inv2")
+
+IN_FLIGHT = 1.0
+"""Time (s) before the end of either side that is left out, as the check does."""
+
+
+def missing(
+    sender: Callable[[int], int | None], receiver: Callable[[int], int | None], lost: Collection[int]
+) -> list[float]:
+    """Run times (s) of the states that are missing, of 10 s with ten states a second.
+
+    `sender` and `receiver` give the epoch of the process at a tick, None where there is none or it is frozen; `lost`
+    are the ticks whose state does not arrive.
+    """
+    accounts = ArrivalAccounts(1.5)
+    for k in range(100):
+        t = round(0.1 * k, 9)
+        for agent, process in (("inv1", sender), ("inv2", receiver)):
+            if (epoch := process(k)) is not None:
+                accounts.state(agent, SentState(k, t, epoch, idle=False, quiet=False))
+        if (epoch := sender(k)) is not None and k not in lost:
+            accounts.heard(LINK, epoch, k)
+    accounts.flush(10.0)
+    found = accounts.accounts[LINK]
+    return [t for account in found for t in account.late.values() if t <= account.until - IN_FLIGHT]
+
+
+def always(k: int) -> int:
+    """One process all the time."""
+    return 1
+
+
+def test_a_message_that_is_lost_between_two_processes_is_missing() -> None:
+    """Nothing else is."""
+    assert missing(always, always, []) == []
+    assert missing(always, always, [40]) == [4.0]
+
+
+def test_the_first_messages_of_a_new_process_come_before_its_links_do() -> None:
+    """Sender or receiver is another process from 5 s on, and nothing arrives before 5.4 s; later ones must."""
+
+    def restarted(k: int) -> int:
+        return 1 if k < 50 else 2
+
+    for ends in ((restarted, always), (always, restarted)):
+        assert missing(*ends, range(50, 54)) == []
+        assert missing(*ends, [50, 51, 52, 53, 70]) == [7.0]
+
+
+def test_the_last_words_of_a_killed_process_may_not_leave_it() -> None:
+    """The sender dies at 6 s: what it sent in the last second may be lost, and what it sent before may not."""
+
+    def killed(k: int) -> int | None:
+        return 1 if k < 60 else None
+
+    assert missing(killed, always, [58, 59]) == []
+    assert missing(killed, always, [40, 59]) == [4.0]
+
+
+def test_links_of_a_process_that_is_frozen_for_long_are_given_up() -> None:
+    """Frozen from 3 to 6 s, heard again from 6.5 s on: what is lost then is missing, as what was lost before."""
+
+    def frozen(k: int) -> int | None:
+        return None if 30 <= k < 60 else 1
+
+    for ends in ((always, frozen), (frozen, always)):
+        assert missing(*ends, range(29, 65)) == []
+        assert missing(*ends, [10, *range(29, 65), 80]) == [1.0, 8.0]
+
+
+def test_a_short_pause_loses_nothing() -> None:
+    """Silent for a second: its links stay, and what was sent before it must arrive."""
+
+    def paused(k: int) -> int | None:
+        return None if 30 <= k < 40 else 1
+
+    assert missing(paused, always, [29]) == [2.9]
