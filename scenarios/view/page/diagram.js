@@ -54,8 +54,9 @@ export class Diagram {
       make("line", { x1: a[0], y1: a[1], x2: b[0], y2: b[1] }, g);
       make("rect", { class: "grab", x: x - 11, y: y - 11, width: 22, height: 22 }, g);
       make("rect", { x: x - 4.5, y: y - 4.5, width: 9, height: 9, rx: 1.5 }, g);
-      if (map.switches.length <= 40) make("text", { x: x + 8, y: y + 13 }, g).textContent = s.alias || s.name;
-      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, title: s.alias ? `${s.alias} (${s.name})` : s.name });
+      const text = map.switches.length <= 40 ? make("text", { x: x + 8, y: y + 13 }, g) : null;
+      if (text) text.textContent = s.alias || s.name;
+      this.hear(g, "switch", s.name); this.switches.set(s.name, { g, x, y, text, title: s.alias ? `${s.alias} (${s.name})` : s.name });
     }
     if (map.source >= 0) { const [x, y] = at[map.source]; make("path", { class: "substation", d: `M${x} ${y - 9}l9 9l-9 9l-9-9z` }, marks); }
     const nodes = this.keys.group(make("g", {}, this.svg), "Inverters"), r = few ? 9 : map.inverters.length > 60 ? 5 : 6.5, taken = new Map();
@@ -72,26 +73,40 @@ export class Diagram {
       this.hear(g, "agent", row.name);
       this.inverters.set(row.name, { g, kind: row.kind, value: null, x, y });
     }
-    if (few) this.label(r, W);
+    if (few) this.label(r, W, H);
     this.pairs.clear();
     if (this.last) this.update(...this.last);
     this.keys.settle(had);
   }
 
-  // Each label goes where it covers least of the marks and of the labels before it.
-  label(r, W) {
+  // Each label goes where it covers least of the marks and of the labels before it: those of the inverters, then of the switches.
+  label(r, W, H) {
     const covered = [...this.inverters.values()].map(({ x, y }) => [x - r - 2, y - r - 2, x + r + 2, y + r + 2]);
-    for (const { g } of this.switches.values()) { const box = g.querySelector(".grab"); covered.push([+box.getAttribute("x") + 4, +box.getAttribute("y") + 4, +box.getAttribute("x") + 18, +box.getAttribute("y") + 18]);
-      const text = g.querySelector("text"), x = text && +text.getAttribute("x"), y = text && +text.getAttribute("y"); if (text) covered.push([x, y - 10, x + 6 * text.textContent.length, y + 3]); }
+    for (const { x, y } of this.switches.values()) covered.push([x - 7, y - 7, x + 7, y + 7]);
     const shared = (a, b) => Math.max(0, Math.min(a[2], b[2]) - Math.max(a[0], b[0])) * Math.max(0, Math.min(a[3], b[3]) - Math.max(a[1], b[1]));
-    for (const [name, drawn] of this.inverters) {
-      const w = 50, h = 27, gap = r + 6, { x, y } = drawn;
-      const choices = [["start", gap, -3, x + gap, y - h / 2], ["end", -gap, -3, x - gap - w, y - h / 2], ["middle", 0, -gap - 12, x - w / 2, y - gap - h], ["middle", 0, gap + 8, x - w / 2, y + gap - 2]]
-        .map(([anchor, dx, dy, left, top], k) => { const box = [left, top, left + w, top + h]; return { anchor, dx, dy, box, cost: k + covered.reduce((sum, other) => sum + shared(box, other), 0) + (left < 2 || left + w > W - 2 ? 9999 : 0) }; });
+    // places: [anchor, dx, dy] of the first line, which rises so far above its base line; the best comes first
+    const place = (x, y, w, h, rises, places) => {
+      const choices = places.map(([anchor, dx, dy], k) => {
+        const left = x + dx - (anchor === "end" ? w : anchor === "middle" ? w / 2 : 0), top = y + dy - rises, box = [left, top, left + w, top + h];
+        const beyond = left < 2 || left + w > W - 2 || top < 0 || top + h > H ? 9999 : 0;
+        return { anchor, dx, dy, box, cost: k + beyond + covered.reduce((sum, other) => sum + shared(box, other), 0) };
+      });
       const best = choices.reduce((a, b) => b.cost < a.cost ? b : a);
       covered.push(best.box);
+      return best;
+    };
+    const gap = r + 6, near = r + 3;
+    const around = [["start", gap, -3], ["end", -gap, -3], ["middle", 0, -gap - 14], ["middle", 0, gap + 8], ["start", near, -near - 6], ["end", -near, -near - 6], ["start", near, near + 2], ["end", -near, near + 2]];
+    for (const [name, drawn] of this.inverters) {
+      const best = place(drawn.x, drawn.y, 50, 27, 11, around);
       make("text", { class: "name", x: best.dx, y: best.dy, "text-anchor": best.anchor }, drawn.g).textContent = name;
       drawn.value = make("text", { class: "value values", x: best.dx, y: best.dy + 13, "text-anchor": best.anchor }, drawn.g);
+    }
+    const corners = [["start", 8, 13], ["start", 8, -6], ["end", -8, 13], ["end", -8, -6], ["middle", 0, 19], ["middle", 0, -10], ["start", 10, 4], ["end", -10, 4]];
+    for (const { x, y, text } of this.switches.values()) {
+      if (!text) continue;
+      const best = place(x, y, 6 * text.textContent.length, 12, 9, corners);
+      text.setAttribute("x", x + best.dx); text.setAttribute("y", y + best.dy); text.setAttribute("text-anchor", best.anchor);
     }
   }
 
