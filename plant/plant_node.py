@@ -101,7 +101,7 @@ class PlantNode(Node):
                 self._tokens.add(key)
                 refusal = self._refusal(name, instance)
                 if refusal:
-                    self._refuse(name, instance, refusal)
+                    self._refuse(name, instance, refusal, now)
                 else:
                     self._process_came(name, instance)
 
@@ -125,7 +125,7 @@ class PlantNode(Node):
         """Return the reason why a process cannot take part; empty if it can."""
         raise NotImplementedError
 
-    def _refuse(self, name: str, instance: str, reason: str) -> None:
+    def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
         """Tell a process that it cannot take part."""
         self.stop(self.keys.stop_request(name, instance), reason, refused=True)
 

@@ -17,6 +17,7 @@ from plant.plant_interface import LivePlant
 from plant.realtime.realtime_plant import RealtimePlant
 from plant.start_words import COMPILING, LISTENING, READY
 from wire.driver.drive import StoppedError, drive, perform, serve
+from wire.driver.open_files import OpenFilesError, check_open_files
 from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
@@ -73,6 +74,10 @@ def run_plant(
         config = replace(config, epoch=new_epoch())
     else:
         schedule_as_batch()
+    try:
+        check_open_files(PLANT, len(config.agents) + len(config.recorders))
+    except OpenFilesError as error:
+        raise ConfigurationError(str(error)) from None
     plant: LivePlant | None = None
     listen, connect = config.listen, config.connect
     session = Session(

@@ -37,6 +37,7 @@ from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.plugin_keys import checks_of, claims_of
 from scenarios.schema.scenario_writing import to_toml
+from wire.driver.open_files import too_few_files
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing, PlantEvent, Telemetry
 
@@ -120,6 +121,8 @@ def _logged(request: Request, progress: Progress) -> RunReport:
                 if no_room(error) or not file.exists():  # the folder is gone, and with it this log
                     raise
                 traceback.print_exc(file=log)
+                if why := too_few_files(error):
+                    raise BrokenRunError(why) from error
                 raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
     except OSError as error:
         _log_no_room(file, f"broken: {refusal(request.folder, error)}\n")

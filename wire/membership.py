@@ -17,7 +17,7 @@ from wire.messages import Nameplate
 MOST_PROCESSES = 8
 """Processes that may claim one name: two, while one replaces another, and some that are mistaken."""
 
-ASKED_AT_ONCE = 50
+ASKED_AT_ONCE = 20
 """Most processes that are asked for their nameplates again in one go: a question costs as much as ten messages."""
 
 

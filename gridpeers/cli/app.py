@@ -13,6 +13,7 @@ from contextlib import suppress
 from typing import Literal
 
 from wire.driver.leftover import leave
+from wire.driver.open_files import raise_limit, too_few_files
 from wire.driver.output import speaking
 
 
@@ -38,6 +39,7 @@ def _main() -> None:
     # The plant's matrices are small: a second BLAS thread only spins, and takes a quarter of the time from the run.
     # It must be said before numpy is imported; the processes that are started inherit it.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    raise_limit()
     _start_ahead(driver_of(sys.argv[1:]))  # what servers import takes longer than all that comes before them here
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
@@ -50,7 +52,7 @@ def _main() -> None:
         except ModuleNotFoundError as error:
             fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail([str(error)], BROKEN)
+            fail([too_few_files(error) or str(error)], BROKEN)
 
 
 def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:

@@ -22,6 +22,7 @@ from wire.admission import FASTER
 from wire.links import Links, is_usable
 from wire.messages import AgentStatus, Journal, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
 from wire.node import Route
+from wire.rate_limit import RateLimit
 from wire.timing.timer import Timer
 from wire.traffic import TimedTraffic
 
@@ -29,6 +30,10 @@ Phase = Literal["gathering", "running", "closing", "over"]
 
 REFUSALS = 20
 """Refused processes that are logged: anybody may hold tokens."""
+
+REFUSAL_INTERVAL = 0.1
+"""Time (s, wall) after which one more process is told that it is refused, once so many have been told at once: each
+needs a publisher of its own, a millisecond or two in which the plant does not step."""
 
 AGAIN = 1.0
 """Time (s, wall) between two questions for the nameplates that have not come: a question dies with its link."""
@@ -54,6 +59,7 @@ class LivePlantNode(PlantNode):
         self._silence = SilenceDetector(config.max_age, config.T_c, config.T_c / config.speed)
         self._ask_timer = Timer(AGAIN, 0.0)
         self._refusals = 0
+        self._refusal_limit = RateLimit(REFUSALS, REFUSAL_INTERVAL)
         self.timed: TimedTraffic | None = None
         """Notes the plant's messages and tokens; None if nobody records them."""
         if self.journal is not None:
@@ -98,11 +104,15 @@ class LivePlantNode(PlantNode):
             return f"{reason} first (gridpeers stop {name}), or give this one another name"
         return ""
 
-    def _refuse(self, name: str, instance: str, reason: str) -> None:
+    def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
+        if self._refusal_limit.admit("refused", now) is None:
+            text = f"a token of {name}, one of too many to be told that they are refused"
+            self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
+            return
         self._refusals += 1
         if self._refusals <= REFUSALS:
             self._say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
-        super()._refuse(name, instance, reason)
+        super()._refuse(name, instance, reason, now)
 
     def _ask_again(self, now: float) -> None:
         """Ask for the nameplates that have not come."""

@@ -20,6 +20,7 @@ import msgspec
 
 from wire.driver.drive import StoppedError, StoppedOnLeashError
 from wire.driver.leftover import leave
+from wire.driver.open_files import raise_limit
 from wire.driver.output import watch_readers
 from wire.driver.session import SessionError
 from wire.driver.stop_signal import StopSignal
@@ -98,6 +99,7 @@ def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable
 
 def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
     watch_readers(quits=False)
+    raise_limit()
     options = sys.argv[1:]
     if options[:1] not in ([], [LEASH]) or len(options) > 2:
         named = get_args(config_type)[0] if isinstance(config_type, UnionType) else config_type

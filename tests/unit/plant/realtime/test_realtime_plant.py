@@ -7,6 +7,7 @@ from msgspec.structs import replace
 
 from agents.agent import Agent
 from plant.plant_config import ScheduledAction
+from plant.realtime.live_plant_node import REFUSALS
 from plant.realtime.realtime_plant import COMMANDS, LEAD, RealtimePlant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -518,6 +519,25 @@ def test_a_run_is_ended_once() -> None:
     assert [(answer.ok, answer.text) for answer in answers][1] == (False, "the run is ending")
     assert answers[0].ok
     assert [message.final for message in lab.take(Telemetry)].count(True) == 1
+
+
+def test_of_thousands_that_are_refused_some_are_told() -> None:
+    """Anybody may hold tokens: the first are told, then ten a second; the others are counted."""
+    lab = running(3)
+    lab.take(Stop)
+    for i in range(5_000):
+        lab.side.appeared(KEYS.alive_agent("inv2", f"x{i}"), lab.now)
+        lab.side.appeared(KEYS.alive_agent(f"who{i}", "x"), lab.now)
+    lab.do()
+    told = lab.take(Stop)
+    lab.now += 1.0
+    lab.side.appeared(KEYS.alive_agent("inv2", "y"), lab.now)
+    lab.do()
+
+    assert len(told) == REFUSALS
+    assert all(stop.refused for stop in told)
+    assert lab.side.rejects.counts["excess"] == 10_000 - REFUSALS
+    assert len(lab.take(Stop)) == 1
 
 
 def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:

@@ -1,0 +1,53 @@
+"""Floods in a run of real processes: bounded memory and log, control goes on, and every loss is counted.
+
+``python -m tests.resources`` does the same for longer, on the paper's feeder, and prints what docs/reliability.md has.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tests.resources.trial import Trial, Watch, attack_on, attacking
+from tests.toy.town import Town
+from wire.bounds import LIMIT
+from wire.driver.session import MOST_BYTES, Session
+
+TWO = ("inv1", "inv2")
+
+
+def test_floods_of_strangers_are_counted_and_control_goes_on(tmp_path: Path) -> None:
+    """States, measurements, stops, questions, long messages of somebody: the run goes on, and says how many it got."""
+    with Town(2, tmp_path).all() as town:
+        watch = Watch(town)
+        found: dict[str, Trial] = {}
+        with attacking(attack_on(town, "foreign", 10_000.0), tmp_path):
+            town.until(lambda: watch.rejected() > 3_000, "thousands are counted")
+            town.until(lambda: abs(town.rows[-1][1] - 60.0) < 0.005, "the frequency is restored meanwhile")
+        found["foreign"] = watch.result(town.rows[watch.first_row :])
+        watch = Watch(town)
+        with attacking(attack_on(town, "commands", 10_000.0), tmp_path):
+            town.until(lambda: ": excess (" in town.log("plant"), "the plant says that it answers no more")
+            watch.run_on(0.5)
+        found["commands"] = watch.result(town.rows[watch.first_row :])
+        watch = Watch(town)
+        someone = Session("someone", listen=("tcp/127.0.0.1:0",), connect=(town.endpoint,), clock="wall")
+        try:
+            town.until(lambda: someone.peers() > len(TWO), "links")
+            for length in (2 * MOST_BYTES, LIMIT + 1):
+                for name in TWO:
+                    someone.publish(town.keys.state(name), bytes(length))
+            town.until(lambda: watch.rejected() >= 2, "the long ones are counted")
+        finally:
+            someone.close()
+        found["long"] = watch.result(town.rows[watch.first_row :])
+        town.together(TWO)
+
+        assert found["foreign"].kinds
+        assert "excess" in found["commands"].kinds
+        assert "oversized" in found["long"].kinds
+        for kind, trial in found.items():
+            assert trial.rows > 10, kind
+            assert trial.growth < 2.0, (kind, trial.memory)
+            assert trial.log < 5_000, kind
+        assert [child.status for child in town.children] == [None] * 3
+        assert [event.text for event in town.events if "left" in event.text or "died" in event.text] == []
