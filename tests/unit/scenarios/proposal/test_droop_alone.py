@@ -24,3 +24,13 @@ def test_an_oscillation_and_a_collapse_are_found(gfl: dict[str, float], found: s
 
     assert found in said
     assert bool(said) == bool(found)
+
+
+def test_a_load_that_an_event_raises_counts_too() -> None:
+    """The plant is not found at rest before the load that it cannot feed has come."""
+    heavy = {str(bus): {"factor": 10.0} for bus in (48, 65, 76)}
+    islanding = gp.load("islanding")
+    events = [*islanding.tables["event"], {"label": "heavy", "t_s": 6.0, "load": heavy}]
+    scenario = islanding.replace({"event": events, "paper": ""})
+
+    assert "tripped" in unsteady(scenario.spec, scenario.feeder, "I")
