@@ -36,8 +36,9 @@ def fate_of(outcome: Outcome, *later: Outcome, **changes: Any) -> str:
     count = 1 + len(later)
     trace = LinkTrace("inv2", "inv1", (6,) * count, (0.12,) * count, (outcome, *later))
     others = LinkTrace("inv2", "inv3", (6,), (0.12,), ("cut",)), LinkTrace("inv4", "inv1", (6,), (0.12,), ("cut",))
-    record = record_of(messages=messages, links=lambda: (trace, *others))
-    fates = verdicts(record, "inv1", 0.0, 1.0)
+    another = LinkTrace("inv2", "inv1", (6,), (1.5,), ("partition",))  # of another process, which numbers anew
+    record = record_of(messages=messages, links=lambda: (trace, *others, another))
+    fates = verdicts(record, "inv1", 0.0, 2.0)
     return missed(record, EVERY, EVERY.neighbours[0], fates, {})
 
 

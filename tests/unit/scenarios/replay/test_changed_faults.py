@@ -5,11 +5,13 @@ from __future__ import annotations
 from math import inf
 
 import pytest
+from msgspec.structs import replace
 
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition
 from scenarios.replay.changed_faults import lossless, spliced, without_loss
+from wire.plugins.plugin import plugin_of
 
 EARLY = Fault(on="* -> inv1", delay=0.1, to_s=2.0)
 LONG = Fault(on="* -> inv2", delay=0.1)
@@ -37,6 +39,8 @@ def test_each_time_has_the_faults_of_its_configuration(since: float) -> None:
 
     for before, after in ((one, other), (other, one)):
         both = spliced(before, after, since)
+        for entry in (*both.links, *both.partitions):
+            assert entry.to_s is None or entry.from_s < entry.to_s
         for t in (0.0, 0.2, 0.6, 0.8, 1.2, 1.8, 2.2, 2.9, 3.2, 3.8, 4.5, 5.2, 5.8, 7.0, 9.0):
             assert in_force(both, t) == in_force(before if t < since else after, t), t
 
@@ -58,4 +62,6 @@ def test_without_loss_all_else_of_a_fault_is_left() -> None:
     assert (left.on, left.from_s, left.to_s) == ("* -> inv1", 1.0, 2.0)
     assert left.models() == Fault(on="* -> inv1", delay=0.1).models()
     assert lossless(EARLY) is EARLY
+    own = replace(lossy, delay=None, own=(plugin_of({"use": "mine:Burst"}),))
+    assert getattr(lossless(own), "own", None) == own.own
     assert without_loss(Netem(links=(Fault(on="* -> inv2", loss=0.2), lossy, EARLY))).links == (left, EARLY)
