@@ -72,9 +72,6 @@ class EmulatedLinks:
                 if math.isinf(interval.slow):  # a paused agent sends nothing: only the lock-step needed its message
                     return True
                 at += interval.slow
-        for interval in self._intervals.get(self._name, ()):
-            if interval.holds(t) and math.isinf(interval.slow):
-                at += interval.until - t
         if src in self._liars and type(message) is State:
             message = self._liars[src].told(message)
         self._receiver.offer(src, message.seq, t, at, payload, message)
@@ -86,8 +83,8 @@ class EmulatedLinks:
         return self._dropped_before + self._receiver.dropped
 
     def due(self, now: float) -> Sequence[Arrival]:
-        """Take out what has arrived by now (s of run time)."""
-        return self._receiver.due(now)
+        """Take out what has arrived by now (s of run time): a paused receiver takes it when it goes on."""
+        return () if self.stalled(now) else self._receiver.due(now)
 
     def stalled(self, t: float) -> bool:
         """Return whether the receiver itself is paused at t (s of run time)."""
