@@ -17,6 +17,7 @@ from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, History, Nameplates, read_only
 from scenarios.results.island_membership import part_of
 from scenarios.schema.configs import limits_of
+from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import without_agent
 from scenarios.schema.scenario_model import ScenarioModel
 from wire.messages import PlantEvent
@@ -135,10 +136,10 @@ class CheckedCase:
         times = [e.t for e in self.events if e.kind in _RESTARTS and window.start - 1e-9 <= e.t < window.end]
         return max((window.start, *times))
 
-    def rows_from(self, window: Window, after_s: float) -> Flags:
-        """Return the rows of a window that come `after_s` or later after its last disturbance."""
+    def rows_from(self, window: Window, after_s: float, since_s: float = 0.0) -> Flags:
+        """Return the rows of a window that come `after_s` or later after its last disturbance, and after `since_s`."""
         t = self.history.t
-        late: Flags = t >= self.disturbed_at(window) + after_s - 1e-9
+        late: Flags = t >= max(self.disturbed_at(window), since_s) + after_s - 1e-9
         return window.rows(t) & late
 
     @cached_property
@@ -165,6 +166,15 @@ class CheckedCase:
                     )
                 )
         return tuple(found)
+
+    def killed(self, history: History) -> Flags:
+        """Return which inverters of a history have an agent that the scenario has killed, by row; shape (T, N)."""
+        names = history.inverters
+        found: Flags = np.zeros(history.P.shape, bool)
+        for node in netem_of(self.scenario, self.case).nodes:
+            if node.kill and node.name in names:
+                found[history.t >= node.from_s - 1e-9, names.index(node.name)] = True
+        return found
 
     def at_limit(self, part: IslandWindow) -> Flags:
         """Return which inverters of an island deliver all power that they have available, by row: they cannot share.

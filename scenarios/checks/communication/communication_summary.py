@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from types import MappingProxyType
-from typing import NamedTuple
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.communication.heals import Heal, Heals
@@ -41,13 +40,16 @@ PAUSE = 1.5
 """Silence of a process (s of wall time) after which its links may be given up: Zenoh gives them 2 s."""
 
 
-class OldestUse(NamedTuple):
-    """The oldest value of a neighbour that an agent used."""
+@dataclass
+class OldUse:
+    """A value of a neighbour that an agent used, and that was older than all that it used of it later."""
 
     age: float
     """Its age (s); infinite if there was none."""
     t: float
-    """Run time of the decision (s)."""
+    """Run time of the first decision that used one of this age (s)."""
+    last: float
+    """Run time of the last of them (s)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +72,8 @@ class CommunicationSummary:
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
     arrivals: Mapping[Link, Sequence[ArrivalAccount]]
     """Wall-clock time: what came over each link, for each time in which both of its ends were there."""
-    oldest: Mapping[Link, OldestUse]
-    """The oldest value that was used of each link."""
+    oldest: Mapping[Link, list[OldUse]]
+    """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
     used: bool
     """Whether a decision used a neighbour's value."""
     heals: list[Heal]
@@ -136,7 +138,7 @@ class SummaryPass:
             Heals(info, t_end, self._sent),
         )
         self._counts: dict[Link, LinkCounts] = {}
-        self._oldest: dict[Link, OldestUse] = {}
+        self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         self._used = False
         self._t = self._flushed = 0.0
 
@@ -217,24 +219,24 @@ class SummaryPass:
 
     def _use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
         """Look at the states of neighbours that an own state came of."""
-        if new:
-            for use in uses.each:
-                if not use.unused:
-                    self._used = True
-                    self._note_age(state, use)
+        for use in uses.each:
+            if not use.unused:
+                self._used = True
+                self._note_age(state, use)
         if self._simulated:
             self._ticks.use(agent, state, uses, new=new)
         self._heals.use(agent, state, uses, new=new)
 
     def _note_age(self, state: SentState, use: NeighbourUse) -> None:
         """Note the age of a value, counted from the last tick at which its sender kept it in force."""
-        before = self._oldest.get(use.link, OldestUse(0.0, 0.0)).age
         age = inf if use.age is None else use.age
-        if age <= before:
-            return
-        number = use.number_at(state.number)
-        if use.age is not None and number is not None:
+        if 1.5 * self._info.T_c < age < inf and (number := use.number_at(state.number)) is not None:
             kept = self._sent[use.link[0]].window_at(state.t).kept_until(number)
             age = max(0.0, age - (kept - number) * self._info.T_c)
-        if age > before:
-            self._oldest[use.link] = OldestUse(age, state.t)
+        old = self._oldest[use.link]
+        while old and old[-1].age < age:
+            old.pop()
+        if old and old[-1].age == age:
+            old[-1].last = state.t
+        else:
+            old.append(OldUse(age, state.t, state.t))

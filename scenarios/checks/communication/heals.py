@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 from collections import defaultdict, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from math import inf
 
 import msgspec
 
 from netem.ledger import LinkTrace
+from netem.schema.fault import Span
 from netem.schema.pattern import Link as LinkEnds
 from scenarios.checks.communication.neighbour_use import Uses
 from scenarios.checks.communication.record_pass import Link, SentState
 from scenarios.checks.communication.sent_states import SentStates
+from scenarios.checks.communication.state_window import StateWindow
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 
 CUTS = ("cut", "partition")
 """Faults with an end, and reasons of dropped messages, that part two agents."""
+
+LOSSES = (*CUTS, "loss", "flap")
+"""Faults during which a link that was cut does not count as whole again."""
 
 
 @dataclass
@@ -28,7 +34,8 @@ class Heal:
     t: float
     """When (s)."""
     took: float | None = None
-    """After what time (s) the receiver used something that the sender has sent since; None if it never did."""
+    """After what time (s) the receiver used something that the sender has sent since; None if it never did. Times in
+    which one of them stood still, as it was paused, do not count."""
 
 
 class Heals:
@@ -65,7 +72,7 @@ class Heals:
         for t, outcome in zip(trace.t, trace.outcome, strict=True):
             if outcome in CUTS:
                 self._was_cut.add(link)
-            elif link in self._was_cut:
+            elif link in self._was_cut and not isinstance(outcome, str):
                 self._was_cut.discard(link)
                 self._add(Heal(link, t))
 
@@ -86,8 +93,10 @@ class Heals:
         for heal in waiting:
             used = number.get(heal.link)
             sent_at = None if used is None else self._sent[heal.link[0]].window_at(state.t).t(used)
-            if sent_at is not None and sent_at >= heal.t - 1e-9:
-                heal.took = state.t - heal.t
+            if used is not None and sent_at is not None and sent_at >= heal.t - 1e-9:
+                src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
+                begins = max(_at_work_since(src, used, heal.t), _at_work_since(dst, state.number, heal.t))
+                heal.took = max(0.0, state.t - begins)
         self._waiting[agent] = [heal for heal in waiting if heal.took is None]
 
     def found(self) -> list[Heal]:
@@ -107,6 +116,26 @@ class Heals:
             self._coming[heal.link] = deque(sorted(coming, key=lambda one: one.t))
 
 
+def _at_work_since(window: StateWindow, number: int, t: float) -> float:
+    """Return since when (s), from a time on, an agent has decided at every tick up to the one of a number."""
+    while window.decided(number - 1) and (window.t(number - 1) or 0.0) >= t - 1e-9:
+        number -= 1
+    return max(t, window.t(number) or 0.0)
+
+
+def _ends(spans: Iterable[Span]) -> Iterator[float]:
+    """Yield when (s) a link is whole again: cuts may overlap, and messages may go on being lost after one."""
+    until, was_cut = -inf, False
+    for span in sorted((it for it in spans if it.kind in LOSSES), key=lambda it: it.from_s):
+        if span.from_s > until:
+            if was_cut:
+                yield until
+            was_cut = False
+        until, was_cut = max(until, span.to_s), was_cut or span.kind in CUTS
+    if was_cut:
+        yield until
+
+
 def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
     """Yield the ends of the cuts that the scenario plans."""
     names = [config.name for config in info.agents]
@@ -116,7 +145,6 @@ def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
         except msgspec.ValidationError:
             continue
         for link in ((src, dst) for src in names for dst in names if src != dst):
-            for span in setup.netem.spans(LinkEnds(*link), setup.microgrids):
-                if span.kind in CUTS and span.to_s < t_end:
-                    yield Heal(link, span.to_s)
+            ends = _ends(setup.netem.spans(LinkEnds(*link), setup.microgrids))
+            yield from (Heal(link, t) for t in ends if t < t_end)
         return

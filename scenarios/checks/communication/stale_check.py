@@ -9,6 +9,7 @@ from typing import Annotated
 from agents.agent_config import MAX_AGE
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.judged_time import Since
 from wire.schema.plausible import Plausible, Unit
 
 
@@ -20,6 +21,8 @@ class StaleValues:
 
     max_age_s: Annotated[float, Unit("s"), Plausible("the greatest age of a state", 0.0, 3600.0)] = 0.0
     """Greatest age (s); 0: `max_age` of the agents, and where they have none, 0.25 s, as in wall-clock time."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the oldest value that was used of each link."""
@@ -30,17 +33,22 @@ class StaleValues:
             config.name: self.max_age_s or config.control.degraded_communication.max_age or MAX_AGE
             for config in found.info.agents
         }
+        judged = {
+            link: next((use for use in uses if use.last >= self.since_s), None) for link, uses in found.oldest.items()
+        }
         beyond = {
-            link: oldest for link, oldest in found.oldest.items() if oldest.age > limits[link[1]] + 0.5 * found.info.T_c
+            link: use
+            for link, use in judged.items()
+            if use is not None and use.age > limits[link[1]] + 0.5 * found.info.T_c
         }
         place = {name: i for i, name in enumerate(found.agents)}
         order = sorted(beyond, key=lambda link: (-beyond[link].age, place[link[1]], place.get(link[0], 0)))
-        for (neighbour, agent), oldest in ((link, beyond[link]) for link in order):
+        for (neighbour, agent), use in ((link, beyond[link]) for link in order):
             yield Violation(
                 text=f"age of the value of {neighbour} that was used",
-                t=oldest.t,
+                t=max(use.t, self.since_s),
                 agent=agent,
-                value=oldest.age if oldest.age < inf else None,
+                value=use.age if use.age < inf else None,
                 unit="s",
                 limit=limits[agent],
             )

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
+from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats
 from wire.schema.plausible import Plausible, Unit
 from wire.schema.relations import Below
@@ -23,11 +24,17 @@ class Frequency:
     """Largest abs(f - f_nom) (Hz): what the paper calls restored."""
     within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
     """Time (s) after the event from which on it holds."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the worst row of each inverter in each window; an island without a grid-forming one is dark."""
-        for part in _parts(case, self.within_s):
-            rows, history, plates = case.rows_from(part.window, self.within_s), part.history, part.nameplates
+        for part in _parts(case, self.within_s, self.since_s):
+            rows, history, plates = (
+                case.rows_from(part.window, self.within_s, self.since_s),
+                part.history,
+                part.nameplates,
+            )
             error = np.abs(history.f - case.f_nom)
             forming = history.present & plates.GFM
             yield from _worst(
@@ -52,22 +59,24 @@ class Voltage:
     """Greatest voltage (pu of nominal), of the same."""
     within_s: Annotated[float, Unit("s"), _SETTLING] = 2.0
     """Time (s) after the event from which on it holds: the clearing time of OV1 of IEEE 1547-2018."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the worst row of each inverter in each window."""
-        for part in _parts(case, self.within_s):
-            rows, history = case.rows_from(part.window, self.within_s), part.history
+        for part in _parts(case, self.within_s, self.since_s):
+            rows, history = case.rows_from(part.window, self.within_s, self.since_s), part.history
             V = history.V / part.nameplates.V_nom
             low, high = (self.low_pu > V) & history.present, ~(self.high_pu >= V) & history.present
             yield from _worst(part, rows, V, high, f"V, {part.label}", "pu", self.high_pu)
             yield from _worst(part, rows, V, low, f"V, {part.label}", "pu", self.low_pu, least=True)
 
 
-def _parts(case: CheckedCase, within_s: float) -> list[IslandWindow]:
+def _parts(case: CheckedCase, within_s: float, since_s: float) -> list[IslandWindow]:
     """Return the islands of the windows that last long enough; raise NotJudgedError if there are none."""
     if not case.windows:
         raise NotJudgedError("the run has no event")
-    parts = [part for part in case.parts if case.rows_from(part.window, within_s).any()]
+    parts = [part for part in case.parts if case.rows_from(part.window, within_s, since_s).any()]
     if not parts:
         raise NotJudgedError(f"no event has a window of more than {within_s:g} s")
     return parts

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.checks.check_verdict import Violation
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags
 from wire.schema.plausible import Plausible, Unit
 
@@ -24,14 +25,20 @@ class Rating:
     """Largest apparent power (pu of the rating) that may last: S_max of the grid-following inverters."""
     longest_s: Annotated[float, Unit("s"), Plausible("a time of overload", 0.0, 3600.0)] = 1.0
     """Longest time (s) above one of them."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
+
+    with_killed: bool = True
+    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the longest overload of each inverter that is too long."""
         history, s = case.history, case.nameplates.s
+        judged: Flags = (history.t >= self.since_s - 1e-9)[:, None] & (self.with_killed | ~case.killed(history))
         P, S = np.abs(history.P) / s, np.hypot(history.P, history.Q) / s
         for name, loading, limit in (("P", P, self.P_limit_pu), ("S", S, self.S_limit_pu)):
             for i, inverter in enumerate(history.inverters):
-                first, last = longest_stretch(~(loading[:, i] <= limit))
+                first, last = longest_stretch(~(loading[:, i] <= limit) & judged[:, i])
                 lasted = float(history.t[last] - history.t[first]) if last >= first else 0.0
                 if lasted > self.longest_s + 1e-9:
                     peak = loading[first : last + 1, i].max()

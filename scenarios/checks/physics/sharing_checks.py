@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
+from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats, History, Nameplates
 from scenarios.results.sharing_index import NO_LOAD, sharing_index
 from scenarios.results.steadiness import ends_of
@@ -25,10 +26,14 @@ class PowerSharing:
     """Largest MPSI, (16): what the paper calls shared."""
     after_s: Annotated[float, Unit("s"), _AFTER] = 2.0
     """Shortest time (s) from the event to the end of a window that is judged."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
+    with_killed: bool = True
+    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the islands that share unequally; those at the limit of their available power are left out."""
-        yield from _unequal(case, self.limit, self.after_s, "MPSI", lambda history: history.P, lambda of: of.m_p)
+        yield from _unequal(case, self, "MPSI", lambda history: history.P, lambda of: of.m_p)
 
 
 class VarSharing:
@@ -38,16 +43,19 @@ class VarSharing:
     """Largest MQSI, (17): a fifth of what islanding leaves without coordination, as in the paper."""
     after_s: Annotated[float, Unit("s"), _AFTER] = 2.0
     """Shortest time (s) from the event to the end of a window that is judged."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
+    with_killed: bool = True
+    """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the islands that share unequally."""
-        yield from _unequal(case, self.limit, self.after_s, "MQSI", lambda history: history.Q, lambda of: of.m_q)
+        yield from _unequal(case, self, "MQSI", lambda history: history.Q, lambda of: of.m_q)
 
 
 def _unequal(
     case: CheckedCase,
-    limit: float,
-    after_s: float,
+    check: PowerSharing | VarSharing,
     index: str,
     power: Callable[[History], Floats],
     droop: Callable[[Nameplates], Floats],
@@ -57,25 +65,25 @@ def _unequal(
     judged = 0
     for part in case.parts:
         end = ends_of(part.history.t, part.window.rows(part.history.t), part.window.start, part.window.end).steady
-        end = end & case.rows_from(part.window, after_s)
+        end = end & case.rows_from(part.window, check.after_s, check.since_s)
         if part.fed or not end.any():
             continue
-        sharing = _sharing(case, part)[end]
+        sharing = _sharing(case, part, with_killed=check.with_killed)[end]
         x, s, m = power(part.history)[end], part.nameplates.s, droop(part.nameplates)
         if not _anything_shared(x, s, sharing):
             continue
         judged += 1
         found = float(np.nanmean(sharing_index(x, s, m, sharing)))
-        if found > limit:
-            yield _violation(part, x, s, m, sharing, found, limit, index)
+        if found > check.limit:
+            yield _violation(part, x, s, m, sharing, found, check.limit, index)
     if not judged:
-        raise NotJudgedError(f"no island of two inverters shares anything {after_s:g} s after an event")
+        raise NotJudgedError(f"no island of two inverters shares anything {check.after_s:g} s after an event")
 
 
-def _sharing(case: CheckedCase, part: IslandWindow) -> Flags:
+def _sharing(case: CheckedCase, part: IslandWindow, *, with_killed: bool) -> Flags:
     """Return which inverters share, by row: present, with an agent, and not at the limit of their available power."""
     present: Flags = part.history.present & part.nameplates.shares & ~case.at_limit(part)
-    return present
+    return present if with_killed else present & ~case.killed(part.history)
 
 
 def _anything_shared(x: Floats, s: Floats, sharing: Flags) -> bool:

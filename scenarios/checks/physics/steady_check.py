@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
+from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats
 from scenarios.results.steadiness import FEWEST, STEADY, Ends, ends_of
 from wire.schema.plausible import Plausible, Unit
@@ -28,6 +29,8 @@ class SteadyEnd:
     """Fastest change of the terminal voltage (pu of nominal per s)."""
     after_s: Annotated[float, Unit("s"), Plausible("a settling time", 0.0, 3600.0)] = 2.0
     """Shortest time (s) from the event to the end of a window that is judged."""
+    since_s: Since = 0.0
+    """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the fastest inverter of each quantity and window."""
@@ -37,7 +40,9 @@ class SteadyEnd:
         for part in case.parts:
             history, plates = part.history, part.nameplates
             ends = ends_of(history.t, part.window.rows(history.t), part.window.start, part.window.end)
-            settled = (ends.last | ends.before).any() and case.rows_from(part.window, self.after_s)[ends.steady].all()
+            settled = (ends.last | ends.before).any() and case.rows_from(part.window, self.after_s, self.since_s)[
+                ends.steady
+            ].all()
             if not settled or min(ends.last.sum(), ends.before.sum()) < FEWEST:
                 continue
             judged = True

@@ -10,7 +10,7 @@ import pytest
 
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.physics.matrix_pencil import modes
-from tests.unit.scenarios.checks.cases import changed, ran, verdict
+from tests.unit.scenarios.checks.cases import changed, ran, ran_with, verdict
 from wire.messages import PlantEvent
 
 PLANT_CHECKS = (
@@ -236,3 +236,42 @@ def test_a_load_whose_new_power_is_not_told_ends_the_balance(sound: CheckedCase)
     assert verdict(wrong, "power_balance").status == "failed"
     assert verdict(replace(wrong, events=(*wrong.events, at[5.0])), "power_balance").status == "passed"
     assert verdict(replace(wrong, events=(*wrong.events, at[1.0])), "power_balance").status == "not judged"
+
+
+@pytest.mark.parametrize(
+    ("check", "limits"),
+    [
+        ("frequency", {"within_s": 0.5}),
+        ("voltage", {"within_s": 0.5}),
+        ("rating", {"longest_s": 0.1}),
+    ],
+)
+def test_what_is_out_before_the_time_of_a_check_is_not_judged(
+    sound: CheckedCase, check: str, limits: dict[str, float]
+) -> None:
+    """A fault of links or agents opens no window: `since_s` says from when on a check judges."""
+
+    def fault(of: Arrays) -> None:
+        during = (of["t"] > 5.0) & (of["t"] < 5.4)
+        of["f"][during, 3], of["V"][during, 3], of["P"][during, 3] = 60.05, 3000.0, 1e6
+
+    faulty = changed(sound, fault)
+
+    assert verdict(faulty, check, **limits).status == "failed"
+    assert verdict(faulty, check, **limits, since_s=4.8).status == "failed"
+    assert verdict(faulty, check, **limits, since_s=5.5).status == "passed"
+
+
+@pytest.mark.parametrize("check", ["power_sharing", "var_sharing", "steady"])
+def test_a_window_that_ends_too_soon_after_the_time_of_a_check_is_not_judged(sound: CheckedCase, check: str) -> None:
+    """From 6.5 s to the end at 7 s there is no time to settle."""
+    assert verdict(sound, check, since_s=4.5).status == "passed"
+    assert verdict(sound, check, since_s=6.5).status == "not judged"
+
+
+def test_an_inverter_whose_agent_was_killed_can_be_left_out() -> None:
+    """It stays at its set-points, and does not share the load that is left; the others do."""
+    killed = ran_with((("case.IV.node", repr([{"name": "inv5", "from_s": 2.0, "kill": True}])),)).checked_case
+
+    assert verdict(killed, "power_sharing").status == "failed"
+    assert verdict(killed, "power_sharing", with_killed=False).status == "passed"
