@@ -42,6 +42,7 @@ from wire.driver.output import OutputLostError
 from wire.messages import Pacing, PlantEvent, Telemetry
 
 if TYPE_CHECKING:
+    from plant.plant_interface import PlantLike
     from scenarios.checks.check_verdict import CheckVerdict
     from scenarios.live.numbers.departures import Departures
     from scenarios.results.event_windows import CaseRecord
@@ -145,7 +146,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     recorded, notes = {}, []
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
-        recorded[case], outcome = _run_case(request, case, text, progress)
+        recorded[case], outcome = run_case(request, case, text, progress)
         from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
@@ -180,7 +181,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
-    checks = {case: _judged(request, case, record, recorded[case].events) for case, record in cases.items()}
+    checks = {case: verdicts_on(request, case, record, recorded[case].events) for case, record in cases.items()}
     write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
         if request.lasting:
@@ -208,7 +209,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     return report
 
 
-def _judged(
+def verdicts_on(
     request: Request, case: str, record: CaseRecord, events: tuple[PlantEvent, ...]
 ) -> tuple[CheckVerdict, ...]:
     """Return the verdicts of the checks on a case."""
@@ -248,8 +249,33 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     }
 
 
-def _run_case(request: Request, case: str, toml: str, progress: Progress) -> tuple[Recorded, Outcome]:
-    """Run one case by the driver asked for, and record it; `toml` is the scenario as run."""
+def run_case(
+    request: Request,
+    case: str,
+    toml: str,
+    progress: Progress,
+    plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
+) -> tuple[Recorded, Outcome]:
+    """Run one case by the driver asked for, and record it.
+
+    Parameters
+    ----------
+    request : Request
+        The run.
+    case : str
+        Name of the case.
+    toml : str
+        The scenario as run, for its record.
+    progress : Progress
+        Takes the progress.
+    plant_at_rest : Callable[[PlantConfig], PlantLike], optional
+        In one process: gives the plant at t = 0 instead of building it.
+
+    Raises
+    ------
+    BrokenRunError
+        If the case broke.
+    """
     time = request.scenario.time
     plant, agents = _configs(request, case)
     record = _record_info(request, case, toml, plant, agents)
@@ -272,7 +298,8 @@ def _run_case(request: Request, case: str, toml: str, progress: Progress) -> tup
             if request.driver == "inprocess":
                 from scenarios.drivers.inprocess import run_inprocess
 
-                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder)
+                ready = None if plant_at_rest is None else plant_at_rest(plant)
+                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder, plant=ready)
             else:
                 from scenarios.drivers.process_driver import run_processes
 

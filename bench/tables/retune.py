@@ -13,7 +13,6 @@ from __future__ import annotations
 from msgspec.structs import replace
 
 from scenarios.schema import load_scenario
-from scenarios.sweep.file import Run
 from scenarios.sweep.sweep_case import run_one
 from scenarios.sweep.workers import cores, on_this_machine
 
@@ -35,7 +34,7 @@ def main() -> None:
         gains = replace(scenario.gains, alpha=alpha, beta_GFM=beta, beta_GFL=beta)
         cases[f"a{alpha}-b{beta}"] = replace(scenario.cases["untuned"], gains=gains)
     whole = replace(scenario, cases=cases)
-    runs = [(i, Run(scenario=whole, case=case, sample=i, shown={})) for i, case in enumerate(cases)]
+    runs = [(i, whole, case) for i, case in enumerate(cases)]
     measures = {end.number: end.measures for end in on_this_machine(runs, cores(), run_one)}
     print("alpha   beta   V_error pu   MQSI    restored")
     for i, (alpha, beta) in enumerate([(float("nan"), float("nan")), *points]):

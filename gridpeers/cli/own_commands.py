@@ -24,6 +24,7 @@ OWN_COMMANDS = {
         ("check", "show:check", "Check a scenario file and its feeder for problems."),
         ("doc", "show:doc", "Print a reference page that is made from the code."),
         ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+        ("chaos", "chaos_command:chaos", "Disturb a scenario at random; judge and shrink what fails."),
         ("predict", "predict:predict", "Predict from theory how a scenario will go."),
         ("compare", "compare_command:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "metrics_command:metrics", "Measure a run from its record, also one that was killed."),

@@ -88,7 +88,8 @@ def sweep(
     plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else tuple(cases or ()), seeds)
     done: dict[int, SweepRow] = {}
     kept: dict[int, pd.DataFrame | None] = {}
-    results = on_this_machine(list(enumerate(plan.runs)), _jobs(plan, jobs), run_with_history if histories else _run)
+    calls = [(number, run.scenario, run.case) for number, run in enumerate(plan.runs)]
+    results = on_this_machine(calls, _jobs(plan, jobs), run_with_history if histories else _run)
     with closing(results):
         for row, history in results:
             done[row.number] = row

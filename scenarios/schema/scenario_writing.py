@@ -12,8 +12,10 @@ from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
 
-def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = ()) -> str:
-    """Every key of a scenario, defaults included, and a table about the run.
+def to_toml(
+    scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = (), *, terse: bool = False
+) -> str:
+    """Every key of a scenario, defaults included, and a table about the run; or what differs from the defaults alone.
 
     Defaults are written out because they may differ in a later version; the text can be run again as it is, and the
     table `[as_run]` is read over then.
@@ -26,8 +28,12 @@ def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterabl
         Driver, versions and the like.
     remarks : Iterable[str], optional
         Sentences on what the scenario does not say of the run, for the head of the file.
+    terse : bool, optional
+        Whether values that are defaults, and the table about the run, are left out.
     """
-    keys, tables = _lines(scenario, "", scenario)
+    keys, tables = _lines(scenario, "", scenario, terse=terse)
+    if terse:
+        return "\n".join([*(f"# {remark}".rstrip() for remark in remarks), *keys, *tables]) + "\n"
     lines = [
         "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
         *(f"# {remark}" for remark in remarks),
@@ -41,7 +47,7 @@ def to_toml(scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterabl
 
 
 def _lines(
-    struct: msgspec.Struct, path: str, common: ScenarioModel, *, entry: bool = False
+    struct: msgspec.Struct, path: str, common: ScenarioModel, *, entry: bool = False, terse: bool = False
 ) -> tuple[list[str], list[str]]:
     """Return the keys of a table, and the tables below it, as TOML wants them ordered; no case repeats a common table.
 
@@ -51,30 +57,32 @@ def _lines(
     tables: list[str] = []
     for field in fields_of(type(struct)):
         value, where = getattr(struct, field.name), f"{path}.{_key(field.key)}" if path else _key(field.key)
-        default = struct.__struct_config__.omit_defaults and not field.required and value == field.default
+        omits = terse or struct.__struct_config__.omit_defaults
+        default = omits and not field.required and INHERITED not in field.marks and value == field.default
         common_too = INHERITED in field.marks and value == getattr(common, field.name)
+        below_terse = terse and INHERITED not in field.marks  # beside a common table, a default is not what is left out
         if value is None or default or common_too or NO_KEY in field.marks:
             continue
         if others := field.mark(OtherKeys):
             keys += [f"{_key(key)} = {inline(given)}" for key, given in map(others.write, value)]
         elif INLINE in field.marks:
-            inner, below = _lines(value, path, common)
+            inner, below = _lines(value, path, common, terse=below_terse)
             keys, tables = keys + inner, tables + below
         elif isinstance(value, msgspec.Struct) and not entry:
-            tables += _table(f"[{where}]", value, where, common)
+            tables += _table(f"[{where}]", value, where, common, terse=below_terse)
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
             for item in value:
-                tables += ["", f"[[{where}]]", *_lines(item, where, common, entry=True)[0]]
+                tables += ["", f"[[{where}]]", *_lines(item, where, common, entry=True, terse=terse)[0]]
         elif isinstance(value, dict) and not entry and any(isinstance(it, msgspec.Struct) for it in value.values()):
             for name, item in value.items():
-                tables += _table(f"[{where}.{_key(name)}]", item, f"{where}.{_key(name)}", common)
+                tables += _table(f"[{where}.{_key(name)}]", item, f"{where}.{_key(name)}", common, terse=terse)
         elif value or not isinstance(value, tuple | dict):
             keys.append(f"{field.key} = {inline(msgspec.to_builtins(value))}")
     return keys, tables
 
 
-def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel) -> list[str]:
-    keys, tables = _lines(struct, path, common)
+def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel, *, terse: bool) -> list[str]:
+    keys, tables = _lines(struct, path, common, terse=terse)
     return ["", header, *keys, *tables]
 
 

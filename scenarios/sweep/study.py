@@ -50,7 +50,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
     """
     before = len(folder.done)
     tell(before)
-    left = [(number, run) for number, run in enumerate(plan.runs) if number not in folder.done]
+    left = [(i, run.scenario, run.case) for i, run in enumerate(plan.runs) if i not in folder.done]
     try:
         if left:
             results = on_dask(left, dask, run_one) if dask else on_this_machine(left, min(jobs, len(left)), run_one)

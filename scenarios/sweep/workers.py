@@ -1,4 +1,4 @@
-"""The runs of a sweep in this process, over all cores of this machine or over a Dask cluster, the last two by joblib.
+"""Many runs, as of a sweep: in this process, over all cores of this machine, or over a Dask cluster by joblib.
 
 Ctrl-C is for the command alone: workers of this machine are started with SIGINT blocked, and they are ended when the
 command leaves. Workers write nothing to the terminal: a run's error comes as its result.
@@ -10,19 +10,17 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, TypeVar
 
-from scenarios.schema import ScenarioModel
-from scenarios.sweep.file import Run
-
 T = TypeVar("T")
 
-Task = Callable[[int, ScenarioModel, str], T]
-"""Does one run: its number, its scenario, its case."""
+Task = Callable[..., T]
+"""Does one run."""
 
-NumberedRuns = Sequence[tuple[int, Run]]
+Calls = Iterable[tuple[Any, ...]]
+"""Arguments of the task for each run, such as its number, its scenario and its case; taken as workers become free."""
 
 _WARNINGS = "PYTHONWARNINGS"
 
@@ -41,14 +39,14 @@ def cores() -> int:
     return int(cpu_count())
 
 
-def on_this_machine(runs: NumberedRuns, jobs: int, task: Task[T]) -> Generator[T, None, None]:
+def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None, None]:
     """Do the runs in `jobs` processes; each result comes as soon as it is there, in whatever order.
 
     Close the generator to end the workers early.
     """
     if jobs == 1:
-        for number, run in runs:
-            yield task(number, run.scenario, run.case)
+        for call in runs:
+            yield task(*call)
         return
     from joblib import parallel_config
     from joblib.externals.loky import get_reusable_executor
@@ -60,7 +58,7 @@ def on_this_machine(runs: NumberedRuns, jobs: int, task: Task[T]) -> Generator[T
             get_reusable_executor(reuse=True).shutdown(wait=True, kill_workers=True)
 
 
-def on_dask(runs: NumberedRuns, address: str, task: Task[T]) -> Generator[T, None, None]:
+def on_dask(runs: Calls, address: str, task: Task[T]) -> Generator[T, None, None]:
     """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders.
 
     Raises
@@ -87,10 +85,10 @@ def on_dask(runs: NumberedRuns, address: str, task: Task[T]) -> Generator[T, Non
             raise WorkersError(f"--dask {address}: the scheduler has no worker; start some by `dask worker`") from None
 
 
-def _parallel(runs: NumberedRuns, task: Task[T]) -> Generator[T, None, None]:
+def _parallel(runs: Calls, task: Task[T]) -> Generator[T, None, None]:
     from joblib import Parallel, delayed
 
-    tasks = (delayed(task)(number, run.scenario, run.case) for number, run in runs)
+    tasks = (delayed(task)(*call) for call in runs)
     with _without_interrupts():
         # one run a batch: each result is kept at once
         results: Any = Parallel(return_as="generator_unordered", batch_size=1)(tasks)

@@ -1,0 +1,121 @@
+"""The command `gridpeers chaos`. What it needs is imported when it is used, so that help comes at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import typer
+
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, ScenarioName, chosen, fail, load, require
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from scenarios.chaos.campaign import Campaign, Summary
+    from scenarios.chaos.chaos_folder import ChaosFolder
+    from scenarios.schema import ScenarioModel
+
+_PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
+
+
+def chaos(
+    scenario: ScenarioName,
+    runs: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs.")] = 100,
+    driver: Annotated[
+        Literal["inprocess", "processes"],
+        typer.Option(help="inprocess: each run in one process; processes: one per agent, beside the same in one."),
+    ] = "inprocess",
+    seed: Annotated[int, typer.Option(min=0, max=10**9, metavar="S", help="Seed of all that is drawn.")] = 1,
+    case: Annotated[
+        str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
+    ] = None,
+    jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
+    ] = None,
+) -> None:
+    """Disturb a scenario at random; judge and shrink what fails.
+
+    Agents are killed and paused, leave and join; links are cut, slow and lossy; switches open and close; agents lie.
+    Once the last of it has ended, the checks judge the run (docs/chaos.md). Each kind of failure becomes a scenario
+    file with few disturbances, for `gridpeers run`.
+
+    Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, 130 interrupted by
+    Ctrl-C: what came until then is written.
+
+    Example:  gridpeers chaos islanding --runs 200
+    """
+    spec, feeder = load(scenario)
+    spec = chosen(spec, case or list(spec.cases)[-1], None)
+    _refuse_unless_possible(scenario, spec, case, driver)
+    require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
+    from datetime import datetime
+
+    from rich.console import Console
+
+    from scenarios.chaos.campaign import Campaign
+    from scenarios.chaos.chaos_folder import ChaosFolder
+    from scenarios.chaos.disturbed_scenario import ChaosBase
+    from scenarios.results.run_files import FolderError, new_folder
+    from scenarios.sweep.workers import cores
+    from wire.driver.command_line import command_line
+
+    base = ChaosBase(spec, feeder)
+    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
+    console = Console()
+    _try_undisturbed(console, campaign)
+    words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
+    try:
+        path = new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
+        folder = ChaosFolder(path, base, seed, command_line(*words))
+    except (FolderError, OSError) as error:
+        fail([str(error)], BAD_INPUT)
+    summary = _carry_out(console, campaign, folder)
+    for line in summary.lines():
+        typer.echo(line)
+    raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
+
+
+def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None, driver: str) -> None:
+    """End with one line if the scenario cannot be disturbed."""
+    if len(spec.cases) > 1:
+        fail([f"--case: takes one case, got {case}"], BAD_INPUT)
+    if spec.plant.simulator != "gridpeers":
+        simulator = spec.plant.simulator
+        fail([f'{scenario}: plant.simulator = "{simulator}" lets nobody leave or join; use "gridpeers"'], BAD_INPUT)
+    if spec.security == "mtls" and driver == "processes":
+        fail([f'{scenario}: security = "mtls" needs certificates, which chaos does not take; leave it out'], BAD_INPUT)
+
+
+def _try_undisturbed(console: Console, campaign: Campaign) -> None:
+    """End with a line for each check that the scenario violates by itself."""
+    from gridpeers.cli.progress import TRYING, explained_work
+    from scenarios.chaos.campaign import undisturbed
+
+    with explained_work(lambda: console.print(TRYING, highlight=False, soft_wrap=True)):
+        row = undisturbed(campaign)
+    if row.violated:
+        name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
+        advice = "choose another case, or switch these checks off in the scenario (docs/checks.md)"
+        lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
+        fail([*lines, advice], BAD_INPUT)
+
+
+def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder) -> Summary:
+    """Do the campaign, showing how far it is; whatever ends it early ends the command."""
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.remaining import remaining
+    from scenarios.chaos.campaign import run_campaign
+    from scenarios.results.run_files import refusal, shown
+    from scenarios.sweep.workers import WorkersError
+
+    try:
+        with interruptible(), remaining(console, 1.0) as tell:
+            return run_campaign(campaign, folder, lambda what, done, of: tell(what, done / of))
+    except (KeyboardInterrupt, OSError, WorkersError) as error:
+        kept = f"{len(folder.rows)} of {campaign.runs} runs are kept in {shown(folder.path)}/"
+        if isinstance(error, KeyboardInterrupt):
+            fail([f"interrupted; {kept}"], exit_code(error))
+        fail([refusal(folder.path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)

@@ -1,0 +1,196 @@
+"""A campaign: many runs with disturbances, what they violate, and each kind of failure shrunk to a scenario file."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+from scenarios.chaos.chaos_folder import ChaosFolder, again
+from scenarios.chaos.chaos_run import (
+    ASKED,
+    REPEATS,
+    SAME,
+    ChaosRow,
+    compared,
+    run_number,
+    run_schedule,
+    seed_of,
+    shrink_number,
+)
+from scenarios.chaos.disturbance import Disturbance, Schedule
+from scenarios.chaos.disturbed_scenario import ChaosBase
+from scenarios.chaos.schedule_search import BATCH, drawn
+from scenarios.checks.check_registry import chosen_checks
+from scenarios.results.run_files import refusal, set_broken, set_complete
+from scenarios.run import Driver
+from scenarios.sweep.workers import on_this_machine
+
+REPEATED = 20
+"""Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""
+
+Tell = Callable[[str, float, float], None]
+"""Takes a piece of work, how much of it is done, and how much there is."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Campaign:
+    """What is to be done."""
+
+    base: ChaosBase
+    seed: int
+    runs: int
+    driver: Driver = "inprocess"
+    jobs: int = 1
+    """Processes for runs in one process each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Failure:
+    """One kind of failure: what is violated, and the simplest schedule found for it."""
+
+    violated: str
+    row: ChaosRow
+    """The run in which it was found, among those with the fewest disturbances."""
+    schedule: Schedule
+    file: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Summary:
+    """The result of a campaign, whole or interrupted."""
+
+    campaign: Campaign
+    rows: dict[int, ChaosRow]
+    failures: tuple[Failure, ...]
+
+    @property
+    def violated(self) -> int:
+        """Number of runs that violated anything."""
+        return sum(bool(row.violated) for row in self.rows.values())
+
+    def lines(self) -> Iterator[str]:
+        """Yield the report."""
+        base, rows = self.campaign.base, self.rows.values()
+        how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
+        kinds = Counter(kind_of(it) for row in rows for it in row.schedule)
+        drawn = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
+        head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
+        yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
+        yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
+        for name in (*ASKED, *chosen_checks(base.scenario.checks)):
+            passed = sum(name in row.passed for row in rows)
+            failed = sorted(row.number for row in rows if name in row.violated)
+            if passed or failed:
+                first = f"run {failed[0]}" if failed else ""
+                yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
+        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips"
+        for failure in self.failures:
+            yield f"{failure.violated}, run {failure.row.number}: {failure.row.violated[failure.violated]}"
+            yield from (f"    {it}" for it in sorted(failure.schedule, key=lambda it: it.begins_s))
+            yield f"    {again(failure.file)}"
+
+
+def kind_of(disturbance: Disturbance) -> str:
+    """Return the kind of a disturbance in a word."""
+    table, entry = disturbance.table, disturbance.entry
+    if table == "partition":
+        return table
+    words: tuple[str, ...] = ("cut", "delay", "loss", "duplicate", "corrupt", "pause", "slow_s", "kill", "lies")
+    words += ("leave", "join", "open", "close", "load", "P_max_kW")
+    return next((word.removesuffix("_s") for word in words if word in entry), table)
+
+
+def undisturbed(campaign: Campaign) -> ChaosRow:
+    """Return the result of the scenario without any disturbance, in this process."""
+    return run_schedule(campaign.base, (), seed_of(campaign.seed, 0))
+
+
+def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary:
+    """Do the runs, shrink what fails, and write all of it; what came until an interruption is written, too.
+
+    Parameters
+    ----------
+    campaign : Campaign
+        What to do.
+    folder : ChaosFolder
+        Its folder.
+    tell : Tell
+        Takes the progress: runs, then failures that are shrunk.
+    """
+    failures: dict[str, Failure] = {}
+    try:
+        with closing(_results(campaign)) as results:
+            for row in results:
+                first = folder.rows.get(row.number)
+                folder.add(row if first is None else compared(first, row, REPEATS))
+                bad = sum(bool(it.violated) for it in folder.rows.values())
+                text = f"{campaign.base.scenario.name}, {len(folder.rows)} of {campaign.runs} runs, {bad} violated"
+                tell(text, len(folder.rows), campaign.runs)
+        _add_failures(failures, folder)
+        with closing(_shrunk(campaign, tuple(failures.values()))) as simpler:
+            for i, (violated, schedule) in enumerate(simpler):
+                row = failures[violated].row
+                file = folder.write_failure(violated, row, schedule)
+                failures[violated] = Failure(violated=violated, row=row, schedule=schedule, file=file)
+                tell(f"shrinking, {i + 1} of {len(failures)} kinds of failure", i + 1, len(failures))
+    except BaseException as error:
+        _add_failures(failures, folder)
+        why = refusal(folder.path, error) if isinstance(error, OSError) else str(error)
+        why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
+        set_broken(folder.path, f"{why} after {len(folder.rows)} of {campaign.runs} runs")
+        raise
+    else:
+        set_complete(folder.path)
+    finally:
+        folder.sort()
+        summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
+        (folder.path / "report.txt").write_text("\n".join(summary.lines()) + "\n", encoding="utf-8")
+    return summary
+
+
+def _results(campaign: Campaign) -> Generator[ChaosRow, None, None]:
+    """Yield the results of all runs, and those of the repeated ones once more."""
+    text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
+    calls = ((text, seed, number, schedule, driver) for number, schedule in _numbered(campaign))
+    yield from on_this_machine(calls, 1 if driver == "processes" else campaign.jobs, run_number)
+
+
+def _numbered(campaign: Campaign) -> Iterator[tuple[int, Schedule]]:
+    """Yield number and schedule of each run as they are asked for; of repeated ones again, at the end of the batch."""
+    for batch in range(-(-campaign.runs // BATCH)):
+        runs = [*enumerate(drawn(campaign.base, campaign.seed, batch), batch * BATCH)]
+        runs = runs[: campaign.runs - batch * BATCH]
+        yield from runs
+        yield from (run for run in runs if run[0] % REPEATED == 0)
+
+
+def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
+    """Add each new kind of failure with the run that has the fewest disturbances, and write its scenario as it is."""
+    rows = sorted(folder.rows.values(), key=lambda row: (len(row.schedule), row.number))
+    for violated in sorted({name for row in rows for name in row.violated} - failures.keys()):
+        row = next(row for row in rows if violated in row.violated)
+        file = folder.write_failure(violated, row, row.schedule)
+        failures[violated] = Failure(violated=violated, row=row, schedule=row.schedule, file=file)
+
+
+def _shrunk(campaign: Campaign, failures: tuple[Failure, ...]) -> Generator[tuple[str, Schedule], None, None]:
+    """Yield for each failure the simplest schedule found."""
+    if not failures:
+        return
+    calls = [
+        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated))
+        for it in failures
+    ]
+    yield from on_this_machine(calls, min(campaign.jobs, len(calls)), _shrink)
+
+
+def _driver(campaign: Campaign, violated: str) -> Driver:
+    """Return the driver with which a failure is shrunk: processes only for what one process cannot show."""
+    return campaign.driver if violated in (SAME, REPEATS) else "inprocess"
+
+
+def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver) -> tuple[str, Schedule]:
+    return violated, shrink_number(text, seed, number, violated, driver)

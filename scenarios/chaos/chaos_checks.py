@@ -1,0 +1,74 @@
+"""Checks of a run with disturbances: what control promises once the last of them has ended (docs/chaos.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from scenarios.checks.check_registry import ALWAYS, check_name
+from wire.plugins.plugin import table_of
+
+WITHIN_S = 4.0
+"""Time (s) after the last change within which a run is to be restored. Set-points come back from their bounds at the
+rate of the law, and vars, the slowest, settle within 3 s after a large step."""
+
+JUDGED_S = 0.8
+"""Time (s) for which it is judged then, up to the end of the run."""
+
+REJOINED_S = 1.0
+"""Longest time (s) after a cut until a value from over there is used: in simulated time nothing has to connect again,
+and no delay is longer."""
+
+LATEST_S = 0.5
+"""Time (s) after the last change from which on no decision uses a stale value: as long as the longest delay."""
+
+_AFTER: Mapping[str, Mapping[str, Any]] = {
+    "frequency": {"within_s": WITHIN_S},
+    "voltage": {"within_s": WITHIN_S},
+    "power_sharing": {"after_s": WITHIN_S, "with_killed": False},
+    "var_sharing": {"after_s": WITHIN_S, "with_killed": False},
+    "rating": {"with_killed": False},
+    "steady": {"after_s": WITHIN_S},
+    "stale_values": {},
+}
+"""Checks that are judged from the last change on, with their limits."""
+
+TAIL_S = 2.0
+"""Tail of the run (s) in which nothing may oscillate any more."""
+
+_ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": TAIL_S}}
+"""Other limits of checks that hold for the whole run; those that are not named here have their own."""
+
+_LATER = {"stale_values": LATEST_S}
+"""Time (s) by which a check is judged later than the last change."""
+
+
+def chaos_checks(own: Iterable[str | Mapping[str, Any]], settled_s: float) -> list[str | dict[str, Any]]:
+    """Return the checks of a run with disturbances, as entries of its scenario.
+
+    What the scenario itself says of a check stays: its limits, but for those above, and that it is off.
+
+    Parameters
+    ----------
+    own : Iterable[str | Mapping[str, Any]]
+        Entries of the scenario.
+    settled_s : float
+        Run time of the last change (s).
+
+    Examples
+    --------
+    >>> of = {check_name(it): it for it in chaos_checks([{"use": "steady", "off": True}, "mine:Calm"], 4.0)}
+    >>> of["steady"], of["mine:Calm".partition(":")[2]], of["voltage"]["since_s"]
+    ({'use': 'steady', 'off': True}, 'mine:Calm', 4.0)
+    """
+    entries: dict[str, str | dict[str, Any]] = {}
+    for entry in own:
+        entries[check_name(entry)] = entry if isinstance(entry, str) else dict(entry)
+    for name in ALWAYS:
+        limits = dict(_ALWAYS.get(name, {}))
+        if name in _AFTER:
+            limits |= {**_AFTER[name], "since_s": round(settled_s + _LATER.get(name, 0.0), 9)}
+        given = table_of(entries.get(name, name))
+        if limits and not given.get("off"):
+            entries[name] = given | limits
+    return list(entries.values())

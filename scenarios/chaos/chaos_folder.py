@@ -1,0 +1,108 @@
+"""The folder of a campaign: a line for each run in chaos.csv, and a scenario file for each kind of failure."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterable
+from io import StringIO
+from pathlib import Path
+
+import msgspec
+
+from scenarios.chaos.chaos_run import ChaosRow, seed_of
+from scenarios.chaos.disturbance import Schedule
+from scenarios.chaos.disturbed_scenario import ChaosBase
+from scenarios.results.run_files import shown, write_whole
+from scenarios.schema.scenario_writing import to_toml
+from wire.driver.command_line import command_line
+
+TABLE, FAILURES = "chaos.csv", "failures"
+
+COLUMNS = (
+    *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
+    *("passed", "trips", "history_sha256", "links_sha256", "took_s"),
+)
+
+
+class ChaosFolder:
+    """The folder of a campaign, new and empty.
+
+    Parameters
+    ----------
+    path : Path
+        Where it is.
+    base : ChaosBase
+        The scenario.
+    seed : int
+        Seed of the campaign.
+    command : str
+        The command that makes it again.
+    """
+
+    def __init__(self, path: Path, base: ChaosBase, seed: int, command: str) -> None:
+        self.path, self._base, self._seed, self._command = path, base, seed, command
+        self.rows: dict[int, ChaosRow] = {}
+        """Results by the number of their run."""
+        write_whole(path / "scenario.toml", base.text)
+        write_whole(path / TABLE, _line(COLUMNS))
+
+    def add(self, row: ChaosRow) -> None:
+        """Keep the result of a run, in the order in which they come."""
+        self.rows[row.number] = row
+        with (self.path / TABLE).open("a", encoding="utf-8", newline="\n") as file:
+            file.write(self._cells(row))
+
+    def sort(self) -> None:
+        """Write the table in the order of the runs."""
+        rows = (self.rows[number] for number in sorted(self.rows))
+        write_whole(self.path / TABLE, [_line(COLUMNS), *map(self._cells, rows)])
+
+    def write_failure(self, violated: str, row: ChaosRow, schedule: Schedule) -> Path:
+        """Write the scenario of a failure; return its file.
+
+        Parameters
+        ----------
+        violated : str
+            Name of the check that fails, or of what else is asked.
+        row : ChaosRow
+            The run in which it was found.
+        schedule : Schedule
+            Its schedule, or what it was shrunk to.
+        """
+        file = self.path / FAILURES / f"{violated}.toml"
+        file.parent.mkdir(exist_ok=True)
+        seed = seed_of(self._seed, row.number)
+        fewer = len(schedule) < len(row.schedule)
+        remarks = [
+            f"Found by chaos: {row.violated[violated]}"[:300],
+            f"{self._command}, run {row.number}, seed of the messages {seed}"
+            + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
+            f"Once more: {again(file)}",
+            *(f"  {disturbance}" for disturbance in sorted(schedule, key=lambda it: it.begins_s)),
+        ]
+        scenario = msgspec.structs.replace(
+            self._base.disturbed(schedule, seed), name=f"{self._base.scenario.name[:16]}-{violated}"[:31], title=""
+        )
+        write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
+        return file
+
+    def _cells(self, row: ChaosRow) -> str:
+        cells = (
+            *(row.number, seed_of(self._seed, row.number), "violated" if row.violated else "passed"),
+            *(" ".join(sorted(row.violated)), "; ".join(row.violated[name] for name in sorted(row.violated))),
+            *(len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
+            *(" ".join(row.passed), row.trips, row.history_sha256, row.links_sha256, row.took_s),
+        )
+        return _line(cells)
+
+
+def again(file: Path) -> str:
+    """Return the command that runs a failure once more."""
+    return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
+
+
+def _line(cells: Iterable[object]) -> str:
+    text = StringIO()
+    csv.writer(text, lineterminator="\n").writerow(cells)
+    return text.getvalue()

@@ -1,0 +1,72 @@
+"""A disturbance of a run, as the entries of a scenario file that make it: so a scenario can say all that chaos can."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import inf
+from typing import Any, Literal
+
+import msgspec
+
+Table = Literal["event", "link", "partition", "node"]
+"""Lists of entries in a scenario file."""
+
+
+class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One thing that is done to a run.
+
+    Examples
+    --------
+    >>> cut = Disturbance(table="link", entry={"on": "inv1 <-> inv4", "from_s": 2.0, "to_s": 3.0, "cut": True})
+    >>> str(cut), cut.settled_s
+    ('2 to 3 s: link on = inv1 <-> inv4, cut = true', 3.0)
+    >>> str(Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}))
+    '2 s: event leave = [inv2]'
+    """
+
+    table: Table
+    """List of the scenario that it stands in."""
+    entry: Mapping[str, Any]
+    """Its entry there; an event has no label yet."""
+    back: Mapping[str, Any] = {}
+    """Of an event: the later event that takes it back; empty if none does."""
+
+    @property
+    def begins_s(self) -> float:
+        """Run time (s) at which it begins."""
+        return float(self.entry["t_s" if self.table == "event" else "from_s"])
+
+    @property
+    def settled_s(self) -> float:
+        """Run time (s) at which its last change comes: its end, or its beginning if it stays."""
+        if self.table == "event":
+            return float(self.back.get("t_s", self.begins_s))
+        return float(self.entry.get("to_s", self.begins_s))
+
+    @property
+    def ends_s(self) -> float:
+        """Run time (s) at which it ends; infinity if it stays."""
+        if self.table == "event":
+            return float(self.back.get("t_s", inf))
+        return float(self.entry.get("to_s", inf))
+
+    def __str__(self) -> str:
+        times = ("t_s", "from_s", "to_s")
+        until = "" if self.ends_s == inf else f" to {self.ends_s:g}"
+        what = ", ".join(f"{key} = {_word(value)}" for key, value in self.entry.items() if key not in times)
+        return f"{self.begins_s:g}{until} s: {self.table} {what}"
+
+
+Schedule = tuple[Disturbance, ...]
+"""Disturbances of one run, as they were drawn: not in the order of time."""
+
+
+def _word(value: Any) -> str:
+    """Return a value of an entry in few letters."""
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key} = {_word(of)}" for key, of in value.items()) + "}"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_word, value)) + "]"
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, float) else str(value)

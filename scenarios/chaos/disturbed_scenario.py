@@ -1,0 +1,180 @@
+"""A scenario with the disturbances of a schedule: checked as if a person had written it."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from math import ceil
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from netem.schema.fault import Fault
+from netem.schema.node_fault import NodeFault
+from netem.schema.partition import Partition
+from plant.equipment import Feeder
+from plant.tables import read_feeder
+from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
+from scenarios.chaos.disturbance import Disturbance, Schedule
+from scenarios.chaos.feasible_supply import FeasibleSupply
+from scenarios.schema.checks import check_switches
+from scenarios.schema.load_changes import check_loads
+from scenarios.schema.loading import check_tables, read_tables
+from scenarios.schema.netem_tables import check_netem, netem_of
+from scenarios.schema.participants import check_agentless, check_schedule
+from scenarios.schema.scenario_errors import Problems
+from scenarios.schema.scenario_model import ScenarioModel
+from scenarios.schema.scenario_writing import to_toml
+from scenarios.schema.time_checks import check_times
+
+_LISTS = ("open", "close", "leave", "join")
+"""Keys of an event that are lists of names."""
+
+_TABLES = ("load", "P_max_kW")
+"""Keys of an event that are tables by name."""
+
+_LONGEST_NAME = 24
+"""Letters of the scenario's name that are kept."""
+
+
+@dataclass(frozen=True)
+class ChaosBase:
+    """A scenario of one case, to be disturbed.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        Checked, with one case.
+    feeder : Feeder
+        Its feeder.
+    """
+
+    scenario: ScenarioModel
+    feeder: Feeder
+    tree: Mapping[str, Any] = field(init=False, repr=False)
+    """Its tables."""
+    supply: FeasibleSupply = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        assert len(self.scenario.cases) == 1, "a base has one case"
+        name = f"{self.scenario.name[:_LONGEST_NAME]}-chaos"
+        plain = msgspec.structs.replace(self.scenario, name=name, paper="", claims=(), metrics=())
+        object.__setattr__(self, "tree", tomllib.loads(to_toml(plain, {}, terse=True)))
+        everybody = [row.name for row in (*self.feeder.inverters, *self.feeder.spares)]
+        object.__setattr__(self, "supply", FeasibleSupply(self.feeder, everybody))
+
+    @property
+    def text(self) -> str:
+        """The scenario as the text of a file, for other processes."""
+        return to_toml(self.scenario, {}, terse=True)
+
+    @property
+    def case(self) -> str:
+        """Name of the case."""
+        return next(iter(self.scenario.cases))
+
+    @property
+    def settled_s(self) -> float:
+        """Run time (s) of the scenario's own last change."""
+        netem = netem_of(self.scenario, self.case)
+        faults: list[Fault | Partition | NodeFault] = [*netem.links, *netem.partitions, *netem.nodes]
+        ends = [fault.from_s if fault.to_s is None else fault.to_s for fault in faults]
+        return max([*ends, *(event.t_s for event in self.scenario.events)], default=0.0)
+
+    def disturbed(self, schedule: Schedule, seed: int) -> ScenarioModel:
+        """Return the scenario with a schedule that `is_possible`, and with a seed.
+
+        Raises
+        ------
+        ScenarioError
+            If the schedule is not possible, with the reasons.
+        """
+        problems = Problems("chaos")
+        scenario, _ = check_tables(self._tree(schedule, seed), Path("chaos.toml"), problems, _read_feeder)
+        problems.raise_if_any()
+        return scenario
+
+    def is_possible(self, schedule: Schedule) -> bool:
+        """Return whether a scenario can say all of a schedule, and inverters can feed what it leaves."""
+        problems = Problems("chaos")
+        tree = self._tree(schedule, 1)
+        del tree["checks"]  # a schedule does not change them, nor what is not checked here
+        scenario = read_tables(tree, problems)
+        check_times(scenario, problems)
+        check_netem(scenario, self.feeder, problems)
+        for check in (check_agentless, check_switches, check_loads, check_schedule):
+            check(scenario, self.feeder, problems)
+        return not problems.any and not self.supply.objection(scenario, self.case)
+
+    def kept(self, drawn: Iterable[Disturbance]) -> Schedule:
+        """Return those of some disturbances that are possible together: of two that are not, the first."""
+        kept = tuple(drawn)
+        if self.is_possible(kept):
+            return kept
+        kept = ()
+        for disturbance in drawn:
+            if self.is_possible((*kept, disturbance)):
+                kept = (*kept, disturbance)
+        return kept
+
+    def _tree(self, schedule: Schedule, seed: int) -> dict[str, Any]:
+        """Return the tables of the scenario with a schedule."""
+        settled = max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
+        T_c = self.scenario.time.T_c_s
+        end = round(ceil((settled + WITHIN_S + JUDGED_S) / T_c - 1e-6) * T_c, 9)
+        tree: dict[str, Any] = {**self.tree, "seed": seed}
+        tree["time"] = self.tree["time"] | {"end_s": end}
+        tree["checks"] = chaos_checks(self.scenario.checks, settled)
+        tree["event"] = merged_events(self.tree.get("event", []), schedule)
+        for table in ("link", "partition", "node"):
+            added = [dict(it.entry) for it in sorted(schedule, key=lambda it: it.begins_s) if it.table == table]
+            if entries := [*self.tree.get(table, []), *added]:
+                tree[table] = entries
+        return tree
+
+
+def merged_events(own: Iterable[Mapping[str, Any]], schedule: Schedule) -> list[dict[str, Any]]:
+    """Return the events of a scenario and of a schedule in the order of time; those of one time are one event.
+
+    Examples
+    --------
+    >>> leave = Disturbance(table="event", entry={"t_s": 1.0, "leave": ["inv2"]}, back={"t_s": 2.0, "join": ["inv2"]})
+    >>> for event in merged_events([{"label": "first", "t_s": 1.0, "open": ["13-152"]}], (leave,)):
+    ...     print(event)
+    {'label': 'first', 't_s': 1.0, 'open': ['13-152'], 'leave': ['inv2']}
+    {'label': 'chaos1', 't_s': 2.0, 'join': ['inv2']}
+    """
+    found = {round(float(event["t_s"]), 9): dict(event) for event in own}
+    taken = {event["label"] for event in found.values()}
+    added = [part for it in schedule if it.table == "event" for part in (it.entry, it.back) if part]
+    for entry in sorted(added, key=lambda part: float(part["t_s"])):
+        t_s = round(float(entry["t_s"]), 9)
+        if t_s not in found:
+            label = next(name for k in range(1, len(added) + len(taken) + 2) if (name := f"chaos{k}") not in taken)
+            taken.add(label)
+            found[t_s] = {"label": label, "t_s": t_s}
+        event = found[t_s]
+        for key, value in entry.items():
+            if key in _LISTS:
+                event[key] = [*event.get(key, []), *value]
+            elif key in _TABLES:
+                event[key] = event.get(key, {}) | dict(value)
+            elif key != "t_s":
+                event[key] = value
+    return [found[t_s] for t_s in sorted(found)]
+
+
+_read_feeder = lru_cache(maxsize=8)(read_feeder)
+
+
+@lru_cache(maxsize=4)
+def base_of(text: str) -> ChaosBase:
+    """Return the base with a text; a process makes it once."""
+    problems = Problems("chaos")
+    scenario, feeder = check_tables(tomllib.loads(text), Path("chaos.toml"), problems, _read_feeder)
+    problems.raise_if_any()
+    assert feeder is not None
+    return ChaosBase(scenario, feeder)

@@ -1,0 +1,145 @@
+"""Whether the inverters of every island can feed it: what no control can change is not drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from functools import cache
+from typing import NamedTuple
+
+from plant.equipment import Feeder, InverterRow
+from plant.equipment.connectivity import Connectivity
+from plant.equipment.named_loads import named_loads
+from scenarios.schema.load_changes import powers_after
+from scenarios.schema.netem_tables import netem_of
+from scenarios.schema.participants import inverters_of, without_agent
+from scenarios.schema.scenario_model import Event, ScenarioModel
+
+MOST_LOAD, LEAST_LOAD = 0.97, 0.05
+"""Load of an island, as parts of the ratings of its inverters that control: above, losses and vars take what is left,
+below, its inverters are at their lower limit, which is no business of the control law."""
+
+KILLED = 0.5
+"""Part of its rating that an inverter is counted with whose agent has been killed: it stays at its last set-points."""
+
+
+class _Part(NamedTuple):
+    """A connected part of the feeder."""
+
+    inverters: tuple[InverterRow, ...]
+    """Those that are connected to it, on the network or not."""
+    load: float
+    """Real power (W) of its loads, as in the feeder's tables."""
+    buses: frozenset[str]
+    has_substation: bool
+    """Whether the substation feeds it."""
+    alive: bool
+    """Whether anything feeds it."""
+
+
+class _State(NamedTuple):
+    """The feeder from a change on."""
+
+    t_s: float
+    closed: frozenset[str]
+    """Closed switches."""
+    present: frozenset[str]
+    """Inverters on the network."""
+    killed: frozenset[str]
+    """Inverters whose agents have died."""
+    powers: Mapping[str, complex]
+    """Loads that an event has set (VA), by name."""
+
+
+class FeasibleSupply:
+    """Judge the islands of scenarios on one feeder; the parts of each state of the switches are found once.
+
+    Parameters
+    ----------
+    feeder : Feeder
+        The feeder.
+    inverters : Collection[str]
+        Names of the inverters that may ever be on the network.
+    """
+
+    def __init__(self, feeder: Feeder, inverters: Collection[str]) -> None:
+        self._feeder, self._graph = feeder, Connectivity(feeder)
+        self._rows = tuple(row for row in (*feeder.inverters, *feeder.spares) if row.name in inverters)
+        self._switches = {name: switch.name for switch in feeder.switches for name in switch.names}
+        self._loads = named_loads(feeder)
+        self._demands = tuple(feeder.demands())
+        self._source = (feeder.source.bus, "A") if feeder.source else None
+        self._parts_of = cache(self._parts)
+
+    def objection(self, scenario: ScenarioModel, case: str) -> str:
+        """Return why an island cannot be fed or controlled at some time, "" if all can.
+
+        Parameters
+        ----------
+        scenario : ScenarioModel
+            Checked.
+        case : str
+            Name of the case.
+        """
+        leaders = self._leaders(scenario, case)
+        for state in self._states(scenario, case):
+            forming = frozenset(row.name for row in self._rows if row.kind == "GFM" and row.name in state.present)
+            for part in self._parts_of(state.closed, forming):
+                if text := _objection(part, self._load(part, state.powers), state, leaders):
+                    return f"at {state.t_s:g} s {text}"
+        return ""
+
+    def _leaders(self, scenario: ScenarioModel, case: str) -> frozenset[str]:
+        """Return the grid-forming inverters whose agents run the secondary law."""
+        chosen, agentless = scenario.cases[case].secondary, without_agent(scenario, case)
+        names = {row.name for row in self._rows if row.kind == "GFM" and chosen != "none"} - agentless
+        return frozenset(names if isinstance(chosen, str) else names & set(chosen))
+
+    def _states(self, scenario: ScenarioModel, case: str) -> Iterator[_State]:
+        """Yield the feeder at t = 0 and after each change."""
+        closed, killed = self._graph.closed_at_start(), frozenset[str]()
+        present = frozenset(row.name for row in inverters_of(scenario, self._feeder) if not row.spare)
+        set_powers = {event.t_s: powers for event, powers in powers_after(scenario, self._feeder)}
+        powers: Mapping[str, complex] = {}
+        deaths = [(node.from_s, node.name) for node in netem_of(scenario, case).nodes if node.kill]
+        changes: list[tuple[float, Event | str]] = [(event.t_s, event) for event in scenario.events]
+        yield _State(0.0, closed, present, killed, powers)
+        for t_s, change in sorted([*changes, *deaths], key=lambda item: item[0]):
+            if isinstance(change, str):
+                killed |= {change}
+            else:
+                closed = closed - {self._switches.get(name, "") for name in change.open}
+                closed |= {self._switches[name] for name in change.close if name in self._switches}
+                present = (present - set(change.leave)) | set(change.join)
+                powers = set_powers[change.t_s]
+            yield _State(t_s, closed, present, killed, powers)
+
+    def _load(self, part: _Part, powers: Mapping[str, complex]) -> float:
+        """Return the real power (W) of the loads of a part."""
+        set_here = [(S, self._loads[name]) for name, S in powers.items() if self._loads[name].bus in part.buses]
+        return part.load + sum(S.real - load.S.real for S, load in set_here)
+
+    def _parts(self, closed: frozenset[str], forming: frozenset[str]) -> tuple[_Part, ...]:
+        fed, dead = self._graph.fed(closed, (row for row in self._rows if row.name in forming))
+        parts = []
+        for nodes, alive in (*((part, True) for part in fed), *((part, False) for part in dead)):
+            load = sum(S.real for bus, ends, S in self._demands if any((bus, phase) in nodes for phase in ends))
+            there = tuple(row for row in self._rows if row.node in nodes)
+            parts.append(_Part(there, load, frozenset(bus for bus, _ in nodes), self._source in nodes, alive))
+        return tuple(parts)
+
+
+def _objection(part: _Part, load: float, state: _State, leaders: frozenset[str]) -> str:
+    """Return why a part of the feeder cannot be fed or controlled."""
+    there = [row for row in part.inverters if row.name in state.present]
+    if part.has_substation or not there:
+        return ""
+    names = ", ".join(row.name for row in there)
+    if not part.alive:
+        return f"no grid-forming inverter is with {names}"
+    alive = [row for row in there if row.name not in state.killed]
+    if leaders and not any(row.name in leaders for row in alive):
+        return f"no grid-forming inverter with an agent that controls is with {names}"
+    able, held = (sum(row.P_rated for row in rows) for rows in (alive, [row for row in there if row not in alive]))
+    if not LEAST_LOAD * able + held <= load <= MOST_LOAD * able + KILLED * held:
+        return f"{load / 1e3:.0f} kW of load are not what {names} can feed"
+    return ""

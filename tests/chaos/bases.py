@@ -1,0 +1,30 @@
+"""Scenarios to be disturbed by tests."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import msgspec
+
+from scenarios.chaos.disturbed_scenario import ChaosBase
+from scenarios.schema import load_scenario
+
+NAMES = ("islanding", "plug-n-play", "microgrid-switching")
+
+
+@cache
+def base_named(name: str) -> ChaosBase:
+    """The last case of a scenario of the catalogue."""
+    return _last_case(name)
+
+
+def base_in(file: Path) -> ChaosBase:
+    """The last case of a scenario file."""
+    return _last_case(file)
+
+
+def _last_case(name: str | Path) -> ChaosBase:
+    scenario, feeder = load_scenario(name)
+    case = list(scenario.cases)[-1]
+    return ChaosBase(msgspec.structs.replace(scenario, cases={case: scenario.cases[case]}), feeder)

@@ -1,0 +1,173 @@
+"""Campaigns: a planted bug is found, shrunk, and written as a scenario that shows it; output and errors."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenarios.catalogue_files import CATALOGUE
+from scenarios.chaos import campaign as campaigns
+from scenarios.chaos import schedule_search
+from scenarios.chaos.campaign import Campaign, run_campaign
+from scenarios.chaos.chaos_folder import ChaosFolder
+from scenarios.chaos.chaos_run import run_scenario
+from scenarios.checks.check_registry import ALWAYS
+from scenarios.schema import load_scenario
+from tests.chaos.bases import base_in
+from tests.command_line import invoke
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+SMALL = """
+name = "small"
+without_agent = ["inv2", "inv3", "inv5", "inv6", "inv8", "inv9"]
+{extra}
+
+[time]
+end_s = 1.2
+T_c_s = 0.1
+record_s = 0.05
+
+[plant]
+load_set = "event2"
+
+[[event]]
+label = "islanding"
+t_s = 1.0
+open = ["13-152", "60-160"]
+
+[case.IV]
+secondary = "all"
+graph = "full"
+"""
+"""Three agents that decide ten times a second: a run takes a tenth of a second."""
+
+BREAKS = '''
+"""The paper's law, with a bug: who has once used an old value keeps its set-points for ever."""
+from agents.laws.consensus import Consensus
+import gridpeers as gp
+
+
+class Breaks(Consensus):
+    """It breaks after a cut."""
+
+    broken = False
+
+    def step(self, own, neighbours, T):
+        self.broken = self.broken or any(it.age > 0.45 for it in neighbours)
+        if self.broken:
+            return gp.SetPoints(P_set=0.2, V_set=own.V_set)
+        return super().step(own, neighbours, T)
+'''
+
+
+def _small(folder: Path, extra: str = "") -> Path:
+    file = folder / "small.toml"
+    file.write_text(SMALL.format(extra=extra), encoding="utf-8")
+    return file
+
+
+def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A law that breaks after a cut: the failure is a file with at most three disturbances, which shows it again."""
+    monkeypatch.setattr(schedule_search, "TRIES", 8)
+    others = [f'{{ use = "{name}", off = true }}' for name in ALWAYS if name != "frequency"]
+    (elsewhere / "breaks.py").write_text(BREAKS, encoding="utf-8")
+    base = base_in(_small(elsewhere, f'law = "breaks:Breaks"\nchecks = [{", ".join(others)}]'))
+    folder = ChaosFolder(elsewhere, base, 8, "gridpeers chaos small")
+
+    summary = run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda what, done, of: None)
+    (failure,) = summary.failures
+    again, _ = load_scenario(failure.file)
+
+    assert failure.violated == "frequency"
+    assert 1 <= len(failure.schedule) <= 3 < len(failure.row.schedule)
+    assert again == base_in(failure.file).scenario
+    assert "frequency" in run_scenario(base_in(failure.file)).violated
+
+
+def _rows(folder: Path) -> list[dict[str, str]]:
+    with (folder / "chaos.csv").open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path) -> None:
+    """A line a run, a report, and the same lines again with the same seed."""
+    _small(elsewhere)
+    words = ("chaos", "small.toml", "--runs", "2", "--seed", "3", "--jobs", "1")
+
+    codes = {invoke(*words, "--out", name)[0] for name in ("one", "two")}
+    one, two = ([{**row, "took_s": ""} for row in _rows(elsewhere / name)] for name in ("one", "two"))
+
+    assert codes <= {0, 1}
+    assert [row["seed"] for row in one] == [str(3_000_000 + i) for i in range(2)]
+    assert [len(json.loads(row["schedule"])) for row in one] == [int(row["disturbances"]) for row in one]
+    assert "repeats" in one[0]["passed"]
+    assert one == two
+    assert "2 of 2 runs" in (elsewhere / "one" / "report.txt").read_text(encoding="utf-8")
+
+
+def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupted campaign has its runs so far, says how many, and ends with 130."""
+    _small(elsewhere)
+    whole = campaigns.run_number
+
+    def interrupted(text: str, seed: int, number: int, *rest: Any) -> Any:
+        if number == 2:
+            raise KeyboardInterrupt
+        return whole(text, seed, number, *rest)
+
+    monkeypatch.setattr(campaigns, "run_number", interrupted)
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--jobs", "1", "--out", "out")
+
+    assert code == 130
+    assert "interrupted; 2 of 9 runs are kept in out/" in text
+    assert len(_rows(elsewhere / "out")) == 2
+    assert "2 of 9 runs" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
+    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: interrupted")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("nowhere",), 'no scenario "nowhere"'),
+        (("islanding", "--case", "V"), '--case: no case "V"'),
+        (("islanding", "--case", "I,IV"), "--case: takes one case, got I,IV"),
+        (("islanding", "--runs", "0"), "--runs: must be at least 1, got 0"),
+        (("islanding", "--seed", "-1"), "--seed: must be at least 0, got -1"),
+        (("islanding", "--driver", "many"), 'there is no "many"'),
+        (("gridlabd.toml",), "lets nobody leave or join"),
+        (("keys.toml", "--driver", "processes"), "needs certificates, which chaos does not take"),
+    ],
+)
+def test_bad_input_is_refused_in_one_line_before_anything_starts(
+    words: tuple[str, ...], said: str, elsewhere: Path
+) -> None:
+    """Exit code 2, the reason, and nothing written."""
+    text = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
+    tables = text.partition("[[event]]")[0] + '[case.I]\nsecondary = "none"\ngraph = "none"\n'
+    tables = tables.replace('paper = "plug-n-play"', "")
+    (elsewhere / "gridlabd.toml").write_text(tables.replace("[plant]", '[plant]\nsimulator = "gridlabd"'))
+    (elsewhere / "keys.toml").write_text(tables.replace("seed = 1", 'seed = 1\nsecurity = "mtls"'))
+
+    code, said_all = invoke("chaos", *words)
+
+    assert code == 2
+    assert said in said_all
+    assert not (elsewhere / "runs").exists()
+
+
+def test_a_scenario_that_fails_by_itself_is_refused(elsewhere: Path) -> None:
+    """Chaos would find nothing else; the line names the check and a way out."""
+    file = _small(elsewhere)
+    file.write_text(file.read_text(encoding="utf-8").replace('"all"', '"none"'), encoding="utf-8")
+
+    code, text = invoke("chaos", "small.toml", "--out", "out")
+
+    assert code == 2
+    assert "small, case IV: violated without any disturbance: frequency failed" in text
+    assert "switch these checks off" in text
+    assert not (elsewhere / "out").exists()

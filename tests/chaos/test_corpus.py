@@ -1,0 +1,24 @@
+"""Failures that chaos has found: those that were mended stay mended, and the limits of the law are still its limits."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.chaos.chaos_run import run_scenario
+from tests.chaos.bases import base_in
+
+CORPUS = Path(__file__).parent / "corpus"
+
+
+@pytest.mark.parametrize("file", sorted((CORPUS / "mended").glob("*.toml")), ids=lambda file: file.stem)
+def test_a_mended_failure_passes(file: Path) -> None:
+    """The scenario of each failure of the past violates nothing."""
+    assert run_scenario(base_in(file)).violated == {}
+
+
+@pytest.mark.parametrize("file", sorted((CORPUS / "limits").glob("*.toml")), ids=lambda file: file.stem)
+def test_a_limit_of_the_law_is_still_one(file: Path) -> None:
+    """What docs/chaos.md names as a limit violates the check in its name: a law that does better takes it out."""
+    assert file.stem.partition("-")[0] in run_scenario(base_in(file)).violated

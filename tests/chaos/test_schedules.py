@@ -1,0 +1,115 @@
+"""Schedules: each is a valid scenario that inverters can feed; a seed draws the same ones; hypothesis shrinks them."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+
+from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
+from scenarios.chaos.disturbance import Disturbance, Schedule
+from scenarios.chaos.disturbed_scenario import base_of
+from scenarios.chaos.schedule_search import BATCH, drawn, shrunk
+from scenarios.chaos.schedule_strategy import MOST, schedules
+from scenarios.schema import load_scenario
+from scenarios.schema.scenario_writing import to_toml
+from tests.chaos.bases import NAMES, base_named
+from tests.scenario_files import written
+
+CUT = Disturbance(table="link", entry={"on": "* <-> *", "from_s": 2.0, "to_s": 3.0, "cut": True})
+KILL = Disturbance(table="node", entry={"name": "inv1", "from_s": 2.0, "kill": True})
+LEAVE = Disturbance(table="event", entry={"t_s": 2.0, "leave": ["inv2"]}, back={"t_s": 3.0, "join": ["inv2"]})
+
+
+@cache
+def _batch(number: int) -> list[Schedule]:
+    return drawn(base_named("islanding"), 1, number)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_schedule_is_a_scenario_file_that_loads_and_can_be_fed(name: str, tmp_path: Path) -> None:
+    """Whatever is drawn: its file has no problem, gives the same scenario, and ends after the time to recover."""
+    base = base_named(name)
+
+    @settings(max_examples=8, database=None)
+    @given(schedules(base))
+    def holds(schedule: Schedule) -> None:
+        scenario = base.disturbed(schedule, 7)
+        file = written(tmp_path, to_toml(scenario, {}, terse=True))
+        last = max([base.settled_s, *(it.settled_s for it in schedule)])
+
+        assert load_scenario(file)[0] == scenario
+        assert base.supply.objection(scenario, base.case) == ""
+        assert scenario.time.end_s >= last + WITHIN_S + JUDGED_S - 1e-9
+
+    holds()
+
+
+def test_a_base_as_text_is_the_same_base() -> None:
+    """Workers get the scenario as text, and draw from it what the command would."""
+    base = base_named("islanding")
+
+    assert base_of(base.text).scenario == base.scenario
+    assert drawn(base_of(base.text), 1, 0) == _batch(0)
+
+
+def test_a_seed_and_a_batch_have_schedules_of_their_own() -> None:
+    """Batches differ, so do seeds; each has its number of schedules, of up to the most disturbances."""
+    assert len(_batch(0)) == len(_batch(1)) == BATCH
+    assert _batch(0)[1:] != _batch(1)[1:]
+    assert _batch(0)[1:] != drawn(base_named("islanding"), 2, 0)[1:]
+    assert max(map(len, _batch(0))) > 3
+    assert max(map(len, _batch(0))) <= MOST
+
+
+def test_a_batch_draws_every_kind_of_disturbance() -> None:
+    """Kills, pauses, lies, leaves, joins, switchings, cuts, delays and losses are all drawn."""
+    both = [it for schedule in (*_batch(0), *_batch(1)) for it in schedule]
+    words = {word for it in both for word in (it.table, *it.entry)}
+
+    assert {"kill", "pause", "slow_s", "lies", "leave", "join", "open", "cut", "delay", "loss", "partition"} <= words
+
+
+def test_what_is_not_possible_together_is_left_out() -> None:
+    """An inverter that is away cannot leave; of two disturbances the first stays."""
+    base = base_named("islanding")
+    again = Disturbance(table="event", entry={"t_s": 2.5, "leave": ["inv2"]})
+
+    assert base.kept([LEAVE, again, CUT]) == (LEAVE, CUT)
+
+
+@pytest.mark.parametrize(
+    ("names", "fits"),
+    [(("inv2",), True), (("inv1", "inv4", "inv7"), False), (("inv1", "inv2", "inv3", "inv4", "inv5", "inv6"), False)],
+)
+def test_what_no_control_can_feed_is_left_out(names: tuple[str, ...], fits: bool) -> None:
+    """Without a grid-forming inverter, or with too few inverters for the load, there is nothing to judge."""
+    leave = Disturbance(table="event", entry={"t_s": 2.0, "leave": list(names)})
+
+    assert base_named("islanding").is_possible((leave,)) == fits
+
+
+def test_somebody_stays_who_controls_the_frequency() -> None:
+    """All agents of grid-forming inverters of an island are not killed."""
+    kills = [
+        Disturbance(table="node", entry={"name": n, "from_s": 2.0, "kill": True}) for n in ("inv1", "inv4", "inv7")
+    ]
+
+    assert base_named("islanding").is_possible(tuple(kills[:1]))
+    assert not base_named("islanding").is_possible(tuple(kills))
+
+
+def test_a_failure_is_shrunk_to_what_makes_it() -> None:
+    """Begun with a run of many disturbances, a fault that takes a pause and a cut ends at these two alone."""
+    base = base_named("islanding")
+
+    def fails(schedule: Schedule) -> bool:
+        return {"pause", "cut"} <= {word for it in schedule for word in it.entry}
+
+    number = next(i for i, schedule in enumerate(_batch(1)) if len(schedule) > 3 and fails(schedule))
+    simplest = shrunk(base, 1, BATCH + number, fails)
+
+    assert len(simplest) == 2
+    assert fails(simplest)
