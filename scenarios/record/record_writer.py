@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import os
 import threading
+import zlib
 from collections.abc import Iterator
 from math import inf
 from pathlib import Path
@@ -101,16 +102,17 @@ class _WholeWrites:
 
 
 class _CompactIndex:
-    """The index of all chunks as bytes: as objects, as the library keeps it, an hour has 17 MB."""
+    """The index of all chunks, packed: as objects, as the library keeps it, an hour has 17 MB, as bytes 3 MB."""
 
     def __init__(self) -> None:
-        self.bytes = bytearray()
+        self.packed = bytearray()
+        self._packer = zlib.compressobj()
 
     def append(self, index: ChunkIndex) -> None:
         """Add the index of a chunk."""
         builder = RecordBuilder()
         index.write(builder)
-        self.bytes += builder.end()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
+        self.packed += self._packer.compress(builder.end())  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
     def __iter__(self) -> Iterator[_CompactIndex]:
         """Yield what writes all of them at the end of the file."""
@@ -118,7 +120,8 @@ class _CompactIndex:
 
     def write(self, builder: RecordBuilder) -> None:
         """Write all of them."""
-        builder.write(self.bytes)
+        self.packed += self._packer.flush()
+        builder.write(zlib.decompress(self.packed))
 
 
 class RecordWriter:
