@@ -12,7 +12,7 @@ import pytest
 from msgspec.structs import replace
 
 from tests.processes.terminals import wait_for
-from tests.security.intruder import Intruder, answered, credentials, handshake
+from tests.security.intruder import Intruder, answered, credentials, forged, handshake
 from tests.security.recording import Recording
 from tests.toy.town import Town
 from wire.messages import Command, Measurement, Message, State
@@ -70,6 +70,14 @@ def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, t
     assert handshake(town.endpoint, site / "inv3.pem", site / "inv3.key") == "SSLV3_ALERT_CERTIFICATE_EXPIRED"
     wait_for(town.folder / "plant.log", "certificate expired")
     assert handshake(town.endpoint, lab / "inv3.pem", lab / "inv3.key") == ""
+
+
+def test_a_member_is_no_authority(town: Town, lab: Path, tmp_path: Path) -> None:
+    """A certificate of an operator that inv3 has signed with its own key is refused, with the whole chain shown."""
+    told = handshake(town.endpoint, *forged(lab, "inv3", "operator:operator", tmp_path))
+
+    assert told == "SSLV3_ALERT_CERTIFICATE_UNKNOWN"
+    wait_for(town.folder / "plant.log", "EndEntityUsedAsCa")
 
 
 def many(state: State) -> list[State]:

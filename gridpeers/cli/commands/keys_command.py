@@ -6,12 +6,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BAD_INPUT, fail, require
+from wire.trust.member import Role
 
 app = typer.Typer(
     cls=Commands,
@@ -53,9 +54,7 @@ def init(
 @app.command()
 def issue(
     names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Names; of agents those of their inverters.")],
-    role: Annotated[
-        Literal["agent", "plant", "operator", "viewer"], typer.Option("--role", help="What its holder may do.")
-    ] = "agent",
+    role: Annotated[Role, typer.Option("--role", help="What its holder may do.")] = "agent",
     keys: _Keys = Path(),
     days: _Days = 365.0,
 ) -> None:
