@@ -123,6 +123,46 @@ def test_a_rate_limit_holds_back_what_jumps() -> None:
     assert fast > slow
 
 
+def test_a_rate_limit_holds_vars_as_well_and_grows_with_the_time_of_silence() -> None:
+    """Q of a neighbour moves by 0.01 pu a step at 0.5 pu/s; one that was silent for 0.2 s by 0.1 pu."""
+
+    def V_set(Q: float, silent: int) -> float:
+        law = Resilient(F=0, rate=0.5)
+        law.step(own(t=1.0), [neighbour("a", Q=0.0)], T)
+        for k in range(silent):
+            law.step(own(t=1.0 + T * (k + 1)), [], T)
+        return law.step(own(t=1.0 + T * (silent + 1)), [neighbour("a", Q=Q)], T).V_set
+
+    for silent, most in ((0, 0.01), (9, 0.1)):
+        assert V_set(0.9, silent) == pytest.approx(V_set(most, silent), abs=1e-12)
+        assert V_set(0.9, silent) != pytest.approx(V_set(0.9 * most, silent), abs=1e-12)
+        assert V_set(-0.9, silent) == pytest.approx(V_set(-most, silent), abs=1e-12)
+
+
+def test_plausibility_goes_by_the_neighbour_s_droop() -> None:
+    """With half the own droop it delivers twice as much of a frequency error."""
+    law, low = Resilient(F=0, tolerance=0.1), own(e=-0.004)
+
+    def counts(m_p: float) -> bool:
+        terms = law.terms(low, [neighbour("a", 0.5)._replace(m_p=m_p)], T)
+        return "implausible" not in {term.name for term in terms.P_set}
+
+    assert counts(0.01)  # 0.9 pu
+    assert not counts(0.005)  # 1.3 pu
+
+
+def test_asking_why_changes_nothing() -> None:
+    """Terms may be asked for at any time: trust ages by steps alone."""
+    asked, law = (Resilient(F=0, tolerance=0.1, T_out=0.2) for _ in range(2))
+    for k in range(5):
+        for each in (asked, law):
+            each.step(own(t=k * T), [neighbour("a", 5.0)], T)
+        asked.terms(own(t=k * T), [neighbour("a", 5.0)], T)
+
+    later = own(t=5 * T), [neighbour("a", 0.6)], T
+    assert asked.step(*later) == law.step(*later)
+
+
 def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     """After three times T_out its weight is e^-3; a start forgets it."""
     law, T_out = Resilient(F=0, tolerance=0.1, T_out=0.2), 0.2

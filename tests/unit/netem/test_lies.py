@@ -73,6 +73,14 @@ def test_random_lies_depend_on_seed_and_number_and_only_the_two_faced_on_who_hea
     assert heard(faced) != heard(faced, "inv2")
 
 
+def test_two_liars_in_one_name_draw_on_their_own() -> None:
+    """What inv4 says in the name of inv3 has other noise than what inv3 says itself."""
+    lie = Random(P_set_W=1e3)
+    own, other = (HeardFrom(1, "inv3", "inv1", [LieTime(0.0, inf, liar, lie)]) for liar in ("inv3", "inv4"))
+
+    assert [own.told(state(k), state).P_set for k in range(9)] != [other.told(state(k), state).P_set for k in range(9)]
+
+
 def test_a_new_process_of_the_liar_has_no_past() -> None:
     """A replay does not reach behind a restart of its sender."""
     live = LiveHearing(HeardFrom(1, "inv3", "inv1", [LieTime(0.0, inf, "inv3", Replay(delay_s=0.5))]))
@@ -93,6 +101,13 @@ def test_a_receiver_keeps_no_more_states_than_its_lies_need() -> None:
 
     assert live.remembered <= 5
     assert plain.remembered == 0
+
+    over = LiveHearing(HeardFrom(1, "inv3", "inv1", [LieTime(0.0, 50.0, "inv3", Freeze())]))
+    kept = []
+    for k in range(1000):
+        over.told(state(k))
+        kept.append(over.remembered)
+    assert max(kept[501:]) <= 2  # a lie that is over needs nothing
 
 
 def test_who_hears_a_lie() -> None:
