@@ -62,10 +62,17 @@ def test_a_host_needs_four_files_and_no_more(lab: Path, tmp_path: Path) -> None:
 
 
 def test_without_a_name_the_first_role_counts_whose_key_is_there(lab: Path) -> None:
-    """A command takes the operator's certificate, and the viewer's where there is no other."""
-    assert open_credentials(lab, ("operator", "viewer"), now=NOW)[0].own.name == "operator"
-    (lab / "operator.key").unlink()
-    assert open_credentials(lab, ("operator", "viewer"), now=NOW)[0].own.name == "viewer"
+    """A command takes the operator's certificate, and the viewer's where there is no other, or it was revoked."""
+
+    def first(folder: Path) -> str:
+        return open_credentials(folder, ("operator", "viewer"), now=NOW)[0].own.name
+
+    host = shutil.copytree(lab, lab.parent / "host")
+    assert first(lab) == first(host) == "operator"
+    revoke(lab, "operator")
+    assert not (lab / "operator.key").exists()
+    shutil.copy2(lab / "members.json", host)
+    assert first(lab) == first(host) == "viewer"
 
 
 def of_another_site(lab: Path, name: str) -> None:
@@ -152,7 +159,8 @@ def test_an_authority_with_a_wrong_key_issues_and_revokes_nothing(
 
 
 def test_an_authority_that_has_expired_issues_nothing(lab: Path) -> None:
-    """Its certificates would have ended before they began."""
+    """Its certificates would have ended before they began; before, they end with it at the latest."""
+    assert issue(lab, "inv3", days=3650, now=NOW + timedelta(days=300)).expires == "2036-11-20"
     with pytest.raises(KeysError, match=r"ca\.pem: expired on 2036-11-20 12:00 UTC; gridpeers keys init makes"):
         issue(lab, "inv3", now=NOW + timedelta(days=3651))
 
