@@ -81,7 +81,8 @@ class FeasibleSupply:
             Name of the case.
         """
         leaders = self._leaders(scenario, case)
-        for state in self._states(scenario, case):
+        both = (state for closes in (True, False) for state in self._states(scenario, case, waiting_closes=closes))
+        for state in both:
             forming = frozenset(row.name for row in self._rows if row.kind == "GFM" and row.name in state.present)
             for part in self._parts_of(state.closed, forming):
                 if text := _objection(part, self._load(part, state.powers), state, leaders):
@@ -94,8 +95,8 @@ class FeasibleSupply:
         names = {row.name for row in self._rows if row.kind == "GFM" and chosen != "none"} - agentless
         return frozenset(names if isinstance(chosen, str) else names & set(chosen))
 
-    def _states(self, scenario: ScenarioModel, case: str) -> Iterator[_State]:
-        """Yield the feeder at t = 0 and after each change."""
+    def _states(self, scenario: ScenarioModel, case: str, *, waiting_closes: bool) -> Iterator[_State]:
+        """Yield the feeder at t = 0 and after each change; a switch that waits for synchronism may never close."""
         closed, killed = self._graph.closed_at_start(), frozenset[str]()
         present = frozenset(row.name for row in inverters_of(scenario, self._feeder) if not row.spare)
         set_powers = {event.t_s: powers for event, powers in powers_after(scenario, self._feeder)}
@@ -108,7 +109,8 @@ class FeasibleSupply:
                 killed |= {change}
             else:
                 closed = closed - {self._switches.get(name, "") for name in change.open}
-                closed |= {self._switches[name] for name in change.close if name in self._switches}
+                if waiting_closes or not change.synchronised:
+                    closed |= {self._switches[name] for name in change.close if name in self._switches}
                 present = (present - set(change.leave)) | set(change.join)
                 powers = set_powers[change.t_s]
             yield _State(t_s, closed, present, killed, powers)

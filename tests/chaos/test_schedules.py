@@ -101,6 +101,15 @@ def test_somebody_stays_who_controls_the_frequency() -> None:
     assert not base_named("islanding").is_possible(tuple(kills))
 
 
+def test_a_switch_that_waits_for_synchronism_may_never_close() -> None:
+    """A leader beyond a switch that is still to close does not count as one: the island may go on without."""
+    close = Disturbance(table="event", entry={"t_s": 3.0, "close": ["18-135"], "synchronised": True})
+    kill = Disturbance(table="node", entry={"name": "inv7", "from_s": 0.4, "kill": True})
+
+    assert base_named("microgrid-switching").is_possible((close,))
+    assert not base_named("microgrid-switching").is_possible((close, kill))
+
+
 def test_a_failure_is_shrunk_to_what_makes_it() -> None:
     """Begun with a run of many disturbances, a fault that takes a pause and a cut ends at these two alone."""
     base = base_named("islanding")
