@@ -82,8 +82,8 @@ _QUERY_TIMEOUT = 600.0
 
 MOST_BYTES = 8_000_000
 """Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have `wire.bounds.LIMIT`
-at most, a configuration or a feeder's diagram more. After a longer
-one it passes nothing more of that sender on that link."""
+at most, a configuration or a feeder's diagram more. After a longer one it passes nothing more of that sender on that
+link."""
 
 MOST_UNPREPARED = 64
 """Publishers that are kept for keys that nobody has prepared, such as those of answers: anybody may ask, under as many
