@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Generator, Iterator
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -136,18 +136,24 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
                 file = folder.write_failure(violated, row, schedule)
                 failures[violated] = Failure(violated=violated, row=row, schedule=schedule, file=file)
                 tell(f"shrinking, {i + 1} of {len(failures)} kinds of failure", i + 1, len(failures))
+        summary = _concluded(campaign, folder, failures)
+        set_complete(folder.path)
     except BaseException as error:
-        _add_failures(failures, folder)
         why = refusal(folder.path, error) if isinstance(error, OSError) else str(error)
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
         set_broken(folder.path, f"{why} after {len(folder.rows)} of {campaign.runs} runs")
+        with suppress(OSError):  # a full disk may take no more of them; the error above is the one to tell
+            _add_failures(failures, folder)
+            _concluded(campaign, folder, failures)
         raise
-    else:
-        set_complete(folder.path)
-    finally:
-        folder.sort()
-        summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
-        (folder.path / "report.txt").write_text("\n".join(summary.lines()) + "\n", encoding="utf-8")
+    return summary
+
+
+def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
+    """Write the table in the order of the runs, and the report."""
+    folder.sort()
+    summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
+    (folder.path / "report.txt").write_text("\n".join(summary.lines()) + "\n", encoding="utf-8")
     return summary
 
 

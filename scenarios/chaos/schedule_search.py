@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 import hypothesis
 import msgspec
@@ -17,7 +18,10 @@ BATCH = 25
 many follow, and few are drawn again to shrink one."""
 
 TRIES = 150
-"""Most runs to shrink one failure."""
+"""Most runs to shrink one failure, in all."""
+
+IDLE_PART = 5
+"""A fifth of these runs is kept for leaving out disturbances one by one, once hypothesis is done."""
 
 
 class _FailsError(Exception):
@@ -53,43 +57,70 @@ def shrunk(base: ChaosBase, seed: int, number: int, fails: Callable[[Schedule], 
     number : int
         Number of the run, whose schedule fails.
     fails : Callable[[Schedule], bool]
-        Whether a schedule fails; asked once for each.
+        Whether a schedule fails; asked once for each, and `TRIES` times at most.
+
+    Returns
+    -------
+    Schedule
+        Empty for a run beyond those that hypothesis draws: it had no disturbances.
     """
     batch, place = divmod(number, BATCH)
-    known: dict[bytes, bool] = {}
+    asked = _Asked(fails)
     simplest: Schedule = ()
     passed = 0
 
     def attempt(schedule: Schedule) -> None:
         nonlocal passed, simplest
-        key = msgspec.json.encode(schedule)
-        if not known:
+        if passed <= place:
             passed += 1
             if passed <= place:
                 return
-            known[key] = True
-        if key not in known:
-            known[key] = len(known) < TRIES and fails(schedule)
-        if known[key]:
+            asked.note_failure(schedule)
+        if asked.fails(schedule, TRIES - TRIES // IDLE_PART):
             simplest = schedule
             raise _FailsError
 
-    try:
+    with suppress(_FailsError):  # of the simplest one, which hypothesis tries again at the end
         _search(base, seed, batch, attempt, (Phase.generate, Phase.shrink))
-    except _FailsError:  # of the simplest one, which hypothesis tries again at the end
-        return _without_idle_ones(base, simplest, fails)
-    raise AssertionError(f"run {number} of seed {seed} is not drawn again")
+    return _without_idle_ones(base, simplest, asked)
 
 
-def _without_idle_ones(base: ChaosBase, schedule: Schedule, fails: Callable[[Schedule], bool]) -> Schedule:
+class _Asked:
+    """Whether schedules fail: each is run once, and all together no more often than they may.
+
+    Parameters
+    ----------
+    fails : Callable[[Schedule], bool]
+        Runs a schedule.
+    """
+
+    def __init__(self, fails: Callable[[Schedule], bool]) -> None:
+        self._fails = fails
+        self._known: dict[bytes, bool] = {}
+        self._runs = 0
+
+    def note_failure(self, schedule: Schedule) -> None:
+        """Note a schedule that is known to fail."""
+        self._known[msgspec.json.encode(schedule)] = True
+
+    def fails(self, schedule: Schedule, most: int) -> bool:
+        """Return whether a schedule is known to fail, after a run of it unless there were `most` runs already."""
+        key = msgspec.json.encode(schedule)
+        if key not in self._known and self._runs < most:
+            self._runs += 1
+            self._known[key] = self._fails(schedule)
+        return self._known.get(key, False)
+
+
+def _without_idle_ones(base: ChaosBase, schedule: Schedule, asked: _Asked) -> Schedule:
     """Return a failing schedule without the disturbances that it fails without.
 
     hypothesis leaves out few numbers in a row, which a disturbance of many is not.
     """
     for disturbance in schedule:
         rest = tuple(it for it in schedule if it is not disturbance)
-        if base.is_possible(rest) and fails(rest):
-            return _without_idle_ones(base, rest, fails)
+        if base.is_possible(rest) and asked.fails(rest, TRIES):
+            return _without_idle_ones(base, rest, asked)
     return schedule
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import csv
+import errno
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.chaos import campaign as campaigns
@@ -128,6 +130,26 @@ def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyP
     assert len(_rows(elsewhere / "out")) == 2
     assert "2 of 9 runs" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
     assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: interrupted")
+
+
+def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever cannot be written after it takes nothing away: the first error is the one that is told."""
+
+    def full(folder: ChaosFolder, *rest: Any) -> None:
+        if len(rest) == 1:
+            folder.rows[rest[0].number] = replace(rest[0], violated={"frequency": "too low"})
+        raise OSError(errno.ENOSPC, "No space left on device", str(folder.path / "chaos.csv"))
+
+    _small(elsewhere)
+    for method in ("add", "sort", "write_failure"):
+        monkeypatch.setattr(ChaosFolder, method, full)
+    code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert "chaos.csv: cannot be written: No space left on device" in text
+    status = (elsewhere / "out" / "status.txt").read_text(encoding="utf-8")
+    assert status.startswith("broken: ")
+    assert "No space left on device after 1 of 2 runs" in status
 
 
 @pytest.mark.parametrize(

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
+from msgspec import json
 
+from scenarios.chaos import schedule_search
 from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.disturbed_scenario import base_of
@@ -122,3 +125,30 @@ def test_a_failure_is_shrunk_to_what_makes_it() -> None:
 
     assert len(simplest) == 2
     assert fails(simplest)
+
+
+def test_a_run_without_disturbances_that_fails_stays_empty() -> None:
+    """A base for which hypothesis draws nothing more has runs without any: their schedule is the simplest there is."""
+    base = base_named("islanding")
+
+    with patch.object(schedule_search, "_search"):
+        assert drawn(base, 1, 0) == [()] * BATCH
+        assert shrunk(base, 1, BATCH - 1, lambda schedule: True) == ()
+
+
+def test_shrinking_runs_each_schedule_once_and_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The disturbances that are left out one by one at the end count, too, and have a part of the runs for them."""
+    base, tries = base_named("islanding"), 20
+    monkeypatch.setattr(schedule_search, "TRIES", tries)
+    asked: list[Schedule] = []
+
+    def fails(schedule: Schedule) -> bool:
+        asked.append(schedule)
+        return len(schedule) > 1
+
+    number = next(i for i, schedule in enumerate(_batch(1)) if len(schedule) > 3)
+    simplest = shrunk(base, 1, BATCH + number, fails)
+
+    assert 1 < len(simplest) < len(_batch(1)[number])
+    assert 0 < len(asked) <= tries
+    assert len({json.encode(schedule) for schedule in asked}) == len(asked)
