@@ -371,6 +371,7 @@ class SoakRun:
 
     def finish(self) -> SoakEnd:
         """End the run, and wait for its report."""
+        self._look_at_sizes()  # an agent that came back may have come since the last look
         self._pids = {"command": self._pids["command"]}  # the others end now
         down = subprocess.run([*COMMAND, "down", *self._where()], capture_output=True, text=True, timeout=PATIENCE)
         if down.returncode:

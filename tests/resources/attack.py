@@ -32,13 +32,15 @@ class Attack(msgspec.Struct, kw_only=True):
     names: tuple[str, ...]
     """Inverters."""
     kind: str
-    """A key of `KINDS`."""
-    rate: float
+    """A key of `KINDS`, or tokens."""
+    rate: float = 0.0
     """Messages a second; 0 is as fast as it goes."""
     epochs: dict[str, int] = {}
     """True epochs, for whoever copies them."""
     size: int = 0
     """Bytes of a long message."""
+    tokens: int = 0
+    """Tokens to hold."""
     links: int = 1
     """Links to wait for."""
     star: bool = False
@@ -97,10 +99,9 @@ KINDS = {"foreign": foreign, "copied": copied, "commands": commands, "long": lon
 
 def tokens(attack: Attack, keys: Keys, session: Session) -> int:
     """Hold tokens of thousands of processes that claim names of the run, and of others."""
-    number = int(attack.rate)
-    for i in range(number):
+    for i in range(attack.tokens):
         session.hold_token(keys.alive_agent(attack.names[i % len(attack.names)] if i % 2 else f"who{i}", f"x{i}"))
-    return number
+    return attack.tokens
 
 
 def main() -> None:

@@ -44,12 +44,14 @@ def settled() -> Town:
     return town.until(lambda: town.t >= SETTLED, "the frequency is restored", patience=60.0)
 
 
-def flood(kind: str, rate: float, seconds: float = 10.0, *, size: int = 0) -> Callable[[], tuple[Trial, str]]:
+def flood(
+    kind: str, rate: float = 0.0, seconds: float = 10.0, *, size: int = 0, tokens: int = 0
+) -> Callable[[], tuple[Trial, str]]:
     """Return a trial with an attacker."""
 
     def trial() -> tuple[Trial, str]:
         with settled() as town:
-            result, sent = attacked(town, kind, rate, seconds, size=size)
+            result, sent = attacked(town, kind, rate, seconds, size=size, tokens=tokens)
             return result, f"{sent} sent"
 
     return trial
@@ -146,7 +148,7 @@ TRIALS: dict[str, Callable[[], tuple[Trial, str]]] = {
     "copies of old messages, 10,000 a second": flood("copied", 10_000.0),
     "foreign messages, as fast as it goes": flood("foreign", 0.0),
     "questions, 2,000 a second, each of another client": flood("commands", 2_000.0),
-    "5,000 processes that claim a name": flood("tokens", 5_000.0),
+    "5,000 processes that claim a name": flood("tokens", tokens=5_000),
     "messages of 100 MB": flood("long", 2.0, size=100_000_000),
     "messages of 200 kB, as fast as it goes": flood("long", 0.0, size=200_000),
     "a reader that is frozen": slow_reader,

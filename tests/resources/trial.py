@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,6 +20,9 @@ from tests.resources.usage import Memory, MemoryWatch, log_bytes
 from tests.toy.town import Town
 
 PLANT_COMMAND = ("-m", "scenarios.emulation.emulated_plant")
+
+DROP = re.compile(r": dropped a message on (\S+): (\w+) \(")
+"""Key and kind in a line of a log."""
 
 F_NOM, F_BAND = 60.0, 0.01
 """Hz."""
@@ -44,7 +48,7 @@ class Trial(NamedTuple):
     rejected: int
     """Messages that plant and agents have counted as rejected meanwhile."""
     kinds: tuple[str, ...]
-    """Kinds of rejection that logs name."""
+    """Kinds of rejection that logs name since the watch began."""
     log: int
     """Bytes of all logs written meanwhile."""
     memory: dict[str, Memory]
@@ -87,6 +91,7 @@ class Watch:
         self.town = town
         pids = {child.name: child.pid for child in town.children if child.status is None}
         self._rejected, self._log = self._count(), log_bytes(town.folder)
+        self._said = {path.name: path.stat().st_size for path in town.folder.glob("*.log")}
         self._late, self._events = self._pace()[1], len(town.events)
         self.first_row = len(town.rows)
         self._memory = MemoryWatch(pids)
@@ -94,6 +99,11 @@ class Watch:
     def rejected(self) -> int:
         """Return the messages that plant and agents have rejected since this began to watch."""
         return self._count() - self._rejected
+
+    def drops(self) -> set[tuple[str, str]]:
+        """Return key and kind of the drops that logs name since this began to watch."""
+        new = [path.read_bytes()[self._said.get(path.name, 0) :] for path in self.town.folder.glob("*.log")]
+        return {(key, kind) for log in new for key, kind in DROP.findall(log.decode(errors="replace"))}
 
     def _count(self) -> int:
         """Return the messages that plant and agents have rejected so far."""
@@ -120,14 +130,6 @@ class Watch:
         """Return what came of it; `rows` are those of the time of the disturbance."""
         worst, late, slipped = self._pace()
         self.run_on(0.6)  # until every agent has sent its status once more
-        logs = "".join(path.read_text(errors="replace") for path in self.town.folder.glob("*.log"))
-        kinds = sorted(
-            {
-                line.split(": dropped a message on ")[1].split(": ")[1].split(" (")[0]
-                for line in logs.splitlines()
-                if ": dropped a message on " in line
-            }
-        )
         return Trial(
             rows=len(rows),
             worst_step=worst,
@@ -136,7 +138,7 @@ class Watch:
             df=self.df(rows),
             df_after=self.df(self.town.rows[-50:]),
             rejected=self.rejected(),
-            kinds=tuple(kinds),
+            kinds=tuple(sorted({kind for _, kind in self.drops()})),
             log=log_bytes(self.town.folder) - self._log,
             memory=self._memory.read(),
             said=tuple(event.text for event in self.town.events[self._events :] if event.kind == "warning"),
@@ -167,22 +169,22 @@ def attacking(attack: Attack, folder: Path) -> Iterator[list[int]]:
             pipe.close()
 
 
-def attack_on(town: Town, kind: str, rate: float, *, size: int = 0) -> Attack:
+def attack_on(town: Town, kind: str, rate: float, *, size: int = 0, tokens: int = 0) -> Attack:
     """Return an attack on a run and all its agents."""
     names = tuple(town.plant_config.agents)
     epochs = {name: town.status[name].epoch for name in names}
     return Attack(
         endpoint=town.endpoint, run=town.plant_config.run, names=names, kind=kind, rate=rate, epochs=epochs, size=size,
-        links=len(names) + 1,
+        tokens=tokens, links=len(names) + 1,
     )  # fmt: skip
 
 
 def attacked(
-    town: Town, kind: str, rate: float, seconds: float, *, size: int = 0, calm: float = 1.0
+    town: Town, kind: str, rate: float, seconds: float, *, size: int = 0, tokens: int = 0
 ) -> tuple[Trial, int]:
     """Attack a run for so long (s of run time); return what came of it, and the number of messages sent."""
     watch = Watch(town)
-    with attacking(attack_on(town, kind, rate, size=size), town.folder) as sent:
+    with attacking(attack_on(town, kind, rate, size=size, tokens=tokens), town.folder) as sent:
         begin = len(town.rows)
         watch.run_on(seconds)
         rows = town.rows[begin:]

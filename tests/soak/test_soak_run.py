@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import sys
+from math import isinf
 from pathlib import Path
 
 import pytest
 
 from bench.soak.disturbances import Disturbance
-from bench.soak.soak_run import PATIENCE, SoakRun
+from bench.soak.soak_run import SoakRun
 from scenarios.schema import load_scenario
 
 
@@ -23,9 +24,8 @@ def test_a_killed_agent_is_told_and_comes_back_and_a_cut_heals(tmp_path: Path) -
         run.disturb(Disturbance("cut", ("inv4", "inv7"), 0.5))
         end = run.finish()
 
-    found = {timed.what: timed.seconds for timed in run.times}
-    assert {"told", "joined", "heal"} <= found.keys()
-    assert max(found.values()) < PATIENCE
+    assert {"told", "joined", "heal"} <= {timed.what for timed in run.times}
+    assert [timed for timed in run.times if isinf(timed.seconds)] == []
     assert [name for name, _ in run.kills] == ["inv3"]
     assert {"plant", "command", *microgrids} == {size.name for size in run.sizes}
     assert all(size.memory > 5.0 and size.files > 3 for size in run.sizes)
