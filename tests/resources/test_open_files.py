@@ -53,6 +53,22 @@ def test_a_limit_is_raised_as_far_as_anybody_may(monkeypatch: pytest.MonkeyPatch
         assert limit() == before[0]
 
 
+@pytest.mark.parametrize("error", [ValueError("not allowed to raise maximum limit"), OSError(errno.EINVAL, "x")])
+def test_a_system_that_allows_less_than_it_says_keeps_its_limit(
+    monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """No process ends because its limit cannot be raised; whether it suffices is checked where links are needed."""
+
+    def refuse(kind: int, limits: tuple[int, int]) -> None:
+        raise error
+
+    monkeypatch.setattr(resource, "getrlimit", lambda kind: (64, 4096))
+    monkeypatch.setattr(resource, "setrlimit", refuse)
+    raise_limit()
+
+    assert limit() == 64
+
+
 def test_what_to_do_about_open_files_is_said_of_that_error_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Any other error of the system keeps its own words."""
     monkeypatch.setattr(resource, "getrlimit", lambda kind: (28, 28))

@@ -24,7 +24,8 @@ Stamped = tuple[Kind, str, bytes, float]
 
 HELD = 1.0
 """Longest time (s) for which a known sender's message waits for room where none may be lost. Its sender waits
-meanwhile, and Zenoh closes a link only after 5 s."""
+meanwhile, and Zenoh closes a link only after 5 s. Then it comes in without room: a lost one would end the run, and a
+sender that waits so long for each cannot bring many."""
 
 
 class Inbox:
@@ -63,9 +64,10 @@ class Inbox:
         self._wake = allocate_lock()
         self._wake.acquire()
         self._backlog, self._guard = Backlog(), allocate_lock()
+        """The guard is held while the backlog is read or changed, and while a message that it has counted is put in."""
         self._counted = False
-        """Whether the backlog has counted any of the messages that wait."""
-        self._emptied = threading.Event()
+        """Whether the backlog has counted any of the messages that wait, or one waits for room."""
+        self._emptied = threading.Condition(self._guard)
 
     def put(self, event: Event, *, asked: bool = False) -> None:
         """Put an event in, from any thread; drop and count a message for which there is no room.
@@ -80,34 +82,41 @@ class Inbox:
         if event[0] != "message":
             self._events.append((*event, monotonic()))
             self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
-        elif (len(self._events) < ROOM and len(event[2]) <= SMALL) or self._admits(event, asked=asked):
+        elif len(self._events) < ROOM and len(event[2]) <= SMALL:
             self._events.append((*event, monotonic()))
+        else:
+            self._put_if_admitted(event, asked=asked)
         if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
 
-    def _admits(self, event: Event, *, asked: bool) -> bool:
-        """Return whether a message may wait: one of many, or a long one."""
+    def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
+        """Put a message in that is one of many, or long, if it may wait."""
         _, key, payload = event
         size, known = len(payload), asked or self.is_known(key, payload)
         if size > LIMIT and not asked:
             self._refuse(key, size)
-            return False
-        self._counted = True
-        if known and self._holds:
-            self._wait_for_room(key, size)
-            with self._guard:
-                self._backlog.add(key, size, waiting=len(self._events))
-            return True
+            return
         with self._guard:
-            return self._backlog.admits(key, size, known=known, waiting=len(self._events))
+            if known and self._holds:
+                self._wait_for_room(key, size)
+                self._backlog.add(key, size, waiting=len(self._events))
+            elif not self._backlog.admits(key, size, known=known, waiting=len(self._events)):
+                return
+            self._counted = True  # before it is put in: `take` looks for it afterwards
+            self._events.append((*event, monotonic()))
 
     def _wait_for_room(self, key: str, size: int) -> None:
-        self._emptied.clear()
-        if not self._backlog.has_room(key, size, known=True, waiting=len(self._events)):
+        """Wait until there is room, at most `HELD`; the guard is held, but for the wait."""
+        end = monotonic() + HELD
+        while not self._backlog.has_room(key, size, known=True, waiting=len(self._events)):
+            self._counted = self._urgent = True  # the owner may wait for more than there is room for
             with suppress(RuntimeError):
-                self._wake.release()  # the owner may wait for more than there is room for
-            self._emptied.wait(HELD)
+                self._wake.release()
+            left = end - monotonic()
+            if left <= 0.0:
+                return
+            self._emptied.wait(left)
 
     def _refuse(self, key: str, size: int) -> None:
         with self._guard:
@@ -146,7 +155,9 @@ class Inbox:
             taken.append(events.popleft())
         if self._counted:
             with self._guard:
+                while events:  # none that is counted waits any more
+                    taken.append(events.popleft())
                 self._counted = False
                 self._backlog.emptied()
-            self._emptied.set()
+                self._emptied.notify_all()
         return taken

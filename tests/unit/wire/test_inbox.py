@@ -1,6 +1,15 @@
 from __future__ import annotations
 
+import threading
+
+import pytest
+
+import wire.driver.inbox
+from wire.backlog import BYTES, MOST_OF_ONE, ROOM
+from wire.bounds import LIMIT
 from wire.driver.inbox import Inbox
+
+LONG = bytes(LIMIT)
 
 
 def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:
@@ -28,3 +37,67 @@ def test_fewer_messages_than_wanted_come_after_the_time() -> None:
     inbox.put(("message", "a", b""))
 
     assert [event[:3] for event in inbox.take(9, timeout=0.01)] == [("message", "a", b"")]
+
+
+@pytest.mark.timeout(60)
+def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatch: pytest.MonkeyPatch) -> None:
+    """None is forgotten, no more come in than there is room for, and the owner is woken though it wants more."""
+    monkeypatch.setattr(wire.driver.inbox, "HELD", 3600.0)
+    inbox = Inbox(holds=True)
+    inbox.is_known = lambda key, payload: True
+    each, senders = 4 * BYTES // LIMIT // 8, 8
+
+    def bring(key: str) -> None:
+        for _ in range(each):
+            inbox.put(("message", key, LONG))
+
+    bringing = [threading.Thread(target=bring, args=(f"telemetry/{i}",), daemon=True) for i in range(senders)]
+    for thread in bringing:
+        thread.start()
+    taken = []
+    while sum(taken) < each * senders:
+        wanted = min(each * senders - sum(taken), 3 * BYTES // LIMIT)
+        taken.append(len(inbox.take(wanted, None)))
+    for thread in bringing:
+        thread.join()
+
+    assert max(taken) <= BYTES // LIMIT
+    assert inbox.take_losses() == ()
+
+
+@pytest.mark.timeout(60)
+def test_senders_of_short_messages_wait_for_room_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    """On one key, beyond the room for all, as many wait as of one sender."""
+    monkeypatch.setattr(wire.driver.inbox, "HELD", 3600.0)
+    inbox = Inbox(holds=True)
+    inbox.is_known = lambda key, payload: True
+    count = 3 * ROOM
+
+    def bring() -> None:
+        for _ in range(count):
+            inbox.put(("message", "state/inv2", b"x"))
+
+    bringing = threading.Thread(target=bring, daemon=True)
+    bringing.start()
+    taken = []
+    while sum(taken) < count:
+        taken.append(len(inbox.take(count - sum(taken), None)))
+    bringing.join()
+
+    assert max(taken) <= ROOM + MOST_OF_ONE
+
+
+def test_a_message_that_has_waited_too_long_for_room_comes_in(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In simulated time none may be lost; once taken out, all of the room is there again."""
+    monkeypatch.setattr(wire.driver.inbox, "HELD", 0.0)
+    inbox = Inbox(holds=True)
+    inbox.is_known = lambda key, payload: key == "telemetry"
+    room = BYTES // LIMIT
+    for _ in range(room + 2):
+        inbox.put(("message", "telemetry", LONG))
+
+    assert len(inbox.take(1, 0.0)) == room + 2
+    for _ in range(room):
+        inbox.put(("message", "command", LONG))
+    assert len(inbox.take(1, 0.0)) == room // 4
+    assert [loss.number for loss in inbox.take_losses()] == [room - room // 4]
