@@ -170,6 +170,8 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     settings: PlantSettings
     agents: tuple[str, ...]
     """Agents the plant waits for before tick 0."""
+    agent_processes: int | msgspec.UnsetType = msgspec.UNSET
+    """Processes that carry these agents, each with one link to the plant; unset, as in a record: one each."""
     schedule: tuple[ScheduledAction, ...] = ()
     """Scheduled joins, leaves and deaths; an agent that joins need not be among `agents`."""
     bridged: bool = False

@@ -74,8 +74,9 @@ def run_plant(
         config = replace(config, epoch=new_epoch())
     else:
         schedule_as_batch()
+    processes = len(config.agents) if config.agent_processes is msgspec.UNSET else config.agent_processes
     try:
-        check_open_files(PLANT, len(config.agents) + len(config.recorders))
+        check_open_files(PLANT, processes + len(config.recorders))
     except OpenFilesError as error:
         raise ConfigurationError(str(error)) from None
     plant: LivePlant | None = None

@@ -56,13 +56,14 @@ class Supervisor:
         shared: int = 0,
     ) -> None:
         self.children = Children()
-        self._plant, self._agents, self._log_dir = plant, {config.name: config for config in agents}, log_dir
+        self._agents, self._log_dir = {config.name: config for config in agents}, log_dir
         self._on_exit, self._on_word, self._plant_command, self._prefixes = on_exit, on_word, plant_command, prefixes
         self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
         self._awaited: set[str] = set()
         alone = self._faults.names | {action.inverter for action in plant.schedule} | set(prefixes)
         self._shared = share(tuple(name for name in self._agents if name not in alone), shared)
         """Agents that share the process of each."""
+        self._plant = replace(plant, agent_processes=len({self._mates(name) for name in plant.agents}))
 
     def __enter__(self) -> Supervisor:
         return self

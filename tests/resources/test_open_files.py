@@ -41,6 +41,14 @@ def test_a_plant_with_too_few_files_for_its_links_ends_the_run_in_one_line(tmp_p
     assert "Traceback" not in outcome.broke
 
 
+def test_a_plant_needs_a_link_for_each_process_not_for_each_agent(tmp_path: Path) -> None:
+    """Agents that share a process, as the advice for too few files says, have one link together."""
+    run = ProcessRun(*toy_configs(3), tmp_path)
+    outcome = run(plant_command=("-c", LIMITED, str(FEW - 1), toy_plant.__file__), shared=1)
+
+    assert f"plant: may have {FEW - 1} files open at once, and needs {2 + BESIDE_LINKS}: 2 links" in outcome.broke
+
+
 def test_a_limit_is_raised_as_far_as_anybody_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """Up to the hard limit, and to what any run needs; never down."""
     for before, after in (((64, 4096), 4096), ((64, 10**9), MOST), ((64, 64), None), ((10**6, 10**6), None)):
