@@ -6,14 +6,16 @@
 
 Agents leave, join, are killed and frozen; links are cut, healed and impaired; loads and a switch change: by the
 commands of a user, drawn from the seed. Two agents stay all the time. Measured are memory (anonymous, resident) and
-open files of every process, late steps of the plant with what explains them, and how long all takes. Exit code: 0 all
-limits are kept, 1 one is not, 2 bad usage, 3 the run broke.
+open files of every process, late steps of the plant with what explains them, and how long all takes.
+
+SIGTERM or Ctrl-C ends the run after the disturbance that goes on; what there is is judged, and no page is written. A
+second one ends all at once. Exit code: 0 all limits are kept, 1 one is not, 2 bad usage, 3 the run broke, 130 and 143
+ended by Ctrl-C and SIGTERM.
 """
 
 from __future__ import annotations
 
 import argparse
-import signal
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -37,6 +39,7 @@ from bench.soak.judging import (
 )
 from bench.soak.process_sizes import ProcessSize
 from bench.soak.soak_run import PATIENCE, SoakEnd, SoakError, SoakRun
+from bench.soak.stop_request import StopRequest, stop_request
 from scenarios.live.run_client import NobodyError
 from scenarios.schema import load_scenario
 from wire.messages import PLANT
@@ -77,23 +80,25 @@ def main(words: Sequence[str] | None = None) -> int:
         except OSError as error:
             parser.error(f"--keep: {given.keep}: {error.strerror}; name a folder that does not exist yet")
     print(machine(), flush=True)
-    with tempfile.TemporaryDirectory(prefix="gridpeers-soak-") as name:
+    with stop_request() as stop, tempfile.TemporaryDirectory(prefix="gridpeers-soak-") as name:
         try:
-            text, kept = soak(given.keep or Path(name), 3600.0 * given.hours, given.seed)
+            text, kept = soak(given.keep or Path(name), 3600.0 * given.hours, given.seed, stop)
         except (SoakError, NobodyError) as error:
             print(f"the run broke: {error}", file=sys.stderr)
             return 3
         except KeyboardInterrupt:
             print("interrupted; nothing is judged", file=sys.stderr)
-            return 130
-    print(text)
+            return stop.exit_code
+    print(text, flush=True)
+    if stop.asked is not None:
+        return stop.exit_code
     if given.write is not None:
         write(given.write, text)
     return 0 if kept else 1
 
 
-def soak(folder: Path, seconds: float, seed: int) -> tuple[str, bool]:
-    """Run for some time (s); return the result as Markdown, and whether all limits were kept."""
+def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[str, bool]:
+    """Run for some time (s), or until a request; return the result as Markdown, and whether all limits were kept."""
     feeder = load_scenario("islanding")[1]
     microgrids = {row.name: row.microgrid for row in feeder.inverters}
     leader = next(row.name for row in feeder.inverters if row.kind == "GFM")
@@ -105,15 +110,15 @@ def soak(folder: Path, seconds: float, seed: int) -> tuple[str, bool]:
     say("the run starts")
     with SoakRun(folder, microgrids, spare) as run:
         calm = monotonic()
-        count = 0
+        count, stop.disturbing = 0, True
         for one in disturbances(seed, replaced, tuple(microgrids), spare, sorted({*microgrids.values()})):
-            if monotonic() - calm >= seconds:
+            if monotonic() - calm >= seconds or stop.asked is not None:
                 break
             run.disturb(one)
             count += 1
             if count % TOLD == 1:
                 say(f"{(monotonic() - calm) / 60.0:.1f} min: {count} disturbances, {run.monitor.t:.0f} s, last {one}")
-        lasted = monotonic() - calm
+        lasted, stop.disturbing = monotonic() - calm, False
         say("the run ends, and makes its report")
         end = run.finish()
     rows = [",".join(ProcessSize._fields), *(",".join(map(str, one)) for one in run.sizes)]
@@ -131,8 +136,11 @@ def soak(folder: Path, seconds: float, seed: int) -> tuple[str, bool]:
         print(f"{what:24}{'warm':>9}{'last':>9}{'growth':>9}")
         for growth in growths(run.sizes, of, (PLANT, "command", *stays)):
             print(f"{growth.name:24}{growth.before:9.1f}{growth.after:9.1f}{100.0 * growth.part:8.1f} %")
+    length = f"{lasted / 60.0:.0f} min"
+    if stop.asked is not None:
+        length = f"ended after {length} of {seconds / 60.0:.0f} by {stop.asked.name}"
     about = (
-        f"{machine()}; commit {commit()}; {lasted / 60.0:.0f} min, seed {seed}, {count} disturbances; "
+        f"{machine()}; commit {commit()}; {length}, seed {seed}, {count} disturbances; "
         f"load (1, 5, 15 min) {before} before and {load()} after"
     )
     print(f"{monotonic() - began:.0f} s in all")
@@ -154,7 +162,7 @@ def judged(run: SoakRun, end: SoakEnd, lasted: float, stays: Sequence[str]) -> l
         of_kind = [timed for timed in run.times if timed.what == what]
         deaf = sum(timed.deaf for timed in of_kind)
         found.append(judge_times(name, [timed.seconds for timed in of_kind if not timed.deaf], limit, deaf))
-    found.append(judge_checks(end.checks, run.kills))
+    found.append(judge_checks(end.checks, end.silences, run.kills))
     wrong = [*run.problems, *([] if end.status == 0 else [f"gridpeers up ended with {end.status}"])]
     found.append(Finding("commands and processes", "none fails", "; ".join(wrong[:3]) or "all as asked", "PASS"))
     if wrong:
@@ -184,5 +192,4 @@ def write(page: Path, text: str) -> None:
 
 
 if __name__ == "__main__":
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # so that all processes of the run end, too
     sys.exit(main())

@@ -10,7 +10,7 @@ import numpy as np
 
 from bench.soak.late_steps import LateSteps
 from bench.soak.process_sizes import ProcessSize
-from scenarios.checks.check_verdict import CheckVerdict, summary
+from scenarios.checks.check_verdict import CheckVerdict, Violation, summary
 
 FLAT = 0.05
 """Growth of memory or files, as a part, that counts as none."""
@@ -168,13 +168,17 @@ def judge_times(what: str, seconds: Sequence[float], limit: float | None, deaf: 
     return Finding(what, words, text, "-" if limit is None else "PASS" if worst < limit else "FAIL")
 
 
-def judge_checks(verdicts: tuple[CheckVerdict, ...], kills: Sequence[tuple[str, float]]) -> Finding:
+def judge_checks(
+    verdicts: tuple[CheckVerdict, ...], silences: Sequence[Violation], kills: Sequence[tuple[str, float]]
+) -> Finding:
     """Return the verdict of the checks.
 
     Parameters
     ----------
     verdicts : tuple[CheckVerdict, ...]
         Of the run.
+    silences : Sequence[Violation]
+        All that the check of last words names: its verdict shows some of them.
     kills : Sequence[tuple[str, float]]
         Agents that this program has killed, and when (s of run time): the check of last words names each of them, as
         nothing in the run tells why they are silent, and no others.
@@ -182,19 +186,28 @@ def judge_checks(verdicts: tuple[CheckVerdict, ...], kills: Sequence[tuple[str, 
     if not verdicts:
         return Finding("checks", "none fails", "there is no checks.json", "FAIL")
     words = next((one for one in verdicts if one.check == LAST_WORDS), None)
-    known = words is not None and words.status == "failed" and words.count == len(kills) and _all_killed(words, kills)
+    known = (
+        words is not None
+        and words.status == "failed"
+        and words.count == len(silences)
+        and _were_killed(silences, kills)
+    )
     failed = [one for one in verdicts if one.status == "failed" and not (known and one is words)]
     text = summary(tuple(one for one in verdicts if not (known and one is words)))
     if known:
-        text += f"; {LAST_WORDS} names the {len(kills)} agents that were killed, and no others"
+        text += f"; {LAST_WORDS} names the {len(kills)} kills by agent and time, and nothing else"
     return Finding("checks", "none fails", text, "FAIL" if failed else "PASS")
 
 
-def _all_killed(words: CheckVerdict, kills: Sequence[tuple[str, float]]) -> bool:
-    """Return whether each agent that fell silent, as far as a verdict shows them, was killed then."""
-    return all(
-        any(one.agent == name and one.t is not None and abs(one.t - t) <= NOTICED for name, t in kills)
-        for one in words.violations
+def _were_killed(silences: Sequence[Violation], kills: Sequence[tuple[str, float]]) -> bool:
+    """Return whether each agent that fell silent was killed then, and each kill has its silence.
+
+    Kills of one agent are seconds apart: in the order of time the first silence belongs to the first kill.
+    """
+    silent = sorted((one.agent, -1.0 if one.t is None else one.t) for one in silences)
+    return len(silent) == len(kills) and all(
+        name == killed and abs(t - when) <= NOTICED
+        for (name, t), (killed, when) in zip(silent, sorted(kills), strict=True)
     )
 
 

@@ -1,7 +1,8 @@
 """The run of a soak: its processes, the commands that disturb it, and what is measured meanwhile.
 
 All processes are started as a user starts them: `gridpeers up` with a record, and `gridpeers agent` for every agent
-that comes back. All disturbances are commands of a user, or signals to a process.
+that comes back. All disturbances are commands of a user, or signals to a process. Each is in a session of its own: the
+Ctrl-C of a terminal reaches the soak alone, which ends them in order.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ import re
 import signal
 import subprocess
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from time import monotonic, sleep
@@ -20,18 +21,22 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+import gridpeers as gp
 from bench.long_runs import COMMAND, processes, processor_time, size
 from bench.soak.disturbances import SETTLE, Disturbance
+from bench.soak.judging import LAST_WORDS
 from bench.soak.late_steps import LateSteps, Start, late_steps
 from bench.soak.process_sizes import MachineTime, ProcessSize, machine_time, size_of, waiting_times
 from bench.soak.soak_monitor import HOLD, SoakMonitor
-from scenarios.checks.check_verdict import CheckVerdict
+from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.checks.checks_file import FILE as CHECKS
 from scenarios.checks.checks_file import read_verdicts
+from scenarios.checks.communication.last_words_check import LastWords
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.live.run_address import RunAddress
 from scenarios.live.run_client import RunClient
 from scenarios.live.show.watching import RunSubscriber
+from scenarios.record.record_info import FILE as RECORD
 from wire.messages import PLANT
 
 BUILD = 300.0
@@ -77,6 +82,8 @@ class SoakEnd(NamedTuple):
     """Exit status of `gridpeers up`; None if it had not ended after `CONCLUDE`."""
     checks: tuple[CheckVerdict, ...]
     """Verdicts of the checks."""
+    silences: tuple[Violation, ...]
+    """All that the check of last words names."""
     report_s: float
     """How long its report took (s)."""
     peak_MB: float
@@ -97,6 +104,15 @@ class CountingClient(RunClient):
         """Open a new session."""
         self.renewals += 1
         super().renew()
+
+
+def all_silences(folder: Path, verdicts: Sequence[CheckVerdict]) -> tuple[Violation, ...]:
+    """Return all that the check of last words names: of many by a second pass over the record."""
+    words = next((one for one in verdicts if one.check == LAST_WORDS), None)
+    if words is None or words.count == len(words.violations):
+        return () if words is None else words.violations
+    (record,) = folder.rglob(RECORD)
+    return tuple(LastWords()(gp.read(record.parent.parent).checked_case))
 
 
 class SoakError(RuntimeError):
@@ -166,7 +182,9 @@ class SoakRun:
             words = ["up", "islanding", "--run", self._name, "--listen", self._endpoint]
             words += ["--out", str(self.here)] if self._recorded else []
             born = monotonic()
-            self._up = subprocess.Popen([*COMMAND, *words], stdout=self._log, stderr=self._log, cwd=self._folder)
+            self._up = subprocess.Popen(
+                [*COMMAND, *words], stdout=self._log, stderr=self._log, cwd=self._folder, start_new_session=True
+            )
             where = RunAddress(run=self._name, connect=(self._endpoint,))
             self._client = CountingClient(where, meet_agents=True)
             self._stack.callback(self._client.close)
@@ -207,14 +225,14 @@ class SoakRun:
     def disturb(self, one: Disturbance) -> None:
         """Do one disturbance, and wait until all is as before."""
         self.monitor.restorations.clear()
+        deaf = self._client.renewals
         if one.kind in ("load", "zone"):
             self.rest(SETTLE)
         getattr(self, f"_{one.kind}")(one)
-        deaf = self._client.renewals
         if not self._until(self._calm, PATIENCE):
             self._note("restored", float("inf"), one, deaf)
         for seconds in self.monitor.restorations:
-            self._note("restored", seconds, one, self._client.renewals)
+            self._note("restored", seconds, one, deaf)
         self.rest(one.rest)
 
     def rest(self, seconds: float) -> None:
@@ -259,16 +277,8 @@ class SoakRun:
         finally:
             os.kill(pid, signal.SIGCONT)
         woken = monotonic()
-        self._wait(
-            "heal",
-            lambda: (
-                all(self.monitor.use(other, name) for other in self._others(name))
-                and all(self.monitor.use(name, other, woken) for other in self._others(name))
-            ),
-            woken,
-            one,
-            deaf,
-        )
+        others = self._others(name)
+        self._wait("heal", lambda: self.monitor.use_each_other((name,), others, woken), woken, one, deaf)
 
     def _cut(self, one: Disturbance) -> None:
         self._cut_between(one, one.agents, (one.agents[0],), (one.agents[1],))
@@ -294,7 +304,7 @@ class SoakRun:
             self._command("link", "cut", *links)
             self.rest(one.seconds)
             healed = self.monitor.wall_time(self._from(self._command("link", "heal", *links)))
-        self._wait("heal", lambda: self.monitor.use_each_other(some, others), healed, one, deaf)
+        self._wait("heal", lambda: self.monitor.use_each_other(some, others, healed), healed, one, deaf)
 
     def _impair(self, one: Disturbance) -> None:
         options = ["--delay", f"{one.delay:g}", "--loss", f"{one.loss:g}", "--for", f"{one.seconds:g}"]
@@ -319,7 +329,11 @@ class SoakRun:
         self._logs += 1
         with (self._folder / f"{name}-{self._logs}.log").open("wb") as log:
             agent = subprocess.Popen(
-                [*COMMAND, "agent", name, *self._where()], stdout=log, stderr=log, cwd=self._folder
+                [*COMMAND, "agent", name, *self._where()],
+                stdout=log,
+                stderr=log,
+                cwd=self._folder,
+                start_new_session=True,
             )
         self._started[name], self._pids[name] = agent, (agent.pid, began)
         self._starting[agent.pid] = f"agent {name}", began
@@ -348,7 +362,11 @@ class SoakRun:
         """Run a command to its end; return what it printed."""
         began = monotonic()
         process = subprocess.Popen(
-            [*COMMAND, *words, *self._where()], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=self._folder
+            [*COMMAND, *words, *self._where()],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            cwd=self._folder,
+            start_new_session=True,
         )
         self._others_of_ours[process.pid] = began
         self._starting[process.pid] = f"gridpeers {words[0]}", began
@@ -382,9 +400,11 @@ class SoakRun:
             sleep(0.05)
         took = monotonic() - began
         verdicts = [file for file in self.here.rglob(CHECKS)]
+        checks = read_verdicts(verdicts[0])["IV"] if verdicts else ()
         return SoakEnd(
             status=self._up.poll(),
-            checks=read_verdicts(verdicts[0])["IV"] if verdicts else (),
+            checks=checks,
+            silences=all_silences(self.here, checks),
             report_s=took,
             peak_MB=float(peak),
             files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},

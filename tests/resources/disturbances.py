@@ -8,7 +8,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from time import monotonic, sleep, time
 from unittest.mock import patch
@@ -37,11 +38,11 @@ os.kill(os.getpid(), signal.SIGSTOP)
 """
 
 
-def settled() -> Town:
-    """Start the run, and wait until it has restored its frequency."""
-    folder = Path(tempfile.mkdtemp(prefix="trial"))
-    town = real_town(folder).all()
-    return town.until(lambda: town.t >= SETTLED, "the frequency is restored", patience=60.0)
+@contextmanager
+def settled() -> Iterator[Town]:
+    """Start the run, and wait until it has restored its frequency; its processes and its folder end with it."""
+    with tempfile.TemporaryDirectory(prefix="trial") as folder, real_town(Path(folder)) as town:
+        yield town.all().until(lambda: town.t >= SETTLED, "the frequency is restored", patience=60.0)
 
 
 def flood(
@@ -119,9 +120,9 @@ def jumping_clock() -> tuple[Trial, str]:
         library = Path(folder) / "jumping_clock.so"
         source = Path(__file__).with_name("jumping_clock.c")
         subprocess.run(["cc", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
-        with patch.dict(os.environ, LD_PRELOAD=str(library)):
-            town = settled()
-        with town:
+        with ExitStack() as stack:
+            with patch.dict(os.environ, LD_PRELOAD=str(library)):
+                town = stack.enter_context(settled())
             watch, begin = Watch(town), len(town.rows)
             watch.run_on(10.0)
             result = watch.result(town.rows[begin:])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from itertools import islice
 from pathlib import Path
 from typing import Literal
@@ -15,7 +16,8 @@ from bench.soak.judging import files_of, growths, judge_checks, judge_growth, ju
 from bench.soak.late_steps import LateSteps, Start, late_steps
 from bench.soak.process_sizes import MachineTime, ProcessSize
 from bench.soak.soak_monitor import SoakMonitor
-from scenarios.checks.check_verdict import CheckVerdict, Violation
+from bench.soak.stop_request import StopRequest, stop_request
+from scenarios.checks.check_verdict import SHOWN, CheckVerdict, Violation
 from wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -143,7 +145,7 @@ def test_only_the_silence_of_agents_that_were_killed_is_explained() -> None:
     words = CheckVerdict(check="last_words", status="failed", violations=(dead,), count=1)
     passed, failed = (CheckVerdict(check="heal", status=status) for status in ("passed", "failed"))
 
-    assert judge_checks((passed, words), [("inv3", 11.9)]).verdict == "PASS"
+    assert judge_checks((passed, words), [dead], [("inv3", 11.9)]).verdict == "PASS"
     for verdicts, kills in (
         ((passed, words), []),
         ((passed, words), [("inv4", 11.9)]),
@@ -152,7 +154,19 @@ def test_only_the_silence_of_agents_that_were_killed_is_explained() -> None:
         ((failed, words), [("inv3", 11.9)]),
         ((), []),
     ):
-        assert judge_checks(verdicts, kills).verdict == "FAIL"
+        assert judge_checks(verdicts, [dead], kills).verdict == "FAIL"
+
+
+def test_every_kill_of_an_hour_counts_not_only_those_that_a_verdict_shows() -> None:
+    """A hundred kills, of which a verdict keeps twenty: one silence of another agent beyond these fails."""
+    kills = [(f"inv{3 + i % 7}", 30.0 * i) for i in range(100)]
+    silences = [Violation(text="sends nothing more", agent=name, t=t + 0.4) for name, t in kills]
+    words = CheckVerdict(check="last_words", status="failed", violations=tuple(silences[:SHOWN]), count=100)
+
+    assert judge_checks((words,), silences, kills).verdict == "PASS"
+    assert judge_checks((words,), silences[:SHOWN], kills).verdict == "FAIL"
+    silences[-1] = Violation(text="sends nothing more", agent="inv1", t=kills[-1][1])
+    assert judge_checks((words,), silences, kills).verdict == "FAIL"
 
 
 def test_a_frequency_is_restored_once_it_holds() -> None:
@@ -199,3 +213,32 @@ def test_the_result_goes_between_its_lines_of_the_page(tmp_path: Path, capsys: p
         with pytest.raises(SystemExit, match="2"):
             command.main(words)
         assert told in capsys.readouterr().err
+
+
+def test_the_first_signal_ends_a_soak_well_and_a_second_one_at_once() -> None:
+    """Before the run is disturbed there is nothing to judge; signals within a second are one request."""
+    now = [0.0]
+    before, request = StopRequest(lambda: now[0]), StopRequest(lambda: now[0])
+    with pytest.raises(KeyboardInterrupt):
+        before(signal.SIGTERM, None)
+    request.disturbing = True
+    request(signal.SIGTERM, None)
+    request(signal.SIGTERM, None)
+    now[0] = 2.0
+
+    assert (before.exit_code, request.exit_code) == (143, 143)
+    with pytest.raises(KeyboardInterrupt):
+        request(signal.SIGINT, None)
+
+
+def test_signals_are_taken_even_if_the_shell_lets_them_be_ignored() -> None:
+    """As it does with the Ctrl-C of what runs in the background; what was there before is there again after it."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with stop_request() as request:
+            request.disturbing = True
+            signal.raise_signal(signal.SIGINT)
+        assert request.asked == signal.SIGINT
+        assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
