@@ -38,8 +38,9 @@ from bench.soak.judging import (
     table,
 )
 from bench.soak.process_sizes import ProcessSize
-from bench.soak.soak_run import PATIENCE, SoakEnd, SoakError, SoakRun
+from bench.soak.soak_run import SoakRun
 from bench.soak.stop_request import StopRequest, stop_request
+from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
 from scenarios.live.run_client import NobodyError
 from scenarios.schema import load_scenario
 from wire.messages import PLANT

@@ -1,9 +1,4 @@
-"""The run of a soak: its processes, the commands that disturb it, and what is measured meanwhile.
-
-All processes are started as a user starts them: `gridpeers up` with a record, and `gridpeers agent` for every agent
-that comes back. All disturbances are commands of a user, or signals to a process. Each is in a session of its own: the
-Ctrl-C of a terminal reaches the soak alone, which ends them in order.
-"""
+"""The disturbances of a soak on its run: commands of a user, or signals to a process, and how long all takes."""
 
 from __future__ import annotations
 
@@ -11,54 +6,17 @@ import os
 import re
 import signal
 import subprocess
-from collections import deque
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from time import monotonic, sleep
-from types import TracebackType
-from typing import NamedTuple, Self
+from time import monotonic
+from typing import NamedTuple
 
-import numpy as np
-
-import gridpeers as gp
-from bench.long_runs import COMMAND, processes, processor_time, size
+from bench.long_runs import COMMAND
 from bench.soak.disturbances import SETTLE, Disturbance
-from bench.soak.judging import LAST_WORDS
-from bench.soak.late_steps import LateSteps, Start, late_steps
-from bench.soak.process_sizes import MachineTime, ProcessSize, machine_time, size_of, waiting_times
-from bench.soak.soak_monitor import HOLD, SoakMonitor
-from scenarios.checks.check_verdict import CheckVerdict, Violation
-from scenarios.checks.checks_file import FILE as CHECKS
-from scenarios.checks.checks_file import read_verdicts
-from scenarios.checks.communication.last_words_check import LastWords
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.live.run_address import RunAddress
-from scenarios.live.run_client import RunClient
-from scenarios.live.show.watching import RunSubscriber
-from scenarios.record.record_info import FILE as RECORD
-from wire.messages import PLANT
-
-BUILD = 300.0
-"""Longest wait (s) for the run to begin: the plant may be compiled first."""
-
-CALM = 6.0
-"""Run time (s) at which both events of the scenario are over."""
-
-PATIENCE = 30.0
-"""Longest wait (s) for anything that a disturbance brings about."""
-
-CONCLUDE = 1800.0
-"""Longest wait (s) for the report of the run after its end."""
-
-LOOK = 5.0
-"""Time (s) between two looks at the sizes of the processes."""
+from bench.soak.watched_run import PATIENCE, WatchedRun
 
 LOAD, ZONE = "48", "60-160"
 """The load that is set, and the switch of the zone that the scenario drops."""
-
-SAMPLES = 3
-"""Samples of the machine's time, one with each telemetry, over which a late step is explained."""
 
 
 class Timed(NamedTuple):
@@ -75,52 +33,8 @@ class Timed(NamedTuple):
     """Whether this program opened a new session meanwhile, so that the time may be its own."""
 
 
-class SoakEnd(NamedTuple):
-    """The end of the run."""
-
-    status: int | None
-    """Exit status of `gridpeers up`; None if it had not ended after `CONCLUDE`."""
-    checks: tuple[CheckVerdict, ...]
-    """Verdicts of the checks."""
-    silences: tuple[Violation, ...]
-    """All that the check of last words names."""
-    report_s: float
-    """How long its report took (s)."""
-    peak_MB: float
-    """Greatest memory of the command meanwhile (MB)."""
-    files: Mapping[str, int]
-    """Files of the run (bytes)."""
-    printed: str
-    """What `gridpeers up` printed."""
-
-
-class CountingClient(RunClient):
-    """A client that counts its sessions."""
-
-    renewals = 0
-    """How often it opened a new session."""
-
-    def renew(self) -> None:
-        """Open a new session."""
-        self.renewals += 1
-        super().renew()
-
-
-def all_silences(folder: Path, verdicts: Sequence[CheckVerdict]) -> tuple[Violation, ...]:
-    """Return all that the check of last words names: of many by a second pass over the record."""
-    words = next((one for one in verdicts if one.check == LAST_WORDS), None)
-    if words is None or words.count == len(words.violations):
-        return () if words is None else words.violations
-    (record,) = folder.rglob(RECORD)
-    return tuple(LastWords()(gp.read(record.parent.parent).checked_case))
-
-
-class SoakError(RuntimeError):
-    """The run does not go on; the message says what ended and its last lines."""
-
-
-class SoakRun:
-    """A live run with a record. Use it as a context: no process is left.
+class SoakRun(WatchedRun):
+    """A live run that is disturbed. Use it as a context: no process is left.
 
     Parameters
     ----------
@@ -135,92 +49,10 @@ class SoakRun:
     """
 
     def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
-        self.microgrids, self.agents = microgrids, tuple(microgrids)
-        self.monitor = SoakMonitor()
-        self.monitor.off.add(spare)
+        super().__init__(folder, microgrids, spare, recorded=recorded)
         self.times: list[Timed] = []
-        self.late: list[LateSteps] = []
-        self.sizes: list[ProcessSize] = []
-        self.problems: list[str] = []
-        """What went wrong beside: a command that failed, a process that ended."""
         self.kills: list[tuple[str, float]] = []
         """Agents that were killed, and when (s of run time)."""
-        self._recorded = recorded
-        self._folder, self._endpoint, self._name = folder, free_endpoint(), f"soak{os.getpid()}"
-        self._pids: dict[str, tuple[int, float]] = {}
-        """Process and its start (s, monotonic) of the plant, the command and each agent."""
-        self._started: dict[str, subprocess.Popen[bytes]] = {}
-        """Agents that were started alone."""
-        self._others_of_ours: dict[int, float] = {os.getpid(): 0.0}
-        """Further processes, by their starts (s, monotonic): this one, servers of `up`, and commands that run now."""
-        self._starting: dict[int, tuple[str, float]] = {}
-        """Processes that get ready now: text and start (s, monotonic)."""
-        self._spent: dict[tuple[int, float], float] = {}
-        """Processor time (s) of every process so far."""
-        self._waited: dict[int, float] = {}
-        """Time (s) in which each thread of the plant waited for a processor so far."""
-        self._starts: deque[Start] = deque(maxlen=40)
-        self._machine: deque[MachineTime] = deque(maxlen=SAMPLES)
-        self._seen = self._late = self._steps = self._logs = 0
-        self._look = 0.0
-        self._stack = ExitStack()
-
-    @property
-    def here(self) -> Path:
-        """Folder of the run."""
-        return self._folder / "run"
-
-    @property
-    def steps(self) -> int:
-        """Steps of the plant since the run is calm."""
-        return 0 if self.monitor.pacing is None else self.monitor.pacing.steps - self._steps
-
-    def __enter__(self) -> Self:
-        """Start all processes; return once the run is calm."""
-        try:
-            self._log = self._stack.enter_context((self._folder / "up.log").open("wb"))
-            words = ["up", "islanding", "--run", self._name, "--listen", self._endpoint]
-            words += ["--out", str(self.here)] if self._recorded else []
-            born = monotonic()
-            self._up = subprocess.Popen(
-                [*COMMAND, *words], stdout=self._log, stderr=self._log, cwd=self._folder, start_new_session=True
-            )
-            where = RunAddress(run=self._name, connect=(self._endpoint,))
-            self._client = CountingClient(where, meet_agents=True)
-            self._stack.callback(self._client.close)
-            self._client.find_plant(BUILD)
-            self._subscriber = RunSubscriber(self._client, self.monitor)
-            self._need(self._until(lambda: self.monitor.t > CALM and self._calm(), BUILD), "the run is not calm")
-            for name, pid in processes(self._up.pid).items():
-                if name in (PLANT, "command", *self.agents):
-                    self._pids[name] = pid, born
-                else:
-                    self._others_of_ours[pid] = born
-            missing = {PLANT, *self.agents} - self._pids.keys()
-            self._need(not missing, f"no process of {', '.join(sorted(missing))} is found")
-            if self.monitor.pacing is not None:
-                self._late, self._steps = self.monitor.pacing.late, self.monitor.pacing.steps
-        except BaseException:
-            self.__exit__(None, None, None)
-            raise
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End all processes that still run."""
-        for process in (*self._started.values(), *([self._up] if hasattr(self, "_up") else [])):
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.send_signal(signal.SIGTERM)
-                try:
-                    process.wait(20.0)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
-        self._stack.close()
-
-    # ---------------------------------------------------------------- disturbances
 
     def disturb(self, one: Disturbance) -> None:
         """Do one disturbance, and wait until all is as before."""
@@ -234,11 +66,6 @@ class SoakRun:
         for seconds in self.monitor.restorations:
             self._note("restored", seconds, one, deaf)
         self.rest(one.rest)
-
-    def rest(self, seconds: float) -> None:
-        """Let the run go on for some time (s)."""
-        end = monotonic() + seconds
-        self._until(lambda: monotonic() >= end, seconds + 1.0)
 
     def _leave(self, one: Disturbance) -> None:
         (name,) = one.agents
@@ -321,7 +148,7 @@ class SoakRun:
         self.rest(one.seconds)
         self._command("event", "open", ZONE)
 
-    # ---------------------------------------------------------------- processes
+    # ---------------------------------------------------------------- agents that come and go
 
     def _join(self, name: str, one: Disturbance) -> None:
         """Start an agent, and measure how long it takes until it and the others use each other."""
@@ -358,75 +185,12 @@ class SoakRun:
         if not ended:
             self.problems.append(f"t = {self.monitor.t:.1f} s: the process of {name} has not ended")
 
-    def _command(self, *words: str) -> str:
-        """Run a command to its end; return what it printed."""
-        began = monotonic()
-        process = subprocess.Popen(
-            [*COMMAND, *words, *self._where()],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=self._folder,
-            start_new_session=True,
-        )
-        self._others_of_ours[process.pid] = began
-        self._starting[process.pid] = f"gridpeers {words[0]}", began
-        if not self._until(lambda: process.poll() is not None, PATIENCE):
-            process.kill()
-        text = process.communicate()[0].decode(errors="replace")
-        self._others_of_ours.pop(process.pid)
-        self._ready(process.pid)
-        if process.returncode:
-            last = text.strip().splitlines()[-1:] or ["it printed nothing"]
-            self.problems.append(
-                f"t = {self.monitor.t:.1f} s: gridpeers {' '.join(words)} ended with {process.returncode}: {last[0]}"
-            )
-        return text
-
-    def _ready(self, pid: int) -> None:
-        """Note that a process that was started is ready, or has ended."""
-        text, began = self._starting.pop(pid)
-        self._starts.append(Start(text, began, monotonic()))
-
-    def finish(self) -> SoakEnd:
-        """End the run, and wait for its report."""
-        self._look_at_sizes()  # an agent that came back may have come since the last look
-        self._pids = {"command": self._pids["command"]}  # the others end now
-        down = subprocess.run([*COMMAND, "down", *self._where()], capture_output=True, text=True, timeout=PATIENCE)
-        if down.returncode:
-            self.problems.append(f"gridpeers down ended with {down.returncode}: {down.stdout}{down.stderr}".strip())
-        began, peak = monotonic(), 0.0
-        while self._up.poll() is None and monotonic() < began + CONCLUDE:
-            peak = max(peak, np.nan_to_num(size(self._up.pid, "VmHWM")))
-            sleep(0.05)
-        took = monotonic() - began
-        verdicts = [file for file in self.here.rglob(CHECKS)]
-        checks = read_verdicts(verdicts[0])["IV"] if verdicts else ()
-        return SoakEnd(
-            status=self._up.poll(),
-            checks=checks,
-            silences=all_silences(self.here, checks),
-            report_s=took,
-            peak_MB=float(peak),
-            files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},
-            printed=(self._folder / "up.log").read_text(errors="replace"),
-        )
+    # ---------------------------------------------------------------- measured times
 
     def _from(self, text: str) -> float:
         """Return the run time (s) from which on a link command holds, as it printed."""
         found = re.search(r"from t = ([\d.]+) s on", text)
         return float(found[1]) if found else self.monitor.t
-
-    def _where(self) -> list[str]:
-        return ["--run", self._name, "--connect", self._endpoint]
-
-    def _others(self, name: str) -> tuple[str, ...]:
-        return tuple(other for other in self.agents if other != name)
-
-    # ---------------------------------------------------------------- waiting and looking
-
-    def _calm(self) -> bool:
-        """Whether all agents use each other, and the frequency has been in its band for a while."""
-        return self.monitor.use_each_other(self.agents, self.agents) and self.monitor.seconds_in_band >= HOLD
 
     def _wait(self, what: str, condition: Callable[[], bool], since: float, one: Disturbance, deaf: int) -> None:
         """Wait until a condition holds, and note how long that took since a time (s, monotonic)."""
@@ -435,45 +199,3 @@ class SoakRun:
 
     def _note(self, what: str, seconds: float, one: Disturbance, deaf: int) -> None:
         self.times.append(Timed(what, seconds, one, self.monitor.t, self._client.renewals > deaf))
-
-    def _until(self, condition: Callable[[], bool], patience: float) -> bool:
-        """Take in messages until a condition holds; return whether it does."""
-        end = monotonic() + patience
-        while not condition():
-            left = end - monotonic()
-            if left <= 0.0:
-                return False
-            self._subscriber.take(min(left, 0.05))
-            self._need(self._up.poll() is None, f"gridpeers up ended with status {self._up.returncode}")
-            if self.monitor.telemetries > self._seen and self._pids:
-                self._seen = self.monitor.telemetries
-                self._look_at_machine()
-            if monotonic() >= self._look and self._pids:
-                self._look = monotonic() + LOOK
-                self._look_at_sizes()
-        return True
-
-    def _look_at_machine(self) -> None:
-        """Sample the machine's time, and explain the late steps since the last sample."""
-        for pid, born in (*self._pids.values(), *self._others_of_ours.items()):
-            self._spent[pid, born] = max(self._spent.get((pid, born), 0.0), processor_time(pid))
-        now, pacing = monotonic(), self.monitor.pacing
-        self._waited |= waiting_times(self._pids[PLANT][0])
-        self._machine.append(machine_time(now, sum(self._spent.values()), sum(self._waited.values())))
-        if pacing is not None and (count := pacing.late - self._late) > 0:
-            self._late = pacing.late
-            starts = [*self._starts, *(Start(text, born, now) for text, born in self._starting.values())]
-            self.late.append(late_steps(self.monitor.t, count, self._machine[0], self._machine[-1], starts))
-
-    def _look_at_sizes(self) -> None:
-        at = monotonic()
-        for name, (pid, born) in list(self._pids.items()):
-            found = size_of(name, pid, born, at)
-            if found is not None:
-                self.sizes.append(found)
-
-    def _need(self, sound: bool, why: str) -> None:
-        if not sound:
-            self._log.flush()
-            last = (self._folder / "up.log").read_text(errors="replace").splitlines()[-8:]
-            raise SoakError("\n".join((why, *last)))
