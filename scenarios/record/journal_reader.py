@@ -11,7 +11,7 @@ import msgspec
 from scenarios.record.record_info import RecordInfo
 from wire.bounds import LIMIT
 from wire.codec import CRC, sound
-from wire.journal import AnyEntry, Entry
+from wire.journal import AnyEntry, Entry, Exchange
 from wire.messages import AnyMessage, Measurement, State
 
 
@@ -23,28 +23,55 @@ def entries_of(data: bytes) -> Iterator[Entry]:
     ValueError
         Where the bytes end within an entry, or make none.
     """
+    for raw in raw_entries(data):
+        if (entry := entry_of(raw)) is not None:
+            yield entry
+
+
+def raw_entries(data: bytes) -> Iterator[Any]:
+    """Yield what follows each other in the data of a `Journal`: any msgpack values, which `entry_of` checks.
+
+    Raises
+    ------
+    ValueError
+        Where the bytes end within a value, or make none.
+    """
     unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
     if len(data) > LIMIT:
         raise ValueError(f"{len(data)} bytes, a part of a journal has at most {LIMIT}")
     unpacker.feed(data)
+    end = 0
     while True:
         try:
             raw = unpacker.unpack()
         except msgpack.OutOfData:
-            if unpacker.tell() != len(data):
-                raise ValueError(f"it ends within an entry, at byte {unpacker.tell()} of {len(data)}") from None
+            if end != len(data):
+                raise ValueError(f"it ends at byte {len(data)}, within the entry from byte {end} on") from None
             return
         except (msgpack.UnpackException, ValueError, TypeError, RecursionError) as error:  # of type: a list as a key
             raise ValueError(f"no msgpack at byte {unpacker.tell()}: {error or type(error).__name__}") from None
-        yield from _entry(raw)
+        end = unpacker.tell()
+        yield raw
 
 
-def _entry(raw: Any) -> Iterator[Entry]:
+def entry_of(raw: Any) -> Entry | None:
+    """Return the entry that a value of `raw_entries` makes; None if it is of a kind that a later version has.
+
+    Raises
+    ------
+    ValueError
+        If it is none of ours.
+    """
+    match raw:
+        case ["exchange", int(tick), list(measurements), list(states)]:  # msgspec would copy each value in it
+            return Exchange(tick, measurements, states)
     try:
-        yield msgspec.convert(raw, AnyEntry)
+        entry: Entry = msgspec.convert(raw, AnyEntry)
     except msgspec.ValidationError as error:
-        if not str(error).startswith("Invalid value"):  # of a kind that a later version has
-            raise ValueError(f"an entry is none of ours: {error}") from None
+        if str(error).startswith("Invalid value"):
+            return None
+        raise ValueError(f"an entry is none of ours: {error}") from None
+    return entry
 
 
 def message_of(

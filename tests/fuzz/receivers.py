@@ -38,6 +38,7 @@ from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.record.journal_reader import entries_of, values_of
 from scenarios.results.record import Recorder, RecordError
 from scenarios.view.run_view import Cursor, RunView
+from tests.fuzz.journals import Journals
 from tests.hostile.scenes import (
     EPOCH,
     INSTANCES,
@@ -318,4 +319,5 @@ def receivers(home: Path) -> dict[str, Receiver]:
         "recorder, simulated time": Recording(stream=False),
         "view": View(),
         "readers": Readers(),
+        "checks": Journals(),
     } | ({"keys": Keyring(home)} if find_spec("cryptography") else {})

@@ -19,7 +19,8 @@ class MessageAccount:
 
     Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision
     has the neighbours' states of the tick before; in wall-clock time every number arrives, from the first one on that
-    does between two processes. A process that is silent for long, as it is frozen, begins anew: its links are given up.
+    does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`). A process that is silent for
+    long, as it is frozen, begins anew: its links are given up.
     """
 
     in_flight_s: Annotated[float, Unit("s"), Plausible("the time of a message on its way", 0.0, 60.0)] = 1.0

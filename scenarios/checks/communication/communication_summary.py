@@ -30,14 +30,18 @@ from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
 from wire.journal import Decision
 from wire.messages import PLANT
+from wire.timing.session_deadline import PATIENCE
 
 DELAY_TICKS, DELAY = 300, 5.0
 """How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100
 ticks at the latest; seconds of wall-clock time, where it comes every 0.2 s."""
 
-
 PAUSE = 1.5
 """Silence of a process (s of wall time) after which its links may be given up: Zenoh gives them 2 s."""
+
+LINKED_WITHIN = 2.0 * PATIENCE
+"""Time (s of wall time) within which two processes hear each other: a session that brings nothing is given up after
+`PATIENCE`, and the next one may take as long."""
 
 
 @dataclass
@@ -134,7 +138,7 @@ class SummaryPass:
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
         self._verdicts = VerdictAccounts(self._sent)
         self._arrivals, self._heals = (
-            ArrivalAccounts(PAUSE * max(1.0, info.plant.speed)),
+            ArrivalAccounts(PAUSE * max(1.0, info.plant.speed), LINKED_WITHIN * max(1.0, info.plant.speed)),
             Heals(info, t_end, self._sent),
         )
         self._counts: dict[Link, LinkCounts] = {}
@@ -157,8 +161,12 @@ class SummaryPass:
 
     def decision(self, agent: str, epoch: int, decision: Decision) -> None:
         """Take how an agent decided."""
-        if agent in self._names:
-            self._of(agent).decision(epoch, decision)
+        if agent not in self._names:
+            return
+        self._of(agent).decision(epoch, decision)
+        if not self._simulated:
+            for name in self._names.intersection(decision.neighbours):
+                self._arrivals.listens((name, agent))
 
     def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         """Take a state that arrived in wall-clock time."""

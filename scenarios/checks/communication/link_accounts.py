@@ -144,11 +144,16 @@ class ArrivalAccount:
     ends: tuple[Presence, Presence]
     """Sender and receiver."""
     began: bool = False
-    """Whether anything came."""
+    """Whether the link must be there: something came, or both ends have been there for long."""
     early: Missing = field(default_factory=Missing)
     """States that did not come, of which only the number is kept."""
     late: dict[tuple[int, int], float] = field(default_factory=dict)
     """Run time (s) of the last ones, by epoch and number."""
+
+    @property
+    def since(self) -> float:
+        """Run time (s) from which on both ends were there."""
+        return max(end.since for end in self.ends)
 
     @property
     def until(self) -> float:
@@ -157,16 +162,18 @@ class ArrivalAccount:
 
 
 class ArrivalAccounts:
-    """Wall-clock time: every state that was sent arrives, from the first one on that does.
+    """Wall-clock time: every state that was sent arrives, from the first one on that does, or that should have.
 
     Parameters
     ----------
     pause : float
         Silence of a process (s of run time) after which its links are given up, so that they have to be made anew.
+    linked_within : float
+        Time (s of run time) within which two processes that are both there have made their link.
     """
 
-    def __init__(self, pause: float) -> None:
-        self._pause = pause
+    def __init__(self, pause: float, linked_within: float) -> None:
+        self._pause, self._linked_within = pause, linked_within
         self._there: dict[str, list[Presence]] = defaultdict(list)
         """When each agent was there, in the order of time."""
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
@@ -186,11 +193,15 @@ class ArrivalAccounts:
         if not state.quiet:
             self._states[agent].append(state)
 
-    def heard(self, link: Link, epoch: int, number: int) -> None:
-        """Note that a state has arrived."""
+    def listens(self, link: Link) -> None:
+        """Note that the receiver of a link has its sender for a neighbour, whether anything comes or not."""
         if link not in self._arrived:
             self._arrived[link], self.accounts[link] = {}, []
             self._links_of[link[0]].append(link)
+
+    def heard(self, link: Link, epoch: int, number: int) -> None:
+        """Note that a state has arrived."""
+        self.listens(link)
         for account in self._open[link]:
             if account.late and account.late.pop((epoch, number), None) is not None:
                 return
@@ -216,9 +227,9 @@ class ArrivalAccounts:
                     if sender is None or receiver is None:
                         continue
                     account = self._account(link, (sender, receiver))
-                    if came:
+                    if came or state.t > account.since + self._linked_within:
                         account.began = True
-                    elif account.began:
+                    if account.began and not came:
                         _miss(account, key, state.t)
 
     def _at(self, agent: str, t: float, epoch: int | None = None) -> Presence | None:

@@ -12,7 +12,6 @@ from math import inf
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-import msgpack
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
@@ -20,11 +19,11 @@ from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.emulation.link_reports import data_of
 from scenarios.record.decision_entries import is_periodic
 from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage
-from scenarios.record.journal_reader import values_of
+from scenarios.record.journal_reader import entry_of, raw_entries, values_of
 from scenarios.record.record_file import RecordFile
-from wire.bounds import LIMIT
+from wire.bounds import MOST_COUNT
 from wire.codec import sound
-from wire.journal import Decision
+from wire.journal import Decision, Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
 from wire.journal_keys import kind_of, name_of
 from wire.messages import PLANT, Journal, LinkReport, State
 from wire.timing.clock import time_of
@@ -81,7 +80,7 @@ class PassEnd:
     """What is known of a record once it was gone through."""
 
     unreadable: int
-    """Number of messages, reports and parts of the file that could not be read."""
+    """Number of messages, entries, reports and parts of the file that could not be read, or cannot be true."""
     lost: Mapping[str, Sequence[Hole]]
     """Simulated time: run times (s) between which parts of a node's journal are lost."""
     known_until: Mapping[str, float]
@@ -121,21 +120,18 @@ class _Pass:
         self._file, self._sink = file, sink
         self._unreadable = 0
         self._simulated = file.info.clock == "simulated"
+        self._t_end = file.t_end
+        self._T_c, self._ahead = file.info.T_c, _AHEAD * max(1.0, file.info.plant.speed)
         self._coverage: dict[str, JournalCoverage] = {}
         fields = file.info.fields.get(State.__name__, ())
+        self._length = len(fields)
         self._places = {name: fields.index(name) for name in _VALUES if name in fields}
 
     def read(self) -> PassEnd:
         for record in self._file.messages(("journal", "link_reports")):
             message = sound(record.data)
             if isinstance(message, Journal):
-                ticks: list[int] = []
-                for entry in _raw_entries(message.data):
-                    self._take(message, entry)
-                    if entry[0] in ("decision", "exchange"):
-                        ticks.append(entry[1])
-                if self._simulated:  # in wall-clock time each entry tells all by itself
-                    self._cover(message, ticks)
+                self._journal(message)
             elif isinstance(message, LinkReport):
                 self._report(message)
             else:
@@ -147,35 +143,71 @@ class _Pass:
             known_until={name: each.known_until for name, each in self._coverage.items()},
         )
 
+    def _journal(self, journal: Journal) -> None:
+        """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
+        before, ticks = self._unreadable, list[int]()
+        for entry in self._entries(journal):
+            if isinstance(entry, Decision | Exchange):
+                if not self._is_timely(journal, time_of(entry.tick, self._T_c) if self._simulated else journal.t):
+                    self._unreadable += 1
+                    continue
+                ticks.append(entry.tick)
+            self._take(journal, entry)
+        if self._simulated and self._unreadable == before:  # in wall-clock time each entry tells all by itself
+            self._cover(journal, ticks)
+
+    def _entries(self, journal: Journal) -> Iterator[Entry]:
+        """Yield the entries that are ours; count each other one, and the end of what can be read."""
+        values = raw_entries(journal.data)
+        while True:
+            try:
+                raw = next(values, _END)
+                entry = None if raw is _END else entry_of(raw)
+            except ValueError:  # if the bytes end here, `values` does too
+                self._unreadable += 1
+                continue
+            if raw is _END:
+                return
+            if entry is not None:
+                yield entry
+
+    def _is_timely(self, journal: Journal, t: float) -> bool:
+        """Return whether an entry of a journal may be about a run time (s): nobody tells of what is yet to come.
+
+        The plant's run time may stand still for a while, as it is frozen, so its journal counts as of the run's end.
+        """
+        return 0.0 <= t <= (self._t_end if journal.sender == PLANT else journal.t) + self._ahead
+
     def _cover(self, journal: Journal, ticks: list[int]) -> None:
         """Note which part of a journal is there, and the ticks of which it tells."""
         name, info = journal.sender, self._file.info
         if name not in self._coverage:
             self._coverage[name] = JournalCoverage(periodic=is_periodic(info, name))
-        T_c = info.T_c
+        T_c = self._T_c
         times = (time_of(ticks[0], T_c), time_of(ticks[-1], T_c) if name == PLANT else journal.t) if ticks else None
         self._coverage[name].take(journal, lambda: times)
         if (t := self._coverage[name].known_until) < inf:
             self._sink.known_until(name, t)
 
-    def _take(self, journal: Journal, entry: Any) -> None:
-        kind = entry[0]
-        if kind == "exchange":
-            for raw in entry[3]:
-                self._state(raw)
-        elif (
-            kind in ("sent", "received") and kind_of(entry[2]) in _STATE_KEYS and not (kind == "received" and entry[4])
-        ):
-            self._state(entry[3])
-        elif kind == "heard" and kind_of(entry[2]) == "state":
-            self._sink.heard((name_of(entry[2]), journal.sender), entry[3], entry[4], entry[5])
-        elif kind == "decision" and journal.sender != PLANT:
-            self._sink.decision(journal.sender, journal.epoch, msgspec.convert(entry, Decision))
+    def _take(self, journal: Journal, entry: Entry) -> None:
+        match entry:
+            case Exchange(states=states):
+                for raw in states:
+                    self._state(journal, raw)
+            case SentMessage(key=key, payload=payload) | ReceivedMessage(key=key, payload=payload, rejected=""):
+                if kind_of(key) in _STATE_KEYS:
+                    self._state(journal, payload)
+            case MessageReference(key=key, epoch=epoch, seq=number, rejected=rejected):
+                if kind_of(key) == "state":
+                    self._sink.heard((name_of(key), journal.sender), epoch, number, rejected)
+            case Decision() if journal.sender != PLANT:
+                self._sink.decision(journal.sender, journal.epoch, entry)
 
-    def _state(self, raw: Any) -> None:
+    def _state(self, journal: Journal, raw: Any) -> None:
+        values: Mapping[str, Any] = {}
         if isinstance(raw, bytes):
             values = values_of(raw)
-        else:
+        elif isinstance(raw, list) and len(raw) == self._length:
             values = {name: raw[place] for name, place in self._places.items()}
         try:
             state = SentState(
@@ -183,10 +215,14 @@ class _Pass:
                 bool(values.get("idle")), bool(values.get("quiet")),
             )  # fmt: skip
             sender = str(values["sender"])
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             self._unreadable += 1
             return
-        self._sink.state(sender, state)
+        numbers = 0 <= state.number <= MOST_COUNT and 0 <= state.epoch <= MOST_COUNT
+        if numbers and self._is_timely(journal, state.t):
+            self._sink.state(sender, state)
+        else:
+            self._unreadable += 1
 
     def _report(self, report: LinkReport) -> None:
         try:
@@ -206,12 +242,8 @@ _VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
 
+_END = object()
+"""Behind the last entry of a part."""
 
-def _raw_entries(data: bytes) -> Iterator[list[Any]]:
-    """Yield the entries of a part of a journal as lists, up to where they cannot be read."""
-    unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
-    unpacker.feed(data)
-    try:
-        yield from unpacker
-    except (msgpack.UnpackException, ValueError, RecursionError):
-        return
+_AHEAD = 5.0
+"""How far (s of wall time) an entry may be ahead of its journal: far more than clocks of two processes differ by."""

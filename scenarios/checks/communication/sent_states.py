@@ -45,10 +45,10 @@ class SentStates:
         """Note a state; return whether it is new."""
         epoch = 0 if self._simulated else state.epoch
         if epoch not in self._windows:
+            if epoch in self.epochs:
+                return False  # it is not kept any more
             if len(self._windows) == _WINDOWS:
-                if epoch < min(self._windows):
-                    return False
-                del self._windows[min(self._windows)]
+                del self._windows[next(iter(self._windows))]  # epochs have no order: the one that came first goes
             self._windows[epoch] = StateWindow()
         if not self._windows[epoch].put(state):
             return False
@@ -59,7 +59,3 @@ class SentStates:
             if not state.quiet:
                 self.spoke_at = max(self.spoke_at, state.t)
         return True
-
-    def epoch_at(self, t: float) -> int | None:
-        """Return the process that was there at a run time (s)."""
-        return next((epoch for epoch, (a, b) in reversed(self.epochs.items()) if a <= t <= b), None)

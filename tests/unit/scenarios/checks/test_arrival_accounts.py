@@ -9,6 +9,9 @@ from scenarios.checks.communication.record_pass import SentState
 
 LINK = ("inv1", "inv2")
 
+LINKED_WITHIN = 7.0
+"""Time (s) after which two processes that are there must hear each other."""
+
 IN_FLIGHT = 1.0
 """Time (s) before the end of either side that is left out, as the check does."""
 
@@ -21,11 +24,12 @@ def missing(
     `sender` and `receiver` give the epoch of the process at a tick, None where there is none or it is frozen; `lost`
     are the ticks whose state does not arrive.
     """
-    accounts = ArrivalAccounts(1.5)
+    accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
     for k in range(100):
         t = round(0.1 * k, 9)
         for agent, process in (("inv1", sender), ("inv2", receiver)):
             if (epoch := process(k)) is not None:
+                accounts.listens(LINK)
                 accounts.state(agent, SentState(k, t, epoch, idle=False, quiet=False))
         if (epoch := sender(k)) is not None and k not in lost:
             accounts.heard(LINK, epoch, k)
@@ -84,3 +88,17 @@ def test_a_short_pause_loses_nothing() -> None:
         return None if 30 <= k < 40 else 1
 
     assert missing(paused, always, [29]) == [2.9]
+
+
+def test_a_link_over_which_nothing_ever_arrives_is_missed() -> None:
+    """From 7 s after both ends are there: by then they must hear each other."""
+    assert missing(always, always, range(100)) == [round(0.1 * k, 9) for k in range(71, 90)]
+
+
+def test_a_new_process_that_never_hears_its_neighbour_is_missed() -> None:
+    """The receiver is another process from 1 s on, to which nothing comes: from 8 s on, that is missing."""
+
+    def restarted(k: int) -> int:
+        return 1 if k < 10 else 2
+
+    assert missing(always, restarted, range(10, 100)) == [round(0.1 * k, 9) for k in range(81, 90)]

@@ -13,7 +13,7 @@ import gridpeers as gp
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication import record_content
-from scenarios.checks.communication.communication_summary import SummaryPass
+from scenarios.checks.communication.communication_summary import LINKED_WITHIN, SummaryPass
 from scenarios.checks.communication.link_accounts import MOST, ArrivalAccounts
 from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.communication.record_pass import SentState
@@ -339,6 +339,17 @@ def test_numbers_of_a_later_process_are_not_those_of_an_earlier_one() -> None:
     assert not sent.put(SentState(50, 1.0, 1, idle=False, quiet=False)), "it came already"
 
 
+def test_epochs_have_no_order() -> None:
+    """A fourth process whose epoch is below those before is kept, the first one is not, and what comes late of it."""
+    sent = SentStates(simulated=False)
+    for place, epoch in enumerate((7, 9, 8, 3)):
+        assert sent.put(SentState(0, 10.0 * place, epoch, idle=False, quiet=False))
+
+    assert [sent.window_of(epoch) is not None for epoch in (7, 9, 8, 3)] == [False, True, True, True]
+    assert not sent.put(SentState(1, 0.02, 7, idle=False, quiet=False))
+    assert sent.window_at(31.0) is sent.window_of(3)
+
+
 def test_a_state_is_kept_in_force_as_long_as_nothing_else_is_sent() -> None:
     """By quiet states that follow it without a gap, however many they are; an idle or a lost one ends that."""
     window = StateWindow()
@@ -357,7 +368,7 @@ def test_a_state_is_kept_in_force_as_long_as_nothing_else_is_sent() -> None:
 
 def test_what_never_arrives_is_counted_where_it_is_too_much_to_keep() -> None:
     """The first and the number of them stay; the last ones stay one by one, as they may still arrive."""
-    accounts = ArrivalAccounts(1.5)
+    accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
     accounts.heard(("inv1", "inv2"), 1, 0)
     for number in range(MOST + 1000):
         for name in NAMES:

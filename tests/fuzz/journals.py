@@ -1,0 +1,86 @@
+"""Journals of one agent that nobody should write, for the checks of communication."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterable, Iterator
+from typing import Any, cast
+
+import msgspec
+from msgspec.structs import replace
+
+from scenarios.checks.communication.communication_summary import SummaryPass
+from scenarios.checks.communication.record_pass import read_into
+from scenarios.record.record_file import RecordFile, RecordMessage
+from scenarios.record.record_info import RecordInfo
+from tests.fuzz.mutation import NUMBERS, TEXTS
+from tests.toy.toy_configs import toy_configs
+from wire.codec import CRC, encode
+from wire.messages import PLANT, Journal, State
+
+T_END = 1.0
+"""End of the run (s)."""
+
+
+def info(*, clock: str) -> RecordInfo:
+    """What was recorded: a toy run."""
+    plant, agents = toy_configs(3, end=T_END)
+    names = tuple(agent.name for agent in agents)
+    return RecordInfo(
+        level="all", scenario="toy", case="case", toml="", seed=1, driver="inprocess", versions={},
+        inverters=names, plant=replace(plant, clock=clock), agents=agents,
+    )  # fmt: skip
+
+
+class JournalFile:
+    """A record with these parts of journals and nothing else; a `RecordFile` for a pass."""
+
+    def __init__(self, parts: Iterable[tuple[str, bytes]], *, clock: str) -> None:
+        self.info, self.t_end = info(clock=clock), T_END
+        self.damage, self.holes = (), list[tuple[float, float]]()
+        self._parts = parts
+
+    def messages(self, topics: object) -> Iterator[RecordMessage]:
+        """Yield the parts of journals."""
+        for number, (sender, data) in enumerate(self._parts):
+            journal = Journal(sender=sender, epoch=1, seq=number, t=T_END, data=data)
+            yield RecordMessage("journal", int(T_END * 1e9), number, bytes(encode(journal)))
+
+
+def judged(parts: Iterable[tuple[str, bytes]], *, clock: str) -> tuple[SummaryPass, int]:
+    """Return what a pass over these parts of journals finds, and how much of them it cannot read."""
+    file = JournalFile(parts, clock=clock)
+    sums = SummaryPass(file.info, file.t_end)
+    return sums, read_into(cast(RecordFile, file), sums).unreadable
+
+
+def entries(payload: bytes) -> list[list[Any]]:
+    """Sound entries about a message, of each kind that checks look at."""
+    state = bytes(encode(State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=0.0, V_set=1.0, Q=0.0)))
+    return [
+        ["exchange", 3, [], [payload, state]],
+        ["sent", 1.0, "state/inv1", state],
+        ["received", 1.0, "state/inv1", payload, ""],
+        ["heard", 1.0, "state/inv1", 1, 3, ""],
+        ["decision", 3, 1, ["inv1", "inv3"], [2, None], ["", "silent"], [1.0, 0.0], [0, 0], 1.0, [0.02, None], [0.0]],
+    ]
+
+
+class Journals:
+    """The pass of the checks over a record in which one journal is made up."""
+
+    def take(self, payload: bytes, rng: random.Random) -> str:
+        """Take the bytes as a journal, or as a message or value of sound entries."""
+        made = entries(payload)
+        for _ in range(rng.randrange(3)):
+            entry = rng.choice(made)
+            if rng.random() < 0.2:
+                del entry[rng.randrange(len(entry)) :]
+            elif entry:
+                entry[rng.randrange(len(entry))] = rng.choice((*NUMBERS, *TEXTS, payload, [], {}, None, [[payload]]))
+        data = b"".join(map(msgspec.msgpack.encode, made))
+        data = rng.choice((data, data[: rng.randrange(len(data))], payload[:-CRC] + data, data + payload[:-CRC]))
+        parts = [(rng.choice(("inv1", PLANT)), data[:200_000])]
+        sums, unreadable = judged(parts, clock=rng.choice(("simulated", "wall")))
+        sums.finish(unreadable)
+        return "garbled" if unreadable else ""
