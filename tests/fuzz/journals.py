@@ -75,7 +75,7 @@ class Journals:
         for _ in range(rng.randrange(3)):
             entry = rng.choice(made)
             if rng.random() < 0.2:
-                del entry[rng.randrange(len(entry)) :]
+                del entry[rng.randrange(len(entry) + 1) :]
             elif entry:
                 entry[rng.randrange(len(entry))] = rng.choice((*NUMBERS, *TEXTS, payload, [], {}, None, [[payload]]))
         data = b"".join(map(msgspec.msgpack.encode, made))
