@@ -34,19 +34,7 @@ class Timed(NamedTuple):
 
 
 class SoakRun(WatchedRun):
-    """A live run that is disturbed. Use it as a context: no process is left.
-
-    Parameters
-    ----------
-    folder : Path
-        For the record and the logs.
-    microgrids : Mapping[str, str]
-        The microgrid of each agent of the run.
-    spare : str
-        The agent that is not there at first.
-    recorded : bool, optional
-        Whether the run has a record, and with it a report and verdicts.
-    """
+    """A live run that is disturbed; its parameters are those of `WatchedRun`."""
 
     def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
         super().__init__(folder, microgrids, spare, recorded=recorded)
