@@ -10,6 +10,7 @@ from pathlib import Path
 
 import msgspec
 
+from agents.agent_config import MAX_AGE
 from netem.schema.change import Change, replayed
 from netem.schema.netem import Netem
 from plant.equipment import Feeder
@@ -23,6 +24,11 @@ from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line
 from wire.messages import LinkRequest
+
+LINKS_ALONE = (
+    "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
+)
+"""For the head of the file."""
 
 
 class LinkLog:
@@ -66,6 +72,7 @@ class LinkLog:
         text = to_toml(
             replay_of(self._scenario, self._feeder, self.changes, t),
             {"driver": LIVE, "python": platform.python_version()},
+            [LINKS_ALONE],
         )
         for file in files:
             if file is not None:
@@ -74,6 +81,8 @@ class LinkLog:
 
 def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> ScenarioModel:
     """Return the scenario whose links change by schedule as they did by command; it leaves out agents that it lacks.
+
+    An age that the live run had by default is written out, as there is no such default in simulated time.
 
     Parameters
     ----------
@@ -88,6 +97,8 @@ def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change]
     """
     ((name, case),) = scenario.cases.items()
     microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
+    ages = case.degraded_communication
+    ages = msgspec.structs.replace(ages, max_age=ages.max_age or MAX_AGE)
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
     end = max(scenario.time.end_s, round(math.ceil(needed / T_c - 1e-6) * T_c, 9))
@@ -97,7 +108,7 @@ def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change]
         paper="",
         time=msgspec.structs.replace(scenario.time, end_s=end),
         netem=replayed(netem_of(scenario, name), changes, microgrids),
-        cases={name: msgspec.structs.replace(case, netem=Netem())},
+        cases={name: msgspec.structs.replace(case, netem=Netem(), degraded_communication=ages)},
     )
 
 

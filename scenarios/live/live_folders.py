@@ -46,6 +46,10 @@ class Folders:
             set_broken(self.whole, why)
 
 
+AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
+"""For the head of its scenario."""
+
+
 @contextmanager
 def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     """Make the folders of a run, as `--out` says.
@@ -61,7 +65,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
     try:
-        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions()))
+        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), [AS_BEGUN]))
         (whole / "log").mkdir()
     except OSError as error:
         why = refusal(whole, error)

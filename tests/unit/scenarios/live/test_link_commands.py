@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from agents.agent_config import MAX_AGE
 from agents.realtime.link_command_receiver import LinkCommandReceiver
 from agents.realtime.realtime_agent import RealtimeAgent
 from netem.schema import change
@@ -315,6 +316,7 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path
     netem = netem_of(again, "IV")
 
     assert (again.name, again.time.end_s) == ("again", 7.36)
+    assert again.cases["IV"].degraded_communication.max_age == MAX_AGE, "which only wall-clock time has by default"
     for link in links_among([name for name in setup.microgrids if name != "inv10"]):
         live = schedule_of(link, setup.netem, changes, setup.microgrids)
         planned = schedule_of(Link(*link), netem, (), setup.microgrids)
