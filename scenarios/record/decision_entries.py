@@ -31,7 +31,7 @@ class DecisionEntries:
 
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
-        self._simulated = self._info.clock == "simulated"
+        self._simulated = self._info.simulated
         self._parts = 0
         """Parts that were gone through."""
         self._places: dict[str, tuple[list[int], list[int]]] = {}

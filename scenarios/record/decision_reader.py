@@ -48,7 +48,7 @@ class DecisionReader:
         config = self._info.agent(agent)
         if config is None:
             return iter(())
-        return (self._in_ticks if self._info.clock == "simulated" else self._in_real_time)(config, since, until)
+        return (self._in_ticks if self._info.simulated else self._in_real_time)(config, since, until)
 
     # ---------------------------------------------------------------- simulated time
 

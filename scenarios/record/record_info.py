@@ -69,6 +69,16 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
         return self.plant.clock
 
     @property
+    def simulated(self) -> bool:
+        """Whether the run kept simulated time."""
+        return self.clock == "simulated"
+
+    @property
+    def agent_names(self) -> tuple[str, ...]:
+        """Names of all configured agents."""
+        return tuple(config.name for config in self.agents)
+
+    @property
     def T_c(self) -> float:
         """Control period (s)."""
         return self.plant.T_c

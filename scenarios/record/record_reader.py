@@ -117,7 +117,7 @@ class RunRecord:
     @property
     def agents(self) -> tuple[str, ...]:
         """Names of all agents that were configured, also of those that join later."""
-        return tuple(config.name for config in self.info.agents)
+        return self.info.agent_names
 
     @property
     def outcome(self) -> str | None:

@@ -128,7 +128,7 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
         cuts = (Fault(on=pattern, cut=True, from_s=changes.since) for pattern in changes.without)
         netem = msgspec.structs.replace(netem, links=(*netem.links, *cuts))
     control, as_it_was = (configs(scenario, feeder, case)[1][0].control for scenario in (after, before))
-    if control != as_it_was and changes.since > 0.0 and record.info.clock == "simulated":
+    if control != as_it_was and changes.since > 0.0 and record.info.simulated:
         raise ReplayError(
             "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
             "out, or take a record of a run in wall-clock time; links can change at any time"

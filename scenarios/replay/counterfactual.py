@@ -89,7 +89,7 @@ def _both(
     """Run the record under the rule; write what was and what would have been."""
     changes = rule.changes
     rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
-    run = _in_simulated_time if record.info.clock == "simulated" else _in_real_time
+    run = _in_simulated_time if record.info.simulated else _in_real_time
     with Recorder(would_be / rule.case, gaps=True) as recorder:
 
         def take(message: Telemetry | LinkReport) -> None:

@@ -101,11 +101,7 @@ def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Rep
         make_plant = None
         note = "the physics was not replayed: it was not that of our plant alone"
         notes.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
-    parts = (
-        _in_simulated_time(record, make_plant)
-        if record.info.clock == "simulated"
-        else _in_real_time(record, make_plant)
-    )
+    parts = _in_simulated_time(record, make_plant) if record.info.simulated else _in_real_time(record, make_plant)
     found = [*notes, *parts]
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
     return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))

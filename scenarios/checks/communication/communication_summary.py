@@ -86,12 +86,12 @@ class CommunicationSummary:
     @property
     def simulated(self) -> bool:
         """Whether the run kept simulated time."""
-        return self.info.clock == "simulated"
+        return self.info.simulated
 
     @property
     def agents(self) -> tuple[str, ...]:
         """All configured agents."""
-        return tuple(config.name for config in self.info.agents)
+        return self.info.agent_names
 
 
 def summarise(path: Path) -> CommunicationSummary:
@@ -130,9 +130,9 @@ class SummaryPass:
         self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
     ) -> None:
         self._info, self._t_end, self._lost = info, t_end, lost
-        self._simulated = simulated = info.clock == "simulated"
+        self._simulated = simulated = info.simulated
         self._delay = DELAY_TICKS * info.T_c if simulated else DELAY * max(1.0, info.plant.speed)
-        self._names = frozenset(config.name for config in info.agents)
+        self._names = frozenset(info.agent_names)
         self._sent: defaultdict[str, SentStates] = defaultdict(lambda: SentStates(simulated=simulated))
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))

@@ -138,7 +138,7 @@ def _ends(spans: Iterable[Span]) -> Iterator[float]:
 
 def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
     """Yield the ends of the cuts that the scenario plans."""
-    names = [config.name for config in info.agents]
+    names = info.agent_names
     for tree in (config.links for config in info.agents if config.links):
         try:
             setup = EmulationConfig.of_tree(tree)

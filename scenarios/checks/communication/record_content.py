@@ -51,12 +51,12 @@ class RecordContent:
     @property
     def simulated(self) -> bool:
         """Whether the run kept simulated time."""
-        return self.info.clock == "simulated"
+        return self.info.simulated
 
     @property
     def agents(self) -> tuple[str, ...]:
         """All configured agents."""
-        return tuple(config.name for config in self.info.agents)
+        return self.info.agent_names
 
     def of_agent(self, agent: str) -> list[SentState]:
         """Return the states of an agent in the order of time."""
@@ -83,7 +83,7 @@ def read_content(path: Path) -> RecordContent:
             f"its record has {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are taken into memory"
         )
     end = read_into(file, all_of_it)
-    simulated = file.info.clock == "simulated"
+    simulated = file.info.simulated
     return RecordContent(
         info=file.info,
         t_end=file.t_end,

@@ -119,7 +119,7 @@ class _Pass:
     def __init__(self, file: RecordFile, sink: RecordSink) -> None:
         self._file, self._sink = file, sink
         self._unreadable = 0
-        self._simulated = file.info.clock == "simulated"
+        self._simulated = file.info.simulated
         self._t_end = file.t_end
         self._T_c, self._ahead = file.info.T_c, _AHEAD * max(1.0, file.info.plant.speed)
         self._coverage: dict[str, JournalCoverage] = {}

@@ -56,7 +56,7 @@ class AgentMoments:
         """Return the agents that were there at a run time (s), by name."""
         if self._info.level == "physics":
             return {}
-        found = (self._in_ticks if self._info.clock == "simulated" else self._live)(t)
+        found = (self._in_ticks if self._info.simulated else self._live)(t)
         return self._perhaps_there(t) | {moment.name: moment for moment in found}
 
     def sent(self, since: float, until: float) -> Counter[str]:
@@ -119,15 +119,15 @@ class AgentMoments:
 
     def _perhaps_there(self, t: float) -> dict[str, AgentMoment]:
         """Return the agents that may have been there, for all that a damaged file says."""
-        simulated = self._info.clock == "simulated"  # the plant has all states
+        simulated = self._info.simulated  # the plant has all states
         since = t - (self._info.T_c if simulated else self._gone)
 
         def is_lost(node: str) -> bool:
             return any(begin < t and end >= since for begin, end in self._entries.holes(node))
 
-        names = [config.name for config in self._info.agents]
+        names = self._info.agent_names
         if not (simulated and is_lost(PLANT)):
-            names = [] if simulated else [name for name in names if is_lost(name)]
+            names = () if simulated else tuple(name for name in names if is_lost(name))
         return {name: _unknown(name, t, "", damaged=True) for name in names}
 
     def _read_sent(self, part: int) -> dict[str, list[float]]:
