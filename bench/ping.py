@@ -11,6 +11,7 @@ import tempfile
 from pathlib import Path
 from struct import pack, unpack_from
 from time import monotonic
+from typing import Any
 
 import msgspec
 
@@ -47,6 +48,16 @@ class Role(msgspec.Struct, frozen=True):
     """Endpoints."""
     credentials: Credentials | None = None
     """Certificate of the process; None: links are open."""
+    rules: bool = True
+    """Whether access rules come with the certificate."""
+
+
+class TlsAlone(Credentials, frozen=True):
+    """A certificate without access rules: what of their cost is TLS's."""
+
+    def zenoh_settings(self, *, star: bool) -> tuple[dict[str, Any], dict[str, Any]]:
+        """Return Zenoh's settings ``transport/link``, and no ``access_control``."""
+        return super().zenoh_settings(star=star)[0], {}
 
 
 def sent_at(payload: bytes) -> float:
@@ -64,6 +75,7 @@ def one_way(
     connect: tuple[str, ...],
     receiver_credentials: Credentials | None = None,
     sender_credentials: Credentials | None = None,
+    rules: bool = True,
 ) -> list[float]:
     """Return the times (s) that so many messages of so many bytes took at the rate of ticks.
 
@@ -79,10 +91,12 @@ def one_way(
         What both connect to, beside what the other listens on: the plant of a run, or nothing.
     receiver_credentials, sender_credentials : Credentials or None, optional
         Their certificates; None: links are open.
+    rules : bool, optional
+        Whether access rules come with the certificates.
     """
     first = tuple(endpoint for endpoint in receiver if not endpoint.endswith(":0"))
-    receive = Role("receive", key, size, count, receiver, connect, receiver_credentials)
-    return _pair(receive, Role("send", key, size, count, sender, first + connect, sender_credentials))
+    receive = Role("receive", key, size, count, receiver, connect, receiver_credentials, rules)
+    return _pair(receive, Role("send", key, size, count, sender, first + connect, sender_credentials, rules))
 
 
 def round_trip(size: int, count: int, *, key: str, endpoint: str) -> list[float]:
@@ -152,9 +166,10 @@ WARM_UP = 25
 
 def run(config: Role) -> None:
     """Be one of the two processes."""
-    session = Session(
-        config.role, listen=config.listen, connect=config.connect, clock="wall", credentials=config.credentials
-    )
+    credentials = config.credentials
+    if credentials is not None and not config.rules:
+        credentials = TlsAlone(**msgspec.structs.asdict(credentials))
+    session = Session(config.role, listen=config.listen, connect=config.connect, clock="wall", credentials=credentials)
     match config.role:
         case "send":
             send(session, config.key, config.size)

@@ -2,7 +2,8 @@
 
 Both are measured beside open links, round by round, so that a ratio holds whatever else the machine does. Lock-step:
 the paper's islanding, case IV, a process for each of nine agents; the time from the first row to the last. One way:
-two agents, one message of the size of a State every 20 ms, median and 99th percentile of each round.
+two agents, one message of the size of a State every 20 ms, median and 99th percentile of each round; with TLS alone
+too, to tell what of the difference the rules make.
 
     .venv/bin/python -m bench.security [--rounds 5] [--end 4.0] [--messages 250]
 """
@@ -10,7 +11,7 @@ two agents, one message of the size of a State every 20 ms, median and 99th perc
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable
 from pathlib import Path
 from statistics import median, quantiles
 
@@ -47,8 +48,8 @@ def lock_step(folder: Path, end: float, keys: Path | None) -> float:
     return outcome.run_s
 
 
-def latencies(count: int, keys: Path | None) -> list[float]:
-    """Return the one-way times (s) of so many messages from inv1 to inv2."""
+def latencies(count: int, keys: Path | None, *, rules: bool = True) -> list[float]:
+    """Return the one-way times (s) of so many messages from inv1 to inv2, over TLS if there are keys."""
     protocol = "tcp" if keys is None else "tls"
     shown: dict[str, Credentials | None] = dict.fromkeys(("inv1", "inv2"))
     if keys is not None:
@@ -62,16 +63,21 @@ def latencies(count: int, keys: Path | None) -> list[float]:
         connect=(),
         receiver_credentials=shown["inv2"],
         sender_credentials=shown["inv1"],
+        rules=rules,
     )
 
 
 def compare_latencies(rounds: int, count: int, keys: Path) -> None:
     """Measure one way beside each other, and print medians over the rounds and their ratios."""
-    times: dict[str, list[list[float]]] = {"open links": [], "mutual TLS": []}
+    arms: dict[str, Callable[[], list[float]]] = {
+        "open links": lambda: latencies(count, None),
+        "TLS, no access rules": lambda: latencies(count, keys, rules=False),
+        "mutual TLS": lambda: latencies(count, keys),
+    }
+    times: dict[str, list[list[float]]] = {name: [] for name in arms}
     for i in range(rounds):
-        order: Sequence[str] = list(times) if i % 2 == 0 else list(reversed(times))
-        for name in order:
-            times[name].append(latencies(count, keys if name == "mutual TLS" else None))
+        for name in list(arms)[:: 1 if i % 2 == 0 else -1]:
+            times[name].append(arms[name]())
         say(f"one way, round {i + 1} of {rounds}")
     print(f"{'one way (ms)':48}{'p50':>11}{'p99':>11}")
     cells = {
@@ -79,9 +85,11 @@ def compare_latencies(rounds: int, count: int, keys: Path) -> None:
     }
     for name, pairs in cells.items():
         print(f"{name:48}{1e3 * median(p for p, _ in pairs):11.3f}{1e3 * median(p for _, p in pairs):11.3f}")
-    for k, name in enumerate(("p50", "p99")):
-        each = [with_tls[k] / bare[k] for bare, with_tls in zip(*cells.values(), strict=True)]
-        print(f"ratio of {name}: {median(each):.3f} ({min(each):.3f} to {max(each):.3f})")
+    bare, *others = cells
+    for other in others:
+        for k, percentile in enumerate(("p50", "p99")):
+            each = [its[k] / open_[k] for open_, its in zip(cells[bare], cells[other], strict=True)]
+            print(f"{other}: ratio of {percentile} {median(each):.3f} ({min(each):.3f} to {max(each):.3f})")
 
 
 def main() -> None:
