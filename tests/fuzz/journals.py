@@ -1,4 +1,4 @@
-"""Journals of one agent that nobody should write, for the checks of communication."""
+"""Journals and link reports of one agent that nobody should write, for the checks of communication."""
 
 from __future__ import annotations
 
@@ -9,14 +9,17 @@ from typing import Any, cast
 import msgspec
 from msgspec.structs import replace
 
+from netem.ledger import LinkTrace
 from scenarios.checks.communication.communication_summary import SummaryPass
 from scenarios.checks.communication.record_pass import read_into
+from scenarios.emulation.link_reports import report_data
 from scenarios.record.record_file import RecordFile, RecordMessage
 from scenarios.record.record_info import RecordInfo
 from tests.fuzz.mutation import NUMBERS, TEXTS
 from tests.toy.toy_configs import toy_configs
+from wire.bounds import LATEST, MOST_COUNT
 from wire.codec import CRC, encode
-from wire.messages import PLANT, Journal, State
+from wire.messages import PLANT, Journal, LinkReport, State
 
 T_END = 1.0
 """End of the run (s)."""
@@ -33,23 +36,33 @@ def info(*, clock: str) -> RecordInfo:
 
 
 class JournalFile:
-    """A record with these parts of journals and nothing else; a `RecordFile` for a pass."""
+    """A record with these parts of journals and link reports and nothing else; a `RecordFile` for a pass."""
 
-    def __init__(self, parts: Iterable[tuple[str, bytes]], *, clock: str) -> None:
+    def __init__(self, parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport], *, clock: str) -> None:
         self.info, self.t_end = info(clock=clock), T_END
         self.damage, self.holes = (), list[tuple[float, float]]()
-        self._parts = parts
+        self._parts, self._reports = parts, reports
 
     def messages(self, topics: object) -> Iterator[RecordMessage]:
-        """Yield the parts of journals."""
+        """Yield the parts of journals, then the reports."""
         for number, (sender, data) in enumerate(self._parts):
             journal = Journal(sender=sender, epoch=1, seq=number, t=T_END, data=data)
             yield RecordMessage("journal", int(T_END * 1e9), number, bytes(encode(journal)))
+        for number, report in enumerate(self._reports):
+            yield RecordMessage("link_reports", int(T_END * 1e9), number, bytes(encode(report)))
 
 
-def judged(parts: Iterable[tuple[str, bytes]], *, clock: str) -> tuple[SummaryPass, int]:
-    """Return what a pass over these parts of journals finds, and how much of them it cannot read."""
-    file = JournalFile(parts, clock=clock)
+def link_report(receiver: str, *traces: LinkTrace) -> LinkReport:
+    """Return a report of the links into one receiver."""
+    (data,) = report_data(traces, {}, "")
+    return LinkReport(sender=receiver, epoch=1, seq=0, t=T_END, data=data)
+
+
+def judged(
+    parts: Iterable[tuple[str, bytes]], reports: Iterable[LinkReport] = (), *, clock: str
+) -> tuple[SummaryPass, int]:
+    """Return what a pass over these parts of journals and reports finds, and how much of them it cannot read."""
+    file = JournalFile(parts, reports, clock=clock)
     sums = SummaryPass(file.info, file.t_end)
     return sums, read_into(cast(RecordFile, file), sums).unreadable
 
@@ -67,7 +80,7 @@ def entries(payload: bytes) -> list[list[Any]]:
 
 
 class Journals:
-    """The pass of the checks over a record in which one journal is made up."""
+    """The pass of the checks over a record in which one journal, and reports of links, are made up."""
 
     def take(self, payload: bytes, rng: random.Random) -> str:
         """Take the bytes as a journal, or as a message or value of sound entries."""
@@ -81,6 +94,21 @@ class Journals:
         data = b"".join(map(msgspec.msgpack.encode, made))
         data = rng.choice((data, data[: rng.randrange(len(data))], payload[:-CRC] + data, data + payload[:-CRC]))
         parts = [(rng.choice(("inv1", PLANT)), data[:200_000])]
-        sums, unreadable = judged(parts, clock=rng.choice(("simulated", "wall")))
+        reports = [link_report("inv1", _verdicts(rng)) for _ in range(rng.randrange(3))]
+        sums, unreadable = judged(parts, reports, clock=rng.choice(("simulated", "wall")))
         sums.finish(unreadable)
         return "garbled" if unreadable else ""
+
+
+def _verdicts(rng: random.Random) -> LinkTrace:
+    """Return verdicts on messages of any numbers and times that a report can have."""
+    numbers = [int(value) for value in NUMBERS if 0 <= value <= MOST_COUNT]
+    times = [float(value) for value in NUMBERS if 0 <= value <= LATEST]
+    count = rng.randrange(5)
+    return LinkTrace(
+        rng.choice(("inv2", "inv9", PLANT)),
+        "inv1",
+        tuple(rng.choices(numbers, k=count)),
+        tuple(rng.choices(times, k=count)),
+        tuple(rng.choices(("cut", "loss", 0.0, 1e300, ((0.1, None), (0.2, 7))), k=count)),
+    )

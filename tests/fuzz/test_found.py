@@ -8,11 +8,13 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from netem.ledger import LinkTrace
 from scenarios.emulation.link_reports import data_of, decode_statuses
 from scenarios.live.feeder_map import read_feeder_map
 from scenarios.record.journal_reader import entries_of, values_of
+from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
-from wire.bounds import LIMIT
+from wire.bounds import LIMIT, MOST_COUNT
 from wire.messages import LinkReport
 
 NO_UTF8 = b"\x81\xa4typ\xe5\x01"
@@ -48,6 +50,14 @@ def test_the_state_of_a_link_cannot_write_on_a_terminal(statuses: dict[str, obje
     """`gridpeers link show` prints what a receiver says of its links, and of whose they are."""
     with pytest.raises(msgspec.DecodeError):
         decode_statuses(msgspec.msgpack.encode(statuses))
+
+
+def test_verdicts_of_a_link_do_not_have_a_check_count_to_2_53() -> None:
+    """The first message of all and the last that there can be: what lies between took a check months."""
+    trace = LinkTrace("inv2", "inv1", (0, MOST_COUNT), (0.0, 0.02), (0.0, 0.0))
+    sums, unreadable = judged([], [link_report("inv1", trace)], clock="simulated")
+
+    assert (sums.finish(unreadable).unreadable, unreadable) == (1, 1)
 
 
 def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -> None:

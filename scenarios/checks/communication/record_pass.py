@@ -120,8 +120,11 @@ class _Pass:
         self._file, self._sink = file, sink
         self._unreadable = 0
         self._simulated = file.info.simulated
-        self._t_end = file.t_end
+        end = file.info.plant.end
+        self._t_end = file.t_end if end is None else min(file.t_end, end)
         self._T_c, self._ahead = file.info.T_c, _AHEAD * max(1.0, file.info.plant.speed)
+        self._most = int((self._t_end + self._ahead) / self._T_c) if self._simulated else MOST_COUNT
+        """Largest number of a state: in simulated time that of its tick."""
         self._coverage: dict[str, JournalCoverage] = {}
         fields = file.info.fields.get(State.__name__, ())
         self._length = len(fields)
@@ -176,7 +179,7 @@ class _Pass:
 
         The plant's run time may stand still for a while, as it is frozen, so its journal counts as of the run's end.
         """
-        return 0.0 <= t <= (self._t_end if journal.sender == PLANT else journal.t) + self._ahead
+        return 0.0 <= t <= min(self._t_end, inf if journal.sender == PLANT else journal.t) + self._ahead
 
     def _cover(self, journal: Journal, ticks: list[int]) -> None:
         """Note which part of a journal is there, and the ticks of which it tells."""
@@ -218,7 +221,7 @@ class _Pass:
         except (KeyError, TypeError, ValueError, OverflowError):
             self._unreadable += 1
             return
-        numbers = 0 <= state.number <= MOST_COUNT and 0 <= state.epoch <= MOST_COUNT
+        numbers = 0 <= state.number <= self._most and 0 <= state.epoch <= MOST_COUNT
         if numbers and self._is_timely(journal, state.t):
             self._sink.state(sender, state)
         else:
@@ -233,7 +236,21 @@ class _Pass:
         for src, counts in data.counts.items():
             self._sink.counts((src, report.sender), counts)
         for trace in data.traces:
-            self._sink.trace(trace)
+            self._sink.trace(self._credible(trace))
+
+    def _credible(self, trace: LinkTrace) -> LinkTrace:
+        """Return the verdicts on messages that may have been sent, and count the others."""
+        latest = self._t_end + self._ahead
+        if max(trace.seq, default=0) <= self._most and max(trace.t, default=0.0) <= latest:
+            return trace
+        rows = [
+            row
+            for row in zip(trace.seq, trace.t, trace.outcome, strict=True)
+            if row[0] <= self._most and row[1] <= latest
+        ]
+        self._unreadable += len(trace.seq) - len(rows)
+        seq, t, outcome = zip(*rows, strict=True) if rows else ((), (), ())
+        return LinkTrace(trace.src, trace.dst, seq, t, outcome)
 
 
 _VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")

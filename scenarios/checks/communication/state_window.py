@@ -38,6 +38,12 @@ class StateWindow:
         """Return whether a state of this number was sent."""
         return number >= 0 and self._numbers[number % KEPT] == number
 
+    def numbers(self, after: int, until: int) -> list[int]:
+        """Return the numbers behind one and up to another that were sent, in order; at most `KEPT`, however far."""
+        if until - after > KEPT:
+            return sorted(number for number in self._numbers if after < number <= until)
+        return [number for number in range(after + 1, until + 1) if self.has(number)]
+
     def spoke(self, number: int) -> bool:
         """Return whether a state of this number was sent to the neighbours."""
         return self.has(number) and not self._flags[number % KEPT]

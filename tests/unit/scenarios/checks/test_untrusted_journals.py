@@ -7,7 +7,10 @@ from typing import Any
 import msgspec
 import pytest
 
-from tests.fuzz.journals import judged
+from netem.ledger import LinkTrace
+from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.state_window import KEPT, StateWindow
+from tests.fuzz.journals import judged, link_report
 from wire.bounds import MOST_COUNT
 from wire.codec import encode
 from wire.messages import State
@@ -72,3 +75,43 @@ def test_a_bad_entry_does_not_end_a_part() -> None:
     sums, unreadable = judged([("inv1", packed(["later", 1], ["heard"]) + GOOD)], clock="wall")
 
     assert (unreadable, sums.finish(unreadable).sent["inv1"].spoke_at) == (1, 0.08)
+
+
+@pytest.mark.parametrize("number", [MOST_COUNT, 2**40, 1000])
+def test_a_verdict_on_a_message_to_come_is_counted_and_left_out(number: int) -> None:
+    """A run of 1 s has 50 ticks: a pass that counted up to 2^53 would never end, and no later verdict would count."""
+    states = packed(*[sent(tick, tick * 0.02) for tick in range(1, 9)])
+    heard = packed(*[[*sent(tick, tick * 0.02)[:2], "state/inv2", sent(tick, tick * 0.02)[3].replace(b"inv1", b"inv2")]
+                     for tick in range(1, 9)])  # fmt: skip
+    ticks = (1, 2, 4, number, 5, 6, 7, 8)
+    trace = LinkTrace("inv1", "inv2", ticks, tuple(0.02 * min(tick, 9) for tick in ticks), (0.0,) * len(ticks))
+    sums, unreadable = judged([("inv1", states), ("inv2", heard)], [link_report("inv2", trace)], clock="simulated")
+    missing = sums.finish(unreadable).unjudged["inv1", "inv2"]
+
+    assert (unreadable, missing.count, missing.first) == (1, 1, 0.06)
+
+
+def test_a_verdict_of_a_time_to_come_is_counted_and_left_out() -> None:
+    """No message is sent after the end of the run, whatever its number."""
+    trace = LinkTrace("inv1", "inv2", (1, 2), (0.02, 1e9), ("cut", 0.0))
+    _, unreadable = judged([], [link_report("inv2", trace)], clock="wall")
+
+    assert unreadable == 1
+
+
+@pytest.mark.parametrize("clock", ["simulated", "wall"])
+def test_a_state_of_a_number_to_come_is_no_state_in_simulated_time(clock: str) -> None:
+    """There a number is a tick; in wall-clock time an agent counts as it likes."""
+    _, unreadable = judged([("inv1", packed(sent(MOST_COUNT, 0.1)))], clock=clock)
+
+    assert unreadable == (clock == "simulated")
+
+
+def test_a_window_names_the_same_numbers_however_far_it_is_asked() -> None:
+    """Up to the largest number there is, without counting to it."""
+    window = StateWindow()
+    for number in (3, 5, 4, KEPT + 4):
+        window.put(SentState(number, 0.0, 1, idle=False, quiet=False))
+
+    assert window.numbers(2, 6) == [3, 5]
+    assert window.numbers(2, MOST_COUNT) == [3, 5, KEPT + 4]
