@@ -14,8 +14,8 @@ from typing import Annotated, Any
 import msgspec
 
 LIMIT = 256_000
-"""Longest message in bytes: room for a row of telemetry on `MOST` inverters with long names. All other messages are a
-hundredth of it."""
+"""Longest message in bytes: room for a row of telemetry on `MOST_INVERTERS` inverters with long names. All other
+messages are a hundredth of it."""
 
 NAME = r"[A-Za-z0-9_.-]{1,64}"
 """Allowed form of a name. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
@@ -116,13 +116,13 @@ Shared = Annotated[
 ]
 """Values that a law shares, by names of its own choice."""
 
-MOST = 1000
+MOST_INVERTERS = 1000
 """Most inverters in a run: one row of telemetry on more would not fit into a message."""
 
-Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST)]
+Names = Annotated[tuple[Name, ...], msgspec.Meta(max_length=MOST_INVERTERS)]
 """Names of inverters or processes."""
 
-QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST)]
+QuickNames = Annotated[tuple[QuickName, ...], msgspec.Meta(max_length=MOST_INVERTERS)]
 """The same, checked together."""
 
 _PATTERN = re.compile(NAME)

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from wire.admission import Admission
-from wire.bounds import MOST
+from wire.bounds import MOST_INVERTERS
 from wire.codec import RejectedError
 from wire.messages import Nameplate
 
@@ -60,7 +60,7 @@ class Membership:
     def has_room(self, name: str) -> bool:
         """Return whether one more token of a name is to be noted: anybody may hold tokens, each costs every node."""
         instances = self._instances.get(name)
-        return len(self._instances) < MOST if instances is None else len(instances) < MOST_PROCESSES
+        return len(self._instances) < MOST_INVERTERS if instances is None else len(instances) < MOST_PROCESSES
 
     def appeared(self, name: str, instance: str) -> bool:
         """Note a token; return whether its process counts."""

@@ -17,7 +17,7 @@ import msgspec
 
 from wire.bounds import (
     LATEST,
-    MOST,
+    MOST_INVERTERS,
     Age,
     Count,
     Cycles,
@@ -311,7 +311,7 @@ class AgentStatus(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw
     """Its island: "grid", the first inverter in it, or empty if that is not known."""
     neighbours: Names
     """Its in-neighbours by the run's rule, among the present agents."""
-    ages: Annotated[tuple[Age, ...], msgspec.Meta(max_length=MOST)]
+    ages: Annotated[tuple[Age, ...], msgspec.Meta(max_length=MOST_INVERTERS)]
     """Age of each neighbour's last state (s of run time, on the own clock); -1 if none was heard."""
     used: Names
     """Neighbours in its sums now: heard, present, young enough and in the same island."""

@@ -24,7 +24,7 @@ from wire.keys import Keys
 from wire.messages import Measurement, State
 from wire.rate_limit import RateLimit
 
-SHOWN = 4_000
+SHOWN_PAYLOAD = 4_000
 """Most bytes that are noted of a message that was rejected."""
 
 REJECTED_OF_TICK = 20
@@ -102,7 +102,7 @@ class TickTraffic:
         elif rejected:
             self._rejected += 1
             if self._rejected <= REJECTED_OF_TICK:
-                self._journal.add(ReceivedMessage(None, key[self._cut :], payload[:SHOWN], rejected))
+                self._journal.add(ReceivedMessage(None, key[self._cut :], payload[:SHOWN_PAYLOAD], rejected))
         elif key not in self._elsewhere:
             self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
 
@@ -193,7 +193,7 @@ class TimedTraffic:
         ):
             self._journal.add(MessageReference(at, name, message.epoch, message.seq, rejected))
             return
-        self._journal.add(ReceivedMessage(at, name, payload[:SHOWN] if rejected else payload, rejected))
+        self._journal.add(ReceivedMessage(at, name, payload[:SHOWN_PAYLOAD] if rejected else payload, rejected))
 
     def _is_noted(self, rejected: str) -> bool:
         """Return whether a rejected message is noted; one of many is not, and their number is."""

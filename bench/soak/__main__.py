@@ -24,7 +24,6 @@ from time import monotonic
 
 from bench.harness import load, machine, say
 from bench.peers.machine_use import commit
-from bench.soak.disturbances import disturbances
 from bench.soak.judging import (
     HEAL,
     Finding,
@@ -38,6 +37,7 @@ from bench.soak.judging import (
     table,
 )
 from bench.soak.process_sizes import ProcessSize
+from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
 from bench.soak.stop_request import StopRequest, stop_request
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
@@ -55,7 +55,7 @@ STAY = 2
 """Agents that are never replaced: the first leader and the first follower of the paper."""
 
 TOLD = 10
-"""Disturbances after which progress is told."""
+"""Actions after which progress is told."""
 
 SMALL = 100_000
 """Size (bytes) up to which a file is not worth a word."""
@@ -65,7 +65,7 @@ def main(words: Sequence[str] | None = None) -> int:
     """Run, print the table, and write it; return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--hours", type=float, default=1.0, help="length by the clock (default 1)")
-    parser.add_argument("--seed", type=int, default=1, help="of the disturbances (default 1)")
+    parser.add_argument("--seed", type=int, default=1, help="of the actions (default 1)")
     parser.add_argument("--write", type=Path, metavar="PAGE", help=f"put the result between {BEGIN} and {END}")
     parser.add_argument(
         "--keep", type=Path, metavar="DIR", help="keep record, logs and sizes.csv in this folder, which is new"
@@ -112,13 +112,13 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     with SoakRun(folder, microgrids, spare) as run:
         calm = monotonic()
         count, stop.disturbing = 0, True
-        for one in disturbances(seed, replaced, tuple(microgrids), spare, sorted({*microgrids.values()})):
+        for one in soak_actions(seed, replaced, tuple(microgrids), spare, sorted({*microgrids.values()})):
             if monotonic() - calm >= seconds or stop.asked is not None:
                 break
             run.disturb(one)
             count += 1
             if count % TOLD == 1:
-                say(f"{(monotonic() - calm) / 60.0:.1f} min: {count} disturbances, {run.monitor.t:.0f} s, last {one}")
+                say(f"{(monotonic() - calm) / 60.0:.1f} min: {count} actions, {run.monitor.t:.0f} s, last {one}")
         lasted, stop.disturbing = monotonic() - calm, False
         say("the run ends, and makes its report")
         end = run.finish()
@@ -141,7 +141,7 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     if stop.asked is not None:
         length = f"ended after {length} of {seconds / 60.0:.0f} by {stop.asked.name}"
     about = (
-        f"{machine()}; commit {commit()}; {length}, seed {seed}, {count} disturbances; "
+        f"{machine()}; commit {commit()}; {length}, seed {seed}, {count} actions; "
         f"load (1, 5, 15 min) {before} before and {load()} after"
     )
     print(f"{monotonic() - began:.0f} s in all")

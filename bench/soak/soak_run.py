@@ -1,4 +1,4 @@
-"""The disturbances of a soak on its run: commands of a user, or signals to a process, and how long all takes."""
+"""The actions of a soak on its run: commands of a user, or signals to a process, and how long all takes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from time import monotonic
 from typing import NamedTuple
 
 from bench.long_runs import COMMAND
-from bench.soak.disturbances import SETTLE, Disturbance
+from bench.soak.soak_actions import SETTLE, SoakAction
 from bench.soak.watched_run import PATIENCE, WatchedRun
 
 LOAD, ZONE = "48", "60-160"
@@ -26,7 +26,7 @@ class Timed(NamedTuple):
     """heal, told, joined or restored."""
     seconds: float
     """The time (s); infinite if it did not come true within `PATIENCE`."""
-    of: Disturbance
+    of: SoakAction
     t: float
     """Run time (s)."""
     deaf: bool
@@ -42,8 +42,8 @@ class SoakRun(WatchedRun):
         self.kills: list[tuple[str, float]] = []
         """Agents that were killed, and when (s of run time)."""
 
-    def disturb(self, one: Disturbance) -> None:
-        """Do one disturbance, and wait until all is as before."""
+    def disturb(self, one: SoakAction) -> None:
+        """Do one action, and wait until all is as before."""
         self.monitor.restorations.clear()
         deaf = self._client.renewals
         if one.kind in ("load", "zone"):
@@ -55,19 +55,19 @@ class SoakRun(WatchedRun):
             self._note("restored", seconds, one, deaf)
         self.rest(one.rest)
 
-    def _leave(self, one: Disturbance) -> None:
+    def _leave(self, one: SoakAction) -> None:
         (name,) = one.agents
         self._stop(name)
         self.rest(one.seconds)
         self._join(name, one)
 
-    def _spare(self, one: Disturbance) -> None:
+    def _spare(self, one: SoakAction) -> None:
         (name,) = one.agents
         self._join(name, one)
         self.rest(one.seconds)
         self._stop(name)
 
-    def _kill(self, one: Disturbance) -> None:
+    def _kill(self, one: SoakAction) -> None:
         (name,) = one.agents
         others, began, deaf = self._others(name), monotonic(), self._client.renewals
         self.kills.append((name, self.monitor.t))
@@ -83,7 +83,7 @@ class SoakRun(WatchedRun):
         self.rest(one.seconds)
         self._join(name, one)
 
-    def _freeze(self, one: Disturbance) -> None:
+    def _freeze(self, one: SoakAction) -> None:
         (name,) = one.agents
         pid, deaf = self._pids[name][0], self._client.renewals
         os.kill(pid, signal.SIGSTOP)
@@ -95,19 +95,19 @@ class SoakRun(WatchedRun):
         others = self._others(name)
         self._wait("heal", lambda: self.monitor.use_each_other((name,), others, woken), woken, one, deaf)
 
-    def _cut(self, one: Disturbance) -> None:
+    def _cut(self, one: SoakAction) -> None:
         self._cut_between(one, one.agents, (one.agents[0],), (one.agents[1],))
 
-    def _isolate(self, one: Disturbance) -> None:
+    def _isolate(self, one: SoakAction) -> None:
         (name,) = one.agents
         self._cut_between(one, (f"{name} <-> *",), (name,), self._others(name))
 
-    def _part(self, one: Disturbance) -> None:
+    def _part(self, one: SoakAction) -> None:
         first, second = (tuple(name for name in self.agents if self.microgrids[name] == group) for group in one.agents)
         self._cut_between(one, (f"{one.agents[0]} <-> {one.agents[1]}",), first, second)
 
     def _cut_between(
-        self, one: Disturbance, links: tuple[str, ...], some: tuple[str, ...], others: tuple[str, ...]
+        self, one: SoakAction, links: tuple[str, ...], some: tuple[str, ...], others: tuple[str, ...]
     ) -> None:
         """Cut links, heal them, and measure how long both sides take to use each other's new values."""
         deaf = self._client.renewals
@@ -121,24 +121,24 @@ class SoakRun(WatchedRun):
             healed = self.monitor.wall_time(self._from(self._command("link", "heal", *links)))
         self._wait("heal", lambda: self.monitor.use_each_other(some, others, healed), healed, one, deaf)
 
-    def _impair(self, one: Disturbance) -> None:
+    def _impair(self, one: SoakAction) -> None:
         options = ["--delay", f"{one.delay:g}", "--loss", f"{one.loss:g}", "--for", f"{one.seconds:g}"]
         self._command("link", "set", *one.agents, *options)
         self.rest(one.seconds)
 
-    def _load(self, one: Disturbance) -> None:
+    def _load(self, one: SoakAction) -> None:
         self._command("load", LOAD, "--factor", f"{one.factor:g}")
         self.rest(one.seconds)
         self._command("load", LOAD, "--factor", "1")
 
-    def _zone(self, one: Disturbance) -> None:
+    def _zone(self, one: SoakAction) -> None:
         self._command("event", "close", ZONE)
         self.rest(one.seconds)
         self._command("event", "open", ZONE)
 
     # ---------------------------------------------------------------- agents that come and go
 
-    def _join(self, name: str, one: Disturbance) -> None:
+    def _join(self, name: str, one: SoakAction) -> None:
         """Start an agent, and measure how long it takes until it and the others use each other."""
         began, deaf = monotonic(), self._client.renewals
         self._logs += 1
@@ -180,10 +180,10 @@ class SoakRun(WatchedRun):
         found = re.search(r"from t = ([\d.]+) s on", text)
         return float(found[1]) if found else self.monitor.t
 
-    def _wait(self, what: str, condition: Callable[[], bool], since: float, one: Disturbance, deaf: int) -> None:
+    def _wait(self, what: str, condition: Callable[[], bool], since: float, one: SoakAction, deaf: int) -> None:
         """Wait until a condition holds, and note how long that took since a time (s, monotonic)."""
         came = self._until(condition, PATIENCE)
         self._note(what, max(0.0, monotonic() - since) if came else float("inf"), one, deaf)
 
-    def _note(self, what: str, seconds: float, one: Disturbance, deaf: int) -> None:
+    def _note(self, what: str, seconds: float, one: SoakAction, deaf: int) -> None:
         self.times.append(Timed(what, seconds, one, self.monitor.t, self._client.renewals > deaf))

@@ -44,7 +44,7 @@ CALM = 6.0
 """Run time (s) at which both events of the scenario are over."""
 
 PATIENCE = 30.0
-"""Longest wait (s) for anything that a disturbance brings about."""
+"""Longest wait (s) for anything that an action brings about."""
 
 CONCLUDE = 1800.0
 """Longest wait (s) for the report of the run after its end."""

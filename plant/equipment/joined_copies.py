@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from plant.equipment import Feeder, Line, Switch
 from plant.equipment.imported_equipment import LinearElement
-from wire.bounds import MOST
+from wire.bounds import MOST_INVERTERS
 
 TIE_LENGTH = 0.3
 """Length (km) of the line of a tie."""
@@ -59,9 +59,11 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
     bus = next((each for each in feeder.buses if each.name == joint), None)
     if feeder.source is None:
         raise ValueError(f'feeder "{feeder.name}" has no substation for its copies to share')
-    most = MOST // max(len(feeder.inverters), 1)
+    most = MOST_INVERTERS // max(len(feeder.inverters), 1)
     if not 1 <= copies <= most:
-        raise ValueError(f"copies: must be from 1 to {most}, as a run has at most {MOST} inverters; got {copies}")
+        raise ValueError(
+            f"copies: must be from 1 to {most}, as a run has at most {MOST_INVERTERS} inverters; got {copies}"
+        )
     if bus is None or not set("ABC") <= set(bus.phases):
         raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
     fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")

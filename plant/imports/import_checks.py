@@ -20,7 +20,7 @@ from wire.schema.suggestion import first_of
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
 
-SHOWN = 5
+SHOWN_NAMES = 5
 """How many buses of a section, or loads, a sentence names."""
 
 MOST_UNFED = 0.5
@@ -89,7 +89,7 @@ def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], s
         notes.append(f"{_named(feeder, section, name_node)}: no path to the source; left out{with_load}")
     names = list(dict.fromkeys(part.name for k, part in enumerate(feeder.load_parts) if k in idle))
     if names:
-        notes.append(f"{first_of(names, SHOWN)}: at a node to which nothing else leads; left out")
+        notes.append(f"{first_of(names, SHOWN_NAMES)}: at a node to which nothing else leads; left out")
     kept = tuple(part for part in feeder.load_parts if part not in parts)
     used = supported | {(part.bus, letter) for part in kept for letter in part.ends}
     used |= {(bus, letter) for row in feeder.switches for bus in (row.from_bus, row.to_bus) for letter in row.phases}
@@ -159,7 +159,7 @@ def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str],
     nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
     buses = list(dict.fromkeys(bus for bus, _ in nodes))
     first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
-    return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN)} (first {first})"
+    return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN_NAMES)} (first {first})"
 
 
 def refuse_unsolvable(

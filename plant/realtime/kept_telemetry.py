@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from typing import NamedTuple
 
-KEPT, KEPT_RECORDED = 4_000_000, 40_000_000
+KEPT_BYTES, KEPT_BYTES_RECORDED = 4_000_000, 40_000_000
 """Bytes that are kept, without and with journals: two minutes of nine inverters at real time, a part of the
 process's memory."""
 
@@ -54,7 +54,7 @@ class KeptTelemetry:
     (False, [b'T1', b'L2', b'T2'], [b'T3', b'T4'], True)
     """
 
-    def __init__(self, limit: int = KEPT) -> None:
+    def __init__(self, limit: int = KEPT_BYTES) -> None:
         self._limit, self._bytes = limit, 0
         self._kept: deque[_Entry] = deque()
         self._due: deque[_Entry] = deque()

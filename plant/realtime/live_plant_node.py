@@ -14,7 +14,7 @@ from typing import Literal
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.plant_node import STAYS, PlantNode
-from plant.realtime.kept_telemetry import KEPT, KEPT_RECORDED
+from plant.realtime.kept_telemetry import KEPT_BYTES, KEPT_BYTES_RECORDED
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.recorder_feed import RecorderFeed
 from plant.realtime.silence_detector import SilenceDetector
@@ -50,7 +50,10 @@ class LivePlantNode(PlantNode):
         self.phase: Phase = "gathering"
         self.plant = plant
         self.link_commands = LinkCommandSender(config.epoch, self.keys, links, self._publish)
-        publish, kept = partial(super()._publish, self.keys.telemetry), KEPT if self.journal is None else KEPT_RECORDED
+        publish, kept = (
+            partial(super()._publish, self.keys.telemetry),
+            KEPT_BYTES if self.journal is None else KEPT_BYTES_RECORDED,
+        )
         self.recorder_feed = RecorderFeed(config.recorders, publish, kept)
         self._states: dict[str, State] = {}
         """States that the links let through and that are not held yet."""

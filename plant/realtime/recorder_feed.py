@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from plant.realtime.kept_telemetry import KEPT, KeptTelemetry
+from plant.realtime.kept_telemetry import KEPT_BYTES, KeptTelemetry
 
 
 class RecorderFeed:
@@ -20,7 +20,7 @@ class RecorderFeed:
         Bytes that are kept.
     """
 
-    def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT) -> None:
+    def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT_BYTES) -> None:
         self._needed, self._publish = frozenset(needed), publish
         self._out_of_reach: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""

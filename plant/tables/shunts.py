@@ -24,7 +24,7 @@ from plant.tables.feeder_columns import (
     SourceColumns,
     power_of,
 )
-from wire.bounds import MOST
+from wire.bounds import MOST_INVERTERS
 from wire.keys import check_name
 from wire.messages import OFF, PLANT
 from wire.schema.plausible import Plausible
@@ -155,8 +155,8 @@ def read_inverters(
                 parameters=it.parameters,
             ),
         )
-    if len(inverters) > MOST:
-        problems.append(f"inverters.csv: has {len(inverters)} inverters; a run has at most {MOST}")
+    if len(inverters) > MOST_INVERTERS:
+        problems.append(f"inverters.csv: has {len(inverters)} inverters; a run has at most {MOST_INVERTERS}")
     return tuple(inverters.values())
 
 

@@ -12,7 +12,7 @@ from scenarios.chaos.chaos_folder import ChaosFolder, again
 from scenarios.chaos.chaos_run import (
     ASKED,
     REPEATS,
-    SAME,
+    SAME_IN_PROCESSES,
     ChaosRow,
     compared,
     run_number,
@@ -195,7 +195,7 @@ def _shrunk(campaign: Campaign, failures: tuple[Failure, ...]) -> Generator[tupl
 
 def _driver(campaign: Campaign, violated: str) -> Driver:
     """Return the driver with which a failure is shrunk: processes only for what one process cannot show."""
-    return campaign.driver if violated in (SAME, REPEATS) else "inprocess"
+    return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
 
 
 def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver) -> tuple[str, Schedule]:

@@ -19,11 +19,18 @@ from scenarios.run import BrokenRunError, Driver, Request, run_case, verdicts_on
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.sweep.sweep_case import plant_at_start
 
-ENDS, ERROR, LAWS, LINKS, REPEATS, SAME = "ends", "no_error", "laws", "links", "repeats", "same_in_processes"
+ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES = (
+    "ends",
+    "no_error",
+    "laws",
+    "links",
+    "repeats",
+    "same_in_processes",
+)
 """What is asked of every run beside the checks: it reaches its end; no error of the program; no law fails; accounts of
 links balance; it repeats to the byte; processes give the bytes of one process."""
 
-ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME)
+ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES)
 """All of them."""
 
 COLLECTED = 10
@@ -139,7 +146,7 @@ def run_schedule(
     scenario = base.disturbed(schedule, seed)
     row = _judged(base, scenario, number, schedule, driver)
     if driver == "processes":
-        row = compared(row, _judged(base, scenario, number, schedule, "inprocess"), SAME)
+        row = compared(row, _judged(base, scenario, number, schedule, "inprocess"), SAME_IN_PROCESSES)
     if again:
         row = compared(row, _judged(base, scenario, number, schedule, driver), REPEATS)
     return msgspec.structs.replace(row, took_s=round(monotonic() - began, 3))

@@ -18,7 +18,7 @@ from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.schema.participants import with_agent
 
-MOST = 10
+MOST_DISTURBANCES = 10
 """Most disturbances of a schedule, of which some may not be possible together."""
 
 LONGEST_S = 2.0
@@ -51,7 +51,7 @@ def schedules(base: ChaosBase) -> st.SearchStrategy[Schedule]:
     base : ChaosBase
         The scenario.
     """
-    return st.lists(_disturbances(base), max_size=MOST).map(base.kept)
+    return st.lists(_disturbances(base), max_size=MOST_DISTURBANCES).map(base.kept)
 
 
 @st.composite

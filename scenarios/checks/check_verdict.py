@@ -9,10 +9,10 @@ import msgspec
 CheckStatus = Literal["passed", "failed", "not judged"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about."""
 
-SHOWN = 20
-"""Most violations that a verdict keeps; it counts up to `MOST`."""
+SHOWN_VIOLATIONS = 20
+"""Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`."""
 
-MOST = 1_000_000
+MOST_VIOLATIONS = 1_000_000
 """Violations after which a check is asked for no more: some seconds, and a check that never ends yields ever more."""
 
 
@@ -64,9 +64,9 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     reason: str = ""
     """Why it was not judged, or, of a check that raised an error, why it failed."""
     violations: tuple[Violation, ...] = ()
-    """The violations, the first `SHOWN` as the check gave them."""
+    """The violations, the first `SHOWN_VIOLATIONS` as the check gave them."""
     count: int = 0
-    """Number of all violations, at most `MOST`."""
+    """Number of all violations, at most `MOST_VIOLATIONS`."""
 
     @property
     def sentence(self) -> str:

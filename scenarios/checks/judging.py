@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.checks.check_registry import CHECKS
-from scenarios.checks.check_verdict import MOST, SHOWN, CheckVerdict, NotJudgedError, Violation
+from scenarios.checks.check_verdict import MOST_VIOLATIONS, SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, made
@@ -41,9 +41,9 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
             raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
         violations: list[Violation] = []
         count = 0
-        for count, violation in enumerate(islice(found, MOST), 1):
+        for count, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
             checked = _checked(violation)
-            if count <= SHOWN:
+            if count <= SHOWN_VIOLATIONS:
                 violations.append(checked)
     except NotJudgedError as error:
         return CheckVerdict(check=name, status="not judged", reason=printable(str(error), 300) or "no reason given")

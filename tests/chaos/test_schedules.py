@@ -15,7 +15,7 @@ from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.disturbed_scenario import base_of
 from scenarios.chaos.schedule_search import BATCH, drawn, shrunk
-from scenarios.chaos.schedule_strategy import MOST, schedules
+from scenarios.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
 from scenarios.schema import load_scenario
 from scenarios.schema.scenario_writing import to_toml
 from tests.chaos.bases import NAMES, base_named
@@ -64,7 +64,7 @@ def test_a_seed_and_a_batch_have_schedules_of_their_own() -> None:
     assert _batch(0)[1:] != _batch(1)[1:]
     assert _batch(0)[1:] != drawn(base_named("islanding"), 2, 0)[1:]
     assert max(map(len, _batch(0))) > 3
-    assert max(map(len, _batch(0))) <= MOST
+    assert max(map(len, _batch(0))) <= MOST_DISTURBANCES
 
 
 def test_a_batch_draws_every_kind_of_disturbance() -> None:

@@ -13,7 +13,7 @@ from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun
 from wire.driver.open_files import (
     BESIDE_LINKS,
-    MOST,
+    MOST_FILES,
     OpenFilesError,
     check_open_files,
     limit,
@@ -51,7 +51,7 @@ def test_a_plant_needs_a_link_for_each_process_not_for_each_agent(tmp_path: Path
 
 def test_a_limit_is_raised_as_far_as_anybody_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """Up to the hard limit, and to what any run needs; never down."""
-    for before, after in (((64, 4096), 4096), ((64, 10**9), MOST), ((64, 64), None), ((10**6, 10**6), None)):
+    for before, after in (((64, 4096), 4096), ((64, 10**9), MOST_FILES), ((64, 64), None), ((10**6, 10**6), None)):
         found: list[tuple[int, tuple[int, int]]] = []
         monkeypatch.setattr(resource, "getrlimit", lambda kind, before=before: before)
         monkeypatch.setattr(resource, "setrlimit", lambda kind, limits, found=found: found.append((kind, limits)))

@@ -11,13 +11,13 @@ import pytest
 
 from agents.agent_config import AgentConfig, Control
 from bench.soak import __main__ as command
-from bench.soak.disturbances import DECK, Disturbance, disturbances
 from bench.soak.judging import files_of, growths, judge_checks, judge_growth, judge_late, judge_times, memory_of, table
 from bench.soak.late_steps import LateSteps, Start, late_steps
 from bench.soak.process_sizes import MachineTime, ProcessSize
+from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from bench.soak.stop_request import StopRequest, stop_request
-from scenarios.checks.check_verdict import SHOWN, CheckVerdict, Violation
+from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
 from wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
@@ -25,9 +25,9 @@ AGENTS = tuple(f"inv{i}" for i in range(1, 10))
 HOUR = 3600.0
 
 
-def drawn(seed: int, count: int) -> list[Disturbance]:
-    """The first disturbances of a seed."""
-    return list(islice(disturbances(seed, AGENTS[2:], AGENTS, "inv10", ("MG1", "MG2", "MG3")), count))
+def drawn(seed: int, count: int) -> list[SoakAction]:
+    """The first actions of a seed."""
+    return list(islice(soak_actions(seed, AGENTS[2:], AGENTS, "inv10", ("MG1", "MG2", "MG3")), count))
 
 
 def looks(growth: float) -> list[ProcessSize]:
@@ -58,7 +58,7 @@ def status(name: str, *used: str) -> AgentStatus:
     )  # fmt: skip
 
 
-def test_a_seed_decides_all_disturbances_and_a_deal_has_every_kind() -> None:
+def test_a_seed_decides_all_actions_and_a_deal_has_every_kind() -> None:
     """The same seed gives the same ones, another others; agents that stay are neither replaced nor frozen."""
     deal = drawn(1, len(DECK))
 
@@ -161,10 +161,10 @@ def test_every_kill_of_an_hour_counts_not_only_those_that_a_verdict_shows() -> N
     """A hundred kills, of which a verdict keeps twenty: one silence of another agent beyond these fails."""
     kills = [(f"inv{3 + i % 7}", 30.0 * i) for i in range(100)]
     silences = [Violation(text="sends nothing more", agent=name, t=t + 0.4) for name, t in kills]
-    words = CheckVerdict(check="last_words", status="failed", violations=tuple(silences[:SHOWN]), count=100)
+    words = CheckVerdict(check="last_words", status="failed", violations=tuple(silences[:SHOWN_VIOLATIONS]), count=100)
 
     assert judge_checks((words,), silences, kills).verdict == "PASS"
-    assert judge_checks((words,), silences[:SHOWN], kills).verdict == "FAIL"
+    assert judge_checks((words,), silences[:SHOWN_VIOLATIONS], kills).verdict == "FAIL"
     silences[-1] = Violation(text="sends nothing more", agent="inv1", t=kills[-1][1])
     assert judge_checks((words,), silences, kills).verdict == "FAIL"
 

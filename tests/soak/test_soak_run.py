@@ -1,4 +1,4 @@
-"""The run of a soak with real processes, without record and report: its disturbances, and what it measures of them."""
+"""The run of a soak with real processes, without record and report: its actions, and what it measures of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bench.soak.disturbances import Disturbance
+from bench.soak.soak_actions import SoakAction
 from bench.soak.soak_run import SoakRun
 from scenarios.schema import load_scenario
 
@@ -20,8 +20,8 @@ def test_a_killed_agent_is_told_and_comes_back_and_a_cut_heals(tmp_path: Path) -
     feeder = load_scenario("islanding")[1]
     microgrids = {row.name: row.microgrid for row in feeder.inverters}
     with SoakRun(tmp_path, microgrids, "inv10", recorded=False) as run:
-        run.disturb(Disturbance("kill", ("inv3",), 0.3))
-        run.disturb(Disturbance("cut", ("inv4", "inv7"), 0.5))
+        run.disturb(SoakAction("kill", ("inv3",), 0.3))
+        run.disturb(SoakAction("cut", ("inv4", "inv7"), 0.5))
         end = run.finish()
 
     assert {"told", "joined", "heal"} <= {timed.what for timed in run.times}

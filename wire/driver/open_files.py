@@ -13,7 +13,7 @@ except ImportError:  # a system without limits
 BESIDE_LINKS = 12
 """Files that a process has open beside its links: standard streams, Zenoh's own, its listener."""
 
-MOST = 65_536
+MOST_FILES = 65_536
 """Limit that suffices for any run; a much greater one makes other programs slow to start."""
 
 
@@ -22,11 +22,11 @@ class OpenFilesError(RuntimeError):
 
 
 def limit() -> int:
-    """Return the number of files that this process may have open; `MOST` where there is no limit."""
+    """Return the number of files that this process may have open; `MOST_FILES` where there is no limit."""
     if resource is None:
-        return MOST
+        return MOST_FILES
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return MOST if soft == resource.RLIM_INFINITY else soft
+    return MOST_FILES if soft == resource.RLIM_INFINITY else soft
 
 
 def raise_limit() -> None:
@@ -34,7 +34,7 @@ def raise_limit() -> None:
     if resource is None:
         return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    wanted = MOST if hard == resource.RLIM_INFINITY else min(hard, MOST)
+    wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
     if soft != resource.RLIM_INFINITY and soft < wanted:
         with suppress(OSError, ValueError):  # some systems allow less than they say; then the limit stays
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))

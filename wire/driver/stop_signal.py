@@ -8,7 +8,7 @@ from math import inf
 from time import monotonic
 from types import FrameType
 
-SAME = 1.0
+SAME_REQUEST_TIME = 1.0
 """Time (s) in which further signals are the same request: `timeout` signals a command and then its group, and whoever
 ends all processes of a run signals those that their parent ends too. An end must not be interrupted by that."""
 
@@ -29,8 +29,8 @@ class StopSignal:
         self._at = -inf
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Raise the error, unless it was raised less than `SAME` ago."""
+        """Raise the error, unless it was raised less than `SAME_REQUEST_TIME` ago."""
         now = self._clock()
-        if now - self._at >= SAME:
+        if now - self._at >= SAME_REQUEST_TIME:
             self._at = now
             raise self._error(signal.Signals(number).name)

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from plant.equipment import Feeder
-from plant.imports.import_checks import SHOWN, number_of, refuse_if, refuse_unsolvable, without_unfed
+from plant.imports.import_checks import SHOWN_NAMES, number_of, refuse_if, refuse_unsolvable, without_unfed
 from plant.imports.opendss.dss_circuit import ImportRequest
 from plant.imports.opendss.dss_process import reading
 from wire.schema.suggestion import first_of
@@ -65,7 +65,7 @@ def _compared(path: Path, feeder: Feeder, V: dict[tuple[str, str], complex]) -> 
     alone = loads_without_ground(feeder)
     if alone:
         told = (
-            f"{first_of(alone, SHOWN)}: constant power to ground behind a delta winding, where nothing else is "
+            f"{first_of(alone, SHOWN_NAMES)}: constant power to ground behind a delta winding, where nothing else is "
             "grounded: the voltage to ground has no single solution; make it conn=delta or model=2, or ground a winding"
         )
     if alone or not solved:

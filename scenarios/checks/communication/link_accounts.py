@@ -17,7 +17,7 @@ from wire.messages import PLANT
 WAIT = 1000
 """Verdicts of an emulated link after which a state without one has none: a link judges what it gets at once."""
 
-MOST = 6000
+MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
 
 
@@ -211,7 +211,7 @@ class ArrivalAccounts:
                 return
         arrived = self._arrived[link]
         arrived[epoch, number] = None
-        if len(arrived) > MOST:
+        if len(arrived) > MOST_WAITING:
             del arrived[next(iter(arrived))]
 
     def flush(self, until: float) -> None:
@@ -255,6 +255,6 @@ class ArrivalAccounts:
 
 def _miss(account: ArrivalAccount, key: tuple[int, int], t: float) -> None:
     account.late[key] = t
-    if len(account.late) > MOST:
+    if len(account.late) > MOST_WAITING:
         oldest = next(iter(account.late))
         account.early.add(account.late.pop(oldest))

@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from agents.agent import Agent
 from tests.toy.toy_configs import agent_config
 from wire.admission import Admission
-from wire.bounds import MOST
+from wire.bounds import MOST_INVERTERS
 from wire.codec import RejectedError
 from wire.membership import ASKED_AT_ONCE, MOST_PROCESSES, Membership
 from wire.messages import Nameplate
@@ -137,7 +137,7 @@ def test_tokens_of_anybody_cost_no_more_than_so_many_questions() -> None:
 
     assert made.instance("inv2") == "a"
     assert sum(name == "inv2" for name, _ in noted) == MOST_PROCESSES - 1
-    assert len({name for name, _ in noted}) == MOST
+    assert len({name for name, _ in noted}) == MOST_INVERTERS
     assert len(made.next_unmet()) == ASKED_AT_ONCE
 
 

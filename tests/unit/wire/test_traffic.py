@@ -22,12 +22,12 @@ from wire.journal import (
 )
 from wire.keys import Keys
 from wire.messages import Leave, Measurement, State
-from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN, TickTraffic, TimedTraffic
+from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN_PAYLOAD, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
 STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))
 LEAVE = encode(Leave(sender="inv2", epoch=3, seq=6, t=0.1))
-NOISE = b"\x00" * (SHOWN + 7)
+NOISE = b"\x00" * (SHOWN_PAYLOAD + 7)
 
 
 def noted(journal: JournalBuffer) -> list[Entry]:
@@ -88,7 +88,7 @@ def test_of_a_rejected_message_the_beginning_is_noted() -> None:
     traffic.received(KEYS.link_request("inv1"), NOISE, 2.0, "")
 
     assert noted(journal) == [
-        ReceivedMessage(1.0, "state/inv2", NOISE[:SHOWN], "corrupt"),
+        ReceivedMessage(1.0, "state/inv2", NOISE[:SHOWN_PAYLOAD], "corrupt"),
         ReceivedMessage(2.0, "link_request/inv1", NOISE),
     ]
 

@@ -14,7 +14,7 @@ from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication import record_content
 from scenarios.checks.communication.communication_summary import LINKED_WITHIN, SummaryPass
-from scenarios.checks.communication.link_accounts import MOST, ArrivalAccounts
+from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts
 from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.communication.record_pass import SentState
 from scenarios.checks.communication.sent_states import SentStates
@@ -370,12 +370,12 @@ def test_what_never_arrives_is_counted_where_it_is_too_much_to_keep() -> None:
     """The first and the number of them stay; the last ones stay one by one, as they may still arrive."""
     accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
     accounts.heard(("inv1", "inv2"), 1, 0)
-    for number in range(MOST + 1000):
+    for number in range(MOST_WAITING + 1000):
         for name in NAMES:
             accounts.state(name, SentState(number, 0.02 * number, 1, idle=False, quiet=False))
     accounts.flush(1e9)
     (account,) = accounts.accounts["inv1", "inv2"]
 
-    assert (account.early.count, account.early.first, len(account.late)) == (999, pytest.approx(0.02), MOST)
-    accounts.heard(("inv1", "inv2"), 1, MOST + 500)
-    assert len(account.late) == MOST - 1
+    assert (account.early.count, account.early.first, len(account.late)) == (999, pytest.approx(0.02), MOST_WAITING)
+    accounts.heard(("inv1", "inv2"), 1, MOST_WAITING + 500)
+    assert len(account.late) == MOST_WAITING - 1

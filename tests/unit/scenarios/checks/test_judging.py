@@ -13,7 +13,7 @@ import pytest
 import gridpeers as gp
 from scenarios.checks import judging
 from scenarios.checks.check_registry import ALWAYS, CHECKS
-from scenarios.checks.check_verdict import SHOWN, CheckVerdict, NotJudgedError, Violation, summary
+from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import read_verdicts, verdicts_json
 from scenarios.checks.judging import judge_case
@@ -78,18 +78,18 @@ def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest
     many = [Violation(text="x", t=np.float64(k), value=float("nan")) for k in range(100)]  # type: ignore[arg-type]
     found = judged(lambda case: many, monkeypatch)
 
-    assert (found.count, len(found.violations)) == (100, SHOWN)
+    assert (found.count, len(found.violations)) == (100, SHOWN_VIOLATIONS)
     assert (found.violations[1].t, found.violations[1].value) == (1.0, None)
     assert found.sentence == "mine failed: x: at t = 0.00 s, and 99 more"
 
 
 def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
     """It has failed, with as many violations as were counted, of which the first are kept."""
-    monkeypatch.setattr(judging, "MOST", 1000)
+    monkeypatch.setattr(judging, "MOST_VIOLATIONS", 1000)
     numbers = count()
     found = judged(lambda case: (Violation(text=f"x{k}") for k in numbers), monkeypatch)
 
-    assert (found.status, found.count, found.violations[-1].text) == ("failed", 1000, f"x{SHOWN - 1}")
+    assert (found.status, found.count, found.violations[-1].text) == ("failed", 1000, f"x{SHOWN_VIOLATIONS - 1}")
     assert next(numbers) == 1000
 
 

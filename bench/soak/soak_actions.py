@@ -1,4 +1,4 @@
-"""The disturbances of a soak, drawn from a seed. Pure.
+"""The actions of a soak, which disturb its run, drawn from a seed. Pure.
 
 Kinds are dealt from a shuffled deck, and so are the agents that they concern: so even a short run has every kind, and
 every agent is replaced early.
@@ -39,7 +39,7 @@ SETTLE = 5.0
 and vars take so long to settle after an agent has come back."""
 
 REST = (0.3, 1.5)
-"""Time (s) between two disturbances."""
+"""Time (s) between two actions."""
 
 LATE, LOSSY = (0.02, 0.15), (0.05, 0.5)
 """Delay (s) and loss of an impaired link."""
@@ -50,8 +50,8 @@ FACTOR = (0.5, 1.5)
 _T = TypeVar("_T")
 
 
-class Disturbance(NamedTuple):
-    """One disturbance."""
+class SoakAction(NamedTuple):
+    """What the soak does to the run once, and takes back: commands of a user, or signals to a process."""
 
     kind: Kind
     agents: tuple[str, ...] = ()
@@ -74,10 +74,10 @@ class Disturbance(NamedTuple):
         return " ".join((self.kind, *self.agents)) + f" for {self.seconds:.1f} s"
 
 
-def disturbances(
+def soak_actions(
     seed: int, replaced: Sequence[str], agents: Sequence[str], spare: str, microgrids: Sequence[str]
-) -> Iterator[Disturbance]:
-    """Yield disturbances without end.
+) -> Iterator[SoakAction]:
+    """Yield actions without end.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def disturbances(
                 concerned = next(groups)
             case _:
                 concerned = ()
-        yield Disturbance(
+        yield SoakAction(
             kind=kind,
             agents=concerned,
             seconds=round(rng.uniform(*LASTS[kind]), 2),
