@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from plant.equipment import Feeder
-from plant.equipment.bus_islands import islands_after
+from plant.equipment.bus_islands import bus_islands
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, History, Nameplates, read_only
 from scenarios.results.island_membership import part_of
+from scenarios.results.switch_positions import closed_switches, switch_events
 from scenarios.schema.configs import limits_of
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import without_agent
@@ -143,18 +144,24 @@ class CheckedCase:
         return window.rows(t) & late
 
     @cached_property
+    def switch_events(self) -> tuple[PlantEvent, ...]:
+        """Operations of switches as they happened: one that waits for synchronism has none until it closes."""
+        return switch_events(self.scenario, self.feeder, self.events)
+
+    @cached_property
     def parts(self) -> tuple[IslandWindow, ...]:
-        """Each island of each window that has inverters, by the switches alone."""
-        operations = ((event.open, event.close) for event in self.scenario.events)
-        after = islands_after(self.feeder, operations)
-        islands = {event.label: buses for event, buses in zip(self.scenario.events, after, strict=True)}
+        """Each island with inverters at the end of each window, as the switches were then, whatever the scenario plans.
+
+        An island that came about within a window is judged from then on (`rows_from`).
+        """
         bus_of = {row.name: row.bus for row in (*self.feeder.inverters, *self.feeder.spares)}
         source = self.feeder.source.bus if self.feeder.source else None
         found = []
         for window in self.windows:
+            until = (event for event in self.switch_events if event.t < window.end - 1e-9)  # then the next one begins
             members = [
                 (buses, tuple(name for name in self.history.inverters if bus_of[name] in buses))
-                for buses in islands[window.label]
+                for buses in bus_islands(self.feeder, closed_switches(self.feeder, until))
             ]
             members = [(buses, names) for buses, names in members if names]
             for buses, names in members:

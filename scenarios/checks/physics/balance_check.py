@@ -14,6 +14,7 @@ from plant.plant_config import PlantSettings
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
+from scenarios.results.switch_positions import closed_switches
 from wire.messages import PlantEvent
 from wire.schema.plausible import Plausible, Unit
 
@@ -105,25 +106,10 @@ def _state_at(case: CheckedCase, t: float) -> NetworkState:
         for event in case.events
         if event.kind == "load" and event.t < t - 1e-9 and (S := _power_of(event)) is not None
     }
-    return NetworkState(_closed_at(case, t), frozenset(powers.items()))
+    until = (event for event in case.switch_events if event.t <= t + 1e-9)
+    return NetworkState(closed_switches(case.feeder, until), frozenset(powers.items()))
 
 
 def _power_of(event: PlantEvent) -> complex | None:
     """Return the power (VA, nominal) of a load from its event on; of a table of events, by its words."""
     return set_power(event.text) if event.P is None or event.Q is None else complex(event.P, event.Q)
-
-
-def _closed_at(case: CheckedCase, t: float) -> frozenset[str]:
-    """Return the names of the switches that are closed at a time (s), by the plant's events."""
-    names = {each: switch.name for switch in case.feeder.switches for each in (*switch.names, switch.event_name)}
-    closed = {switch.name for switch in case.feeder.switches if switch.closed}
-    for event in case.events:
-        if event.kind != "switch" or event.t > t + 1e-9 or event.subject not in names:
-            continue
-        if " already" in event.text:
-            continue
-        if " closed" in event.text:
-            closed.add(names[event.subject])
-        elif " opened" in event.text:
-            closed.discard(names[event.subject])
-    return frozenset(closed)
