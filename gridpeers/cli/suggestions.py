@@ -53,6 +53,8 @@ def _line(error: Any) -> str:
     message = error.format_message().rstrip(".")
     more = command_line(*_words(error.ctx), "-h")
     param, kind = getattr(error, "param", None), type(error).__name__
+    if kind == "NoSuchOption" and _is_negative_time(error):
+        return 'TIME: must be at least 0 s, where a run begins, as 4.3; a word that begins with "-" is an option'
     if kind == "NoSuchOption":
         known = [name for each in error.ctx.command.get_params(error.ctx) for name in each.opts if name[:2] == "--"]
         return f'no option "{error.option_name}"; {suggestion(error.option_name, known, "options")}'
@@ -66,6 +68,12 @@ def _line(error: Any) -> str:
     if param is not None:
         return f"{_name(param)}: {_wrong_value(error, message)}"
     return f"{message[:1].lower()}{message[1:]}; {more} shows what can be given"
+
+
+def _is_negative_time(error: Any) -> bool:
+    """Return whether a number below 0 was read as an option by a command that takes a run time."""
+    params = error.ctx.command.get_params(error.ctx)
+    return bool(re.fullmatch(r"-[\d.]", error.option_name)) and any(each.metavar == "TIME" for each in params)
 
 
 def _words(ctx: Any) -> list[str]:

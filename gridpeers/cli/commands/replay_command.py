@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from scenarios.replay.changes import Changes
 
 
+CHANGES = "--without, --without-loss, --without-link-commands, --law or --set"
+"""Options that change something, in words."""
+
+
 def replay(
     run: Annotated[
         Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
@@ -99,9 +103,9 @@ def _key_and_value(text: str) -> tuple[str, Any]:
 def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
     """Replay a record and print what came of it; return whether something differs."""
     if since:
-        fail([f"--from {since:g}: nothing is changed from then on; give --without, --law or --set"], BAD_INPUT)
+        fail([f"--from {since:g}: nothing is changed from then on; give {CHANGES}"], BAD_INPUT)
     if out is not None:
-        text = "a replay without a change writes no folder; leave it out, or give --without, --law or --set"
+        text = f"a replay without a change writes no folder; leave it out, or give {CHANGES}"
         fail([f"--out {out}: {text}"], BAD_INPUT)
 
     from gridpeers.cli.progress import explained_work

@@ -1,7 +1,9 @@
 """What is typed wrong is told in one line, in the words of the house."""
 
 import pytest
+import typer.main
 
+from gridpeers.cli.commands.replay_command import CHANGES, replay
 from tests.command_line import invoke
 
 
@@ -22,6 +24,9 @@ from tests.command_line import invoke
             ["run", "x", "--spede", "2"],
             'no option "--spede"; did you mean "--speed"? The options are --driver, --clock,',
         ),
+        (["why", "x", "inv2", "-1"], "TIME: must be at least 0 s, where a run begins, as 4.3;"),
+        (["why", "x", "inv2", "-.5"], "TIME: must be at least 0 s, where a run begins, as 4.3;"),
+        (["event", "open", "-1"], 'no option "-1"; the options are --sync'),
         (["run", "x", "--case"], "--case: needs a value"),
         (["run", "x", "--strict=yes"], "--strict: takes no value"),
         (["run", "x", "y"], 'too much was typed: "y"; '),
@@ -42,3 +47,12 @@ def test_a_mistyped_word_is_one_line(words: list[str], line: str) -> None:
 def test_a_command_alone_shows_its_help(words: tuple[str, ...]) -> None:
     """A command without arguments shows its help."""
     assert "Commands:" in invoke(*words)[1]
+
+
+def test_a_replay_without_a_change_names_every_option_that_changes_something() -> None:
+    """All of its options but those that say which case, from when, and where to."""
+    app = typer.Typer(add_completion=False)
+    app.command()(replay)
+    options = {max(each.opts, key=len) for each in typer.main.get_command(app).params if each.opts[0][:2] == "--"}
+
+    assert options - {"--case", "--from", "--out", "--help"} == set(CHANGES.replace(" or ", ", ").split(", "))
