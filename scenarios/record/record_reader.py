@@ -270,17 +270,25 @@ class RunRecord:
         if self._decisions.entries.lost_at(agent, t, None if found is None else found.t):
             raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self._lost()}")
         if found is None:
-            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{self._first(agent)}")
+            raise RecordFileError(f"{self.path}: {self._undecided(agent, t)}")
         return found
 
     def _lost(self) -> str:
         return self.damage[0] if self.damage else "parts of journals never came into it"
 
-    def _first(self, agent: str) -> str:
+    def _undecided(self, agent: str, t: float) -> str:
+        """Return in a sentence why an agent has no decision up to a run time (s)."""
+        not_yet = f"{agent} had not decided anything by t = {t:g} s"
         first = next(self.decisions(agent), None)
-        if first is None and self.damage:
-            return f", as far as the record has it: {self.damage[0]}"
-        return "" if first is None else f"; its first decision is of t = {first.t:.2f} s"
+        if first is not None:
+            return f"{not_yet}; its first decision is of t = {first.t:.2f} s"
+        if self.damage:
+            return f"{not_yet}, as far as the record has it: {self.damage[0]}"
+        if any(event.kind == "roster" and event.subject == agent for event in self.events()):
+            return f"{not_yet}, nor later"
+        decided = [name for name in self.agents if next(self.decisions(name), None) is not None]
+        advice = f"; ask about an agent that decided: {short(decided)}" if decided else ", nor did any other agent"
+        return f"no agent of {agent} joined in the {self.t_end:.2f} s of this record, so nothing decided for it{advice}"
 
     def _require(self, agent: object) -> None:
         if agent != "plant" and agent not in self.agents:

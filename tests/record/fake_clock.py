@@ -244,6 +244,7 @@ def fake_clock_record(
     folder: Path,
     *,
     n: int = 3,
+    spares: tuple[str, ...] = (),
     end: float = 1.0,
     netem: Netem | None = None,
     control: Control = ALL_FULL,
@@ -258,6 +259,8 @@ def fake_clock_record(
         Folder of the case, which is made.
     n : int, optional
         Number of agents.
+    spares : tuple[str, ...], optional
+        Those of them that are not started with the run.
     end : float, optional
         End of the run (s).
     netem : Netem, optional
@@ -269,7 +272,7 @@ def fake_clock_record(
     happens : Callable[[FakeClockRun], None], optional
         Plans what people and the machine do, before the run.
     """
-    plant, agents = toy_configs(n, control, end=end)
+    plant, agents = toy_configs(n, control, end=end, spares=spares)
     links: dict[str, Any] = {}
     if netem is not None:
         microgrids = {agent.name: agent.microgrid for agent in agents}

@@ -29,7 +29,7 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
         code, printed = invoke(command, *arguments)
         if not decided and command == "why":
             assert code == 2
-            assert "had not decided anything" in printed
+            assert "had not decided anything" in printed or "no agent of" in printed
             continue
         if not decided and command == "replay" and code:
             assert code == 2

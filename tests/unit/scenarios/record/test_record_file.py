@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from mcap.writer import Writer
 from scenarios.record.record_file import RecordFileError
 from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
 from scenarios.record.record_reader import RunRecord
+from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
 CALM = '[time]\nend_s = 1.0\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'
@@ -133,6 +135,19 @@ def test_what_was_not_there_is_told(whole: Path, tmp_path: Path) -> None:
         RunRecord.open(tmp_path)
     with pytest.raises(RecordFileError, match="cannot be read: No such file"):
         RunRecord.open(whole.parent / "other.mcap")
+
+
+def test_an_inverter_without_an_agent_is_told_from_one_that_has_not_decided_yet(tmp_path: Path) -> None:
+    """A spare whose agent never came has no decision at any time; one that came later had none before that."""
+    never = fake_clock_record(tmp_path / "never", spares=("inv3",), end=0.2)
+    later = fake_clock_record(
+        tmp_path / "later", spares=("inv3",), end=0.6, happens=lambda run: run.at(0.3, partial(run.start, "inv3"))
+    )
+
+    with pytest.raises(RecordFileError, match=r"no agent of inv3 joined in the 0\.20 s .* that decided: inv1,2$"):
+        never.decision("inv3", 0.1)
+    with pytest.raises(RecordFileError, match=r"inv3 had not decided anything by t = 0\.1 s; its first decision is of"):
+        later.decision("inv3", 0.1)
 
 
 def test_physics_alone_have_no_decisions(tmp_path: Path) -> None:
