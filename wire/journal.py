@@ -19,6 +19,9 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import msgspec
+from msgspec.structs import replace
+
+from wire.bounds import Count
 
 RecordLevel = Literal["all", "decisions", "physics"]
 """What nodes note: everything; decisions with their inputs, but no arrivals and no fates on links; or nothing, as the
@@ -29,6 +32,9 @@ LOT = 32_000
 
 ROOM = 1_000_000
 """Bytes that a journal holds at most: what comes beyond, as in a flood of messages, is counted only."""
+
+COUNTED_KEYS = 200
+"""Keys and kinds of which a part counts messages; all further ones are counted by their kind alone."""
 
 AT_ONCE = 64
 """Most messages in one entry: of the longest there are, they fit into a part."""
@@ -87,6 +93,21 @@ class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
     """Its bytes."""
     rejected: str = ""
     """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
+
+
+class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
+    """Messages on one key of which nothing else is noted: dropped unread, or more rejected ones than are noted."""
+
+    at: float | None
+    """Time on the own clock by which they had come (s, monotonic); None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`; empty for all others, where there are too many."""
+    kind: str
+    """Kind of their rejection (`wire.codec.KINDS`)."""
+    count: Count
+    """Number of them."""
+    since: float | None = None
+    """Time from which on they came, on the same clock (s)."""
 
 
 class Token(Entry, frozen=True, array_like=True, tag="token"):
@@ -161,7 +182,17 @@ UNUSED = {
 """Reasons why an agent leaves out an in-neighbour."""
 
 
-AnyEntry = Exchange | SentMessage | MessageReference | ReceivedMessage | Token | WakeUp | ProcessEvent | Decision
+AnyEntry = (
+    Exchange
+    | SentMessage
+    | MessageReference
+    | ReceivedMessage
+    | RejectedCount
+    | Token
+    | WakeUp
+    | ProcessEvent
+    | Decision
+)
 """An entry of any kind."""
 
 ENTRIES: tuple[type[Entry], ...] = AnyEntry.__args__
@@ -181,7 +212,7 @@ class JournalBuffer:
     (28, b'\x94\xa5token', 0)
     """
 
-    __slots__ = ("_bytes", "_ends", "_lost")
+    __slots__ = ("_bytes", "_ends", "_lost", "_rejected")
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -189,6 +220,8 @@ class JournalBuffer:
         """Entries that found no room."""
         self._ends: list[int] = []
         """Ends of the entries that a part may end with."""
+        self._rejected: dict[tuple[str, str], RejectedCount] = {}
+        """Messages that are only counted, by key and kind."""
 
     def __len__(self) -> int:
         return len(self._bytes)
@@ -202,8 +235,20 @@ class JournalBuffer:
         if len(self._bytes) - (self._ends[-1] if self._ends else 0) >= LOT:
             self._ends.append(len(self._bytes))
 
+    def count(self, rejected: RejectedCount) -> None:
+        """Add to the entry about messages of one key and kind; it is the last of its part, whatever room there is."""
+        if len(self._rejected) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._rejected:
+            rejected = replace(rejected, key="")
+        before = self._rejected.get((rejected.key, rejected.kind))
+        if before is not None:
+            rejected = replace(rejected, count=before.count + rejected.count, since=before.since)
+        self._rejected[rejected.key, rejected.kind] = rejected
+
     def take_parts(self) -> list[bytes]:
         """Take out all entries, in parts of about `LOT` bytes."""
+        for rejected in self._rejected.values():
+            _encode_into(rejected, self._bytes, -1)
+        self._rejected.clear()
         if self._lost:
             _encode_into(ProcessEvent(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"), self._bytes, -1)
             self._lost = 0

@@ -151,10 +151,10 @@ class Node:
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages that the driver has dropped unread; the journal has one entry for them, without bytes."""
+        """Count messages that the driver has dropped unread; the journal has their number."""
         self.rejects.add(loss.kind, loss.key, loss.text, count=loss.number)
         if self.traffic is not None:
-            self.traffic.received(loss.key, b"", now, loss.kind)
+            self.traffic.lost(loss.key, loss.kind, loss.number, now)
 
     @property
     def watched(self) -> str:

@@ -15,6 +15,7 @@ from wire.journal import (
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
+    RejectedCount,
     SentMessage,
     Token,
     WakeUp,
@@ -28,7 +29,7 @@ SHOWN_PAYLOAD = 4_000
 """Most bytes that are noted of a message that was rejected."""
 
 REJECTED_OF_TICK = 20
-"""Rejected messages that are noted in one tick of simulated time; the others are only counted."""
+"""Rejected messages that are noted in one tick of simulated time; the others are only counted, by key and kind."""
 
 REJECTED, REJECTED_INTERVAL = 100, 0.05
 """The same in wall-clock time, of each kind: how many at once, and the time (s) after which one more is noted."""
@@ -46,6 +47,10 @@ class Traffic(Protocol):
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         """Note a message off the wire, and the kind of its rejection, if it was rejected."""
+        ...
+
+    def lost(self, key: str, kind: str, count: int, at: float) -> None:
+        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
         ...
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
@@ -103,8 +108,14 @@ class TickTraffic:
             self._rejected += 1
             if self._rejected <= REJECTED_OF_TICK:
                 self._journal.add(ReceivedMessage(None, key[self._cut :], payload[:SHOWN_PAYLOAD], rejected))
+            else:
+                self.lost(key, rejected, 1, at)
         elif key not in self._elsewhere:
             self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
+
+    def lost(self, key: str, kind: str, count: int, at: float) -> None:
+        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
+        self._journal.count(RejectedCount(None, key[self._cut :], kind, count))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""
@@ -129,8 +140,6 @@ class TickTraffic:
 
     def ticked(self, tick: int) -> None:
         """Note that tick k is complete, or that it ends as it is."""
-        if self._rejected > REJECTED_OF_TICK:
-            self.line(f"{self._rejected - REJECTED_OF_TICK} more rejected messages left out")
         self._rejected = 0
         measurements, states = self._measurements, self._states
         if not (measurements or states):
@@ -184,6 +193,7 @@ class TimedTraffic:
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
         if rejected and not self._is_noted(rejected):
+            self._journal.count(RejectedCount(at, name, rejected, 1, at))
             return
         if (
             kind in EACH_TICK
@@ -197,10 +207,14 @@ class TimedTraffic:
 
     def _is_noted(self, rejected: str) -> bool:
         """Return whether a rejected message is noted; one of many is not, and their number is."""
-        line = (self._stale if rejected == "stale" else self._rejected).admit(rejected, self.now)
-        if line is not None and line != rejected:
-            self._journal.add(ProcessEvent(self.now, "line", f"rejected messages: {line}"))
-        return line is not None
+        limit = self._stale if rejected == "stale" else self._rejected
+        return limit.admit(rejected, self.now) is not None
+
+    def lost(self, key: str, kind: str, count: int, at: float) -> None:
+        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
+        since, self.now = self.now, at
+        if self._arrivals or self._whole:
+            self._journal.count(RejectedCount(at, key[self._cut :], kind, count, since))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""

@@ -10,7 +10,8 @@ from netem.ledger import Outcome, copies_of
 from scenarios.record.message_index import MessageOnWire
 from scenarios.record.record_reader import RunRecord
 from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from wire.journal import MessageReference, ReceivedMessage
+from wire.counted import counted
+from wire.journal import MessageReference, ReceivedMessage, RejectedCount
 from wire.journal_keys import kind_of, name_of
 from wire.messages import OFF, PlantEvent, State
 
@@ -34,6 +35,10 @@ Fates = Mapping[tuple[str, int], list[tuple[float, Outcome]]]
 """Verdicts by sender and number: when the message was sent (s of run time), and its outcome."""
 
 
+Rejections = Mapping[str, list[tuple[int, str, int]]]
+"""Rejected messages by sender: their number, -1 if it is not known; the kind of their rejection; how many."""
+
+
 def verdicts(record: RunRecord, agent: str, since: float, until: float) -> Fates:
     """Return the verdicts of the links into an agent on messages of some run time (s)."""
     found: dict[tuple[str, int], list[tuple[float, Outcome]]] = {}
@@ -45,13 +50,21 @@ def verdicts(record: RunRecord, agent: str, since: float, until: float) -> Fates
     return found
 
 
-def rejections(record: RunRecord, agent: str, since: float, until: float) -> Mapping[str, list[tuple[int, str]]]:
-    """Return the number and the kind of each message of a neighbour that an agent rejected, by the neighbour."""
-    found: dict[str, list[tuple[int, str]]] = {}
+def rejections(record: RunRecord, agent: str, since: float, until: float) -> Rejections:
+    """Return the messages on each neighbour's key that an agent rejected."""
+    found: dict[str, list[tuple[int, str, int]]] = {}
     for entry in record.entries(agent, since=since, until=until):
-        if isinstance(entry, MessageReference | ReceivedMessage) and entry.rejected and kind_of(entry.key) == "state":
-            number = entry.seq if isinstance(entry, MessageReference) else -1
-            found.setdefault(name_of(entry.key), []).append((number, entry.rejected))
+        match entry:
+            case MessageReference(key=key, seq=number, rejected=kind) if kind:
+                rejected = number, kind, 1
+            case ReceivedMessage(key=key, rejected=kind) if kind:
+                rejected = -1, kind, 1
+            case RejectedCount(key=key, kind=kind, count=count):
+                rejected = -1, kind, count
+            case _:
+                continue
+        if kind_of(key) == "state":
+            found.setdefault(name_of(key), []).append(rejected)
     return found
 
 
@@ -60,11 +73,12 @@ def missed(
     decision: RecordedDecision,
     each: NeighbourInput,
     fates: Fates,
-    rejected: Mapping[str, list[tuple[int, str]]],
+    rejected: Rejections,
 ) -> str:
     """Return in words what became of a neighbour's states after the last one that was heard.
 
-    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since".
+    Examples of the result: "48 states since: 48 cut off by a partition"; "no state since". Of a rejected message
+    without a number nobody knows the sender: as many as there are states whose fate nothing else tells may be these.
     """
     since = 0.0 if each.state is None else each.state.t
     last = -1 if each.number is None else each.number
@@ -73,15 +87,20 @@ def missed(
     for message in record.messages(each.name, since=since, until=decision.t - 0.5 * T, kind="State"):
         if message.number > last or (each.state is not None and message.epoch != each.state.epoch):
             counts[_fate(message, decision.t, fates)] += 1
-    refused = Counter(kind for number, kind in rejected.get(each.name, ()) if number < 0 or number > last)
-    for kind, count in refused.items():
-        counts[f'rejected as "{kind}"'] += count
-        counts[""] -= min(count, counts[""])
+    others: Counter[str] = Counter()
+    for number, kind, count in sorted(rejected.get(each.name, ()), reverse=True):
+        if number > last or (number < 0 and kind != "stale"):  # a stale one is older than the last one heard
+            own = count if number > last else min(count, counts[""])
+            counts[f'rejected as "{kind}"'] += own
+            counts[""] -= min(own, counts[""])
+            others[kind] += count - own
     total = sum(counts.values())
-    if not total:
-        return "no state since"
     known = ", ".join(f"{count} {WORDS.get(why, why)}" for why, count in counts.most_common() if why and count)
-    return f"{total} state{'s' if total > 1 else ''} since" + (f": {known}" if known else "")
+    text = f"{counted(total, 'state') if total else 'no state'} since" + (f": {known}" if known else "")
+    strange = [
+        f'{counted(count, "message")} on its key rejected as "{kind}"' for kind, count in others.items() if count
+    ]
+    return "; ".join([text, *strange])
 
 
 def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:

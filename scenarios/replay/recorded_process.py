@@ -16,6 +16,7 @@ from wire.journal import (
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
+    RejectedCount,
     SentMessage,
     Token,
     WakeUp,
@@ -26,7 +27,7 @@ from wire.messages import PLANT, AnyMessage, Journal
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""
 
-Input = Token | MessageReference | ReceivedMessage | WakeUp | ProcessEvent
+Input = Token | MessageReference | ReceivedMessage | RejectedCount | WakeUp | ProcessEvent
 """An entry that is a call of the node."""
 
 

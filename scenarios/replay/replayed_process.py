@@ -19,13 +19,25 @@ from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.live_processes import RECORDER_WAIT
 from scenarios.record.record_info import RecordInfo
-from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
+from scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
 from scenarios.replay.replay_error import ReplayError
-from wire.codec import encode, sound
-from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, Token, WakeUp
+from wire.backlog import Loss
+from wire.codec import KINDS, encode, sound
+from wire.journal import (
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    RejectedCount,
+    SentMessage,
+    Token,
+    WakeUp,
+)
 from wire.journal_keys import EACH_TICK, kind_of
 from wire.links import Links
 from wire.messages import PLANT, Measurement, State
+
+UNREAD = ("excess", "oversized")
+"""Kinds of messages that are dropped unread: without bytes they are noted, and not rejected for having none."""
 
 MakePlant = Callable[[PlantConfig], LivePlant]
 """Starts the plant of a configuration."""
@@ -52,6 +64,9 @@ class _Outbox:
         self.messages.append(Message(key[self._cut :], payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
+        """Take no note: the record has it."""
+
+    def lost(self, key: str, kind: str, count: int, at: float) -> None:
         """Take no note: the record has it."""
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
@@ -105,7 +120,9 @@ class ReplayedProcess:
             The message that it hears in this step, if it hears one.
         """
         node, entry = self.node, step.entry
-        if isinstance(entry, MessageReference | ReceivedMessage):
+        if (loss := _loss_of(entry)) is not None:
+            node.lost(loss._replace(key=self._root + loss.key), entry.at or 0.0)
+        elif isinstance(entry, MessageReference | ReceivedMessage):
             assert message is not None
             return self.hear(message, entry.at or 0.0)
         if isinstance(entry, Token):
@@ -145,6 +162,15 @@ class ReplayedProcess:
         self.node.take_actions()
         sent, self._sent.messages = self._sent.messages, []
         return sent
+
+
+def _loss_of(entry: Input) -> Loss | None:
+    """Return the messages that a process rejected in a step, if the record has their number alone."""
+    if isinstance(entry, RejectedCount) and entry.kind in KINDS:
+        return Loss(entry.key, entry.kind, "as recorded", entry.count)
+    if isinstance(entry, ReceivedMessage) and entry.rejected in UNREAD and not entry.payload:
+        return Loss(entry.key, entry.rejected, "as recorded", 1)  # records until 2026-11 have no number
+    return None
 
 
 def agent_again(

@@ -31,6 +31,7 @@ from scenarios.results.record import Recorder
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Listen, Log, Publish
+from wire.backlog import Loss
 from wire.codec import decode, encode
 from wire.keys import Keys
 from wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
@@ -119,6 +120,11 @@ class FakeClockRun:
     def freeze(self, name: str, seconds: float) -> None:
         """Let a process stand still for some time (s)."""
         self._frozen[name] = self.now + seconds
+
+    def lose(self, name: str, key: str, number: int) -> None:
+        """Have a process drop messages on a key (without `gridpeers/<run>/`) unread, as in a flood."""
+        self._nodes[name].lost(Loss(self.keys.prefix + key, "excess", "4000 messages were waiting", number), self.now)
+        self._work(name)
 
     def command(self, verb: Any, **further: Any) -> None:
         """Send the plant a command."""

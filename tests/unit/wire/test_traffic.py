@@ -10,12 +10,14 @@ from scenarios.record.journal_reader import entries_of
 from wire.codec import encode
 from wire.journal import (
     AT_ONCE,
+    COUNTED_KEYS,
     Entry,
     Exchange,
     JournalBuffer,
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
+    RejectedCount,
     SentMessage,
     Token,
     WakeUp,
@@ -197,12 +199,12 @@ def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
         traffic.received(KEYS.state("inv2"), STATE, 10.0 + 1e-4 * i, "")
     entries = noted(journal)
     kept = [entry for entry in entries if isinstance(entry, ReceivedMessage)]
-    lines = [entry.text for entry in entries if isinstance(entry, ProcessEvent)]
 
     assert REJECTED <= len(kept) <= REJECTED + 1.0 / REJECTED_INTERVAL + 1
     assert sum(isinstance(entry, MessageReference) for entry in entries) == 10_000
-    assert lines[0].startswith("rejected messages: garbled (")
-    assert lines[0].endswith(" more of this kind left out)")
+    (count,) = [entry for entry in entries if isinstance(entry, RejectedCount)]
+    assert (count.key, count.kind, len(kept) + count.count) == ("state/inv2", "garbled", 10_000)
+    assert 10.0 + 1e-4 * REJECTED == count.since < count.at <= 11.0
 
 
 def test_a_flood_of_rejected_messages_in_simulated_time_is_noted_tick_by_tick() -> None:
@@ -216,6 +218,35 @@ def test_a_flood_of_rejected_messages_in_simulated_time_is_noted_tick_by_tick() 
     entries = noted(journal)
 
     assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 2 * REJECTED_OF_TICK
-    assert [entry.text for entry in entries if isinstance(entry, ProcessEvent)] == [
-        f"{1_000 - REJECTED_OF_TICK} more rejected messages left out"
-    ] * 2
+    assert [entry for entry in entries if isinstance(entry, RejectedCount)] == [
+        RejectedCount(None, "state/inv2", "garbled", 2 * (1_000 - REJECTED_OF_TICK))
+    ]
+
+
+def test_messages_that_were_dropped_unread_are_noted_by_their_number() -> None:
+    """By key and kind, since the last call of the node; a part of the journal has one entry about each."""
+    traffic, journal = timed()
+    traffic.woken(9.0)
+    traffic.lost(KEYS.state("inv2"), "excess", 500, 9.5)
+    traffic.lost(KEYS.state("inv2"), "excess", 20, 9.7)
+    traffic.lost(KEYS.command, "oversized", 1, 9.7)
+
+    assert noted(journal) == [
+        WakeUp(9.0),
+        RejectedCount(9.7, "state/inv2", "excess", 520, 9.0),
+        RejectedCount(9.7, "command", "oversized", 1, 9.7),
+    ]
+    assert noted(journal) == []
+
+
+def test_a_journal_that_is_full_still_counts() -> None:
+    """What finds no room is what a flood brings; and keys are many only if somebody makes them up."""
+    journal = JournalBuffer()
+    for _ in range(2_000):
+        journal.add(ReceivedMessage(None, "state/inv2", bytes(1_000), "corrupt"))
+    for number in range(COUNTED_KEYS + 50):
+        journal.count(RejectedCount(1.0, f"state/{number}", "excess", 2, 1.0))
+    counts = [entry for entry in noted(journal) if isinstance(entry, RejectedCount)]
+
+    assert len(counts) == COUNTED_KEYS + 1
+    assert counts[-1] == RejectedCount(1.0, "", "excess", 100, 1.0)

@@ -14,7 +14,7 @@ from scenarios.record.message_index import MessageOnWire, on_wire
 from tests.toy.toy_configs import ALL_FULL, agent_config
 from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
 from wire.codec import encode
-from wire.journal import MessageReference, ReceivedMessage
+from wire.journal import MessageReference, ReceivedMessage, RejectedCount
 from wire.messages import OFF
 
 EVERY = decision(neighbour("inv2", 5), state=None)
@@ -77,24 +77,43 @@ def test_without_a_verdict_only_the_number_is_told() -> None:
     record = record_of(messages=messages)
 
     assert missed(record, EVERY, EVERY.neighbours[0], {}, {}) == "3 states since"
-    rejected = {"inv2": [(7, "ghost"), (4, "stale"), (-1, "corrupt")], "inv3": [(8, "ghost")]}
+    rejected = {"inv2": [(7, "ghost", 1), (4, "stale", 1), (-1, "corrupt", 1)], "inv3": [(8, "ghost", 1)]}
     text = missed(record, EVERY, EVERY.neighbours[0], {}, rejected)
     assert text == '3 states since: 1 rejected as "ghost", 1 rejected as "corrupt"'
     empty = record_of(messages=lambda *words, **more: iter(()))
     assert missed(empty, EVERY, EVERY.neighbours[0], {}, {}) == "no state since"
 
 
+def test_messages_that_were_dropped_unread_are_all_told() -> None:
+    """Nobody knows who sent them: as many as the neighbour sent may be its own, and late ones are older ones."""
+    record = record_of(messages=lambda *words, **more: iter(sent("inv2", 5, 6, 7)))
+    none = record_of(messages=lambda *words, **more: iter(()))
+    rejected = {"inv2": [(7, "ghost", 1), (-1, "excess", 500), (-1, "stale", 9)]}
+
+    text = missed(record, EVERY, EVERY.neighbours[0], {}, rejected)
+    assert text == (
+        '2 states since: 1 rejected as "ghost", 1 rejected as "excess"; 499 messages on its key rejected as "excess"'
+    )
+    text = missed(none, EVERY, EVERY.neighbours[0], {}, {"inv2": [(-1, "excess", 1)]})
+    assert text == 'no state since; 1 message on its key rejected as "excess"'
+
+
 def test_what_was_rejected_is_known_by_its_sender() -> None:
-    """States alone; one whose bytes are noted has no number that can be trusted."""
+    """States alone; one whose bytes are noted has no number that can be trusted, and many have one entry."""
     entries = [
         MessageReference(None, "state/inv2", 1, 5, "stale"),
         MessageReference(None, "state/inv2", 1, 6),
         ReceivedMessage(None, "state/inv3", b"noise", "corrupt"),
         ReceivedMessage(None, "command", b"noise", "corrupt"),
+        RejectedCount(1.0, "state/inv3", "excess", 12, 0.8),
+        RejectedCount(1.0, "command", "excess", 12, 0.8),
     ]
     record = record_of(entries=lambda agent, *, since, until: iter(entries))
 
-    assert rejections(record, "inv1", 0.0, 1.0) == {"inv2": [(5, "stale")], "inv3": [(-1, "corrupt")]}
+    assert rejections(record, "inv1", 0.0, 1.0) == {
+        "inv2": [(5, "stale", 1)],
+        "inv3": [(-1, "corrupt", 1), (-1, "excess", 12)],
+    }
 
 
 def test_each_reason_has_its_words() -> None:

@@ -15,9 +15,10 @@ from scenarios.replay.difference import Difference, message_difference, row_diff
 from scenarios.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
 from scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
 from scenarios.replay.replay_error import ReplayError
+from scenarios.replay.replayed_process import agent_again, message_of
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_plant import ISLANDING, ToyPlant
-from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, Token, WakeUp
+from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
 from wire.messages import Measurement, State, Telemetry
 
 STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=5e4, V_set=277.0, Q=1e3, shared={"w": 0.5})
@@ -156,6 +157,49 @@ def test_where_parts_of_a_journal_are_lost_its_steps_end(missing: int, told: str
 
     assert len(list(process.steps())) < count
     assert process.ends.startswith(f"the journal of inv1 {told} at t = ")
+
+
+@pytest.mark.parametrize(
+    ("entry", "counts"),
+    [
+        (RejectedCount(1001.0, "state/inv2", "excess", 500, 1000.9), {"excess": 500}),
+        (RejectedCount(1001.0, "state/inv2", "garbled", 7, 1000.9), {"garbled": 7}),
+        (RejectedCount(1001.0, "state/inv2", "of a later version", 7), {}),
+        (ReceivedMessage(1001.0, "state/inv2", b"", "excess"), {"excess": 1}),  # of records until 2026-11
+        (ReceivedMessage(1001.0, "measurement/inv1", b"", "corrupt"), {"corrupt": 1}),
+    ],
+)
+def test_what_was_rejected_unseen_is_rejected_again_by_its_number(
+    entry: RejectedCount | ReceivedMessage, counts: dict[str, int], record: RunRecord
+) -> None:
+    """As it was: a message that was dropped unread is no corrupt one, though it has no bytes here."""
+    (process, (start, *_)), *_ = steps_of(record, "inv1")
+    config = record.info.agent("inv1")
+    assert config is not None
+    again = agent_again(process, config, "a", [], None)
+    again.take(start)
+    step = RecordedStep(1001.0, entry, (), 0.1)
+
+    assert again.take(step, message_of(process, step)) == []
+    assert again.node.rejects.counts == counts
+
+
+def test_a_replay_counts_what_a_flood_had_dropped(tmp_path: Path) -> None:
+    """An agent tells the number with its status; so does the agent of the replay, and nothing else differs."""
+
+    def happens(run: FakeClockRun) -> None:
+        run.at(0.4, lambda: run.lose("inv1", "state/inv2", 5_000))
+
+    flooded = fake_clock_record(tmp_path / "case", happens=happens)
+    (entry,) = [each for each in flooded.entries("inv1") if isinstance(each, RejectedCount)]
+    ((_, steps),) = steps_of(flooded, "inv1")
+
+    assert (entry.key, entry.kind, entry.count) == ("state/inv2", "excess", 5_000)
+    assert entry.at is not None
+    assert entry.since is not None
+    assert 0.0 <= entry.at - entry.since < 0.05
+    assert [step.entry for step in steps if isinstance(step.entry, RejectedCount)] == [entry]
+    assert all(part.difference is None for of in parts_of(flooded).values() for part in of)
 
 
 # -------------------------------------------------------------------- differences
