@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import platform
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from netem.schema.change import Change, replayed
 from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
+from scenarios.live.ended_scenario import end_of
 from scenarios.live.live_folders import LIVE
 from scenarios.live.run_address import UsageError
 from scenarios.results.run_files import shown, write_whole
@@ -101,7 +101,7 @@ def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change]
     ages = msgspec.structs.replace(ages, max_age=ages.max_age or MAX_AGE)
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
-    end = max(scenario.time.end_s, round(math.ceil(needed / T_c - 1e-6) * T_c, 9))
+    end = max(scenario.time.end_s, end_of(needed, T_c))
     return msgspec.structs.replace(
         scenario,
         name="",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -14,6 +14,7 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
+from scenarios.live.ended_scenario import ended_scenario
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
 from scenarios.run import versions
@@ -40,6 +41,11 @@ class Folders:
         if self.whole is not None:
             set_complete(self.whole, filter(None, missing))
 
+    def write_end(self, scenario: ScenarioModel, ended: float) -> None:
+        """Write the scenario anew, as long as the run was, which ended at a run time (s)."""
+        if self.whole is not None:
+            _write_scenario(self.whole, *ended_scenario(scenario, ended))
+
     def broken(self, why: str) -> None:
         """Write to status.txt why the folder is not complete."""
         if self.whole is not None:
@@ -47,7 +53,7 @@ class Folders:
 
 
 AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
-"""For the head of its scenario."""
+"""For the head of its scenario, until it has ended."""
 
 
 @contextmanager
@@ -65,7 +71,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
     try:
-        write_whole(whole / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), [AS_BEGUN]))
+        _write_scenario(whole, scenario, [AS_BEGUN])
         (whole / "log").mkdir()
     except OSError as error:
         why = refusal(whole, error)
@@ -73,6 +79,10 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         raise FolderError(why) from None
     (case,) = scenario.cases
     yield Folders(whole / "log", whole / case, whole)
+
+
+def _write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]) -> None:
+    write_whole(folder / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), remarks))
 
 
 def live_record(

@@ -33,6 +33,10 @@ LawKey = str | dict[str, Any]
 """A control law: a registered name, `module:Class`, or a table with one of use, command, fmu, and parameters."""
 
 
+LONGEST_RUN = 3600.0
+"""Longest run of a scenario (s)."""
+
+
 class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[time]`: how long, and in which steps."""
 
@@ -41,7 +45,7 @@ class Time(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True
         Unit("s"),
         MultipleOf("T_c_s"),
         Label("end of the run"),
-        Plausible("the duration of a run", 0.001, 3600.0, above_zero=True),
+        Plausible("the duration of a run", 0.001, LONGEST_RUN, above_zero=True),
     ]
     """Duration of the run (s), a multiple of T_c_s."""
     T_c_s: Annotated[
@@ -145,7 +149,7 @@ class Event(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
     label: str
     """Name of the window in metrics.json, e.g. "event1"."""
-    t_s: Annotated[float, Unit("s"), Plausible("the time of an event", 0.0, 3600.0, above_zero=True)]
+    t_s: Annotated[float, Unit("s"), Plausible("the time of an event", 0.0, LONGEST_RUN, above_zero=True)]
     """When (s), a multiple of h_s, or of T_c_s if agents leave or join; after 0 and before end_s."""
     open: Annotated[tuple[str, ...], Example('["13-152"]')] = ()
     """Switches to open, e.g. ["13-152"]."""

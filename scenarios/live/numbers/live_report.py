@@ -145,6 +145,7 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> 
         return outcome
     try:
         show(write_report(metrics, outcome.recorded, outcome.pacing), Console())
+        folders.write_end(metrics.scenario, outcome.recorded.ended)
         folders.complete(outcome.recorded.record_failure)
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")
