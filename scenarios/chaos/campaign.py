@@ -49,12 +49,13 @@ class Campaign:
 
 @dataclass(frozen=True, kw_only=True)
 class Failure:
-    """One kind of failure: what is violated, and the simplest schedule found for it."""
+    """One kind of failure: what is violated, and the runs that show it."""
 
     violated: str
     row: ChaosRow
     """The run in which it was found, among those with the fewest disturbances."""
-    schedule: Schedule
+    simplest: ChaosRow
+    """The run of the simplest schedule found for it."""
     file: Path
 
 
@@ -89,7 +90,7 @@ class Summary:
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips"
         for failure in self.failures:
             yield f"{failure.violated}, run {failure.row.number}: {failure.row.violated[failure.violated]}"
-            yield from (f"    {it}" for it in sorted(failure.schedule, key=lambda it: it.begins_s))
+            yield from (f"    {it}" for it in sorted(failure.simplest.schedule, key=lambda it: it.begins_s))
             yield f"    {again(failure.file)}"
 
 
@@ -131,10 +132,10 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
                 tell(text, len(folder.rows), campaign.runs)
         _add_failures(failures, folder)
         with closing(_shrunk(campaign, tuple(failures.values()))) as simpler:
-            for i, (violated, schedule) in enumerate(simpler):
+            for i, (violated, simplest) in enumerate(simpler):
                 row = failures[violated].row
-                file = folder.write_failure(violated, row, schedule)
-                failures[violated] = Failure(violated=violated, row=row, schedule=schedule, file=file)
+                file = folder.write_failure(violated, row, simplest)
+                failures[violated] = Failure(violated=violated, row=row, simplest=simplest, file=file)
                 tell(f"shrinking, {i + 1} of {len(failures)} kinds of failure", i + 1, len(failures))
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
@@ -178,12 +179,12 @@ def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
     rows = sorted(folder.rows.values(), key=lambda row: (len(row.schedule), row.number))
     for violated in sorted({name for row in rows for name in row.violated} - failures.keys()):
         row = next(row for row in rows if violated in row.violated)
-        file = folder.write_failure(violated, row, row.schedule)
-        failures[violated] = Failure(violated=violated, row=row, schedule=row.schedule, file=file)
+        file = folder.write_failure(violated, row, row)
+        failures[violated] = Failure(violated=violated, row=row, simplest=row, file=file)
 
 
-def _shrunk(campaign: Campaign, failures: tuple[Failure, ...]) -> Generator[tuple[str, Schedule], None, None]:
-    """Yield for each failure the simplest schedule found."""
+def _shrunk(campaign: Campaign, failures: tuple[Failure, ...]) -> Generator[tuple[str, ChaosRow], None, None]:
+    """Yield for each failure the run of the simplest schedule found."""
     if not failures:
         return
     calls = [
@@ -198,5 +199,5 @@ def _driver(campaign: Campaign, violated: str) -> Driver:
     return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
 
 
-def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver) -> tuple[str, Schedule]:
+def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver) -> tuple[str, ChaosRow]:
     return violated, shrink_number(text, seed, number, violated, driver)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from scenarios.checks.check_registry import ALWAYS, check_name
+from scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
 from wire.plugins.plugin import table_of
 
 WITHIN_S = 4.0
@@ -29,9 +29,8 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
     "var_sharing": {"after_s": WITHIN_S, "with_killed": False},
     "rating": {"with_killed": False},
     "steady": {"after_s": WITHIN_S},
-    "stale_values": {},
 }
-"""Checks that are judged from the last change on, with their limits."""
+"""Checks that are judged from the last change, trip or return on, with their limits."""
 
 TAIL_S = 2.0
 """Tail of the run (s) in which nothing may oscillate any more."""
@@ -39,11 +38,10 @@ TAIL_S = 2.0
 _ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "oscillation": {"tail_s": TAIL_S}}
 """Other limits of checks that hold for the whole run; those that are not named here have their own."""
 
-_LATER = {"stale_values": LATEST_S}
-"""Time (s) by which a check is judged later than the last change."""
 
-
-def chaos_checks(own: Iterable[str | Mapping[str, Any]], settled_s: float) -> list[str | dict[str, Any]]:
+def chaos_checks(
+    own: Iterable[str | Mapping[str, Any]], changed_s: float, since_s: float
+) -> list[str | dict[str, Any]]:
     """Return the checks of a run with disturbances, as entries of its scenario.
 
     What the scenario itself says of a check stays: its limits, but for those above, and that it is off.
@@ -52,23 +50,29 @@ def chaos_checks(own: Iterable[str | Mapping[str, Any]], settled_s: float) -> li
     ----------
     own : Iterable[str | Mapping[str, Any]]
         Entries of the scenario.
-    settled_s : float
+    changed_s : float
         Run time of the last change (s).
+    since_s : float
+        Run time from which on a run is to be restored (s): the same, or later if inverters trip.
 
     Examples
     --------
-    >>> of = {check_name(it): it for it in chaos_checks([{"use": "steady", "off": True}, "mine:Calm"], 4.0)}
+    >>> of = {check_name(it): it for it in chaos_checks([{"use": "steady", "off": True}, "mine:Calm"], 4.0, 9.0)}
     >>> of["steady"], of["mine:Calm".partition(":")[2]], of["voltage"]["since_s"]
-    ({'use': 'steady', 'off': True}, 'mine:Calm', 4.0)
+    ({'use': 'steady', 'off': True}, 'mine:Calm', 9.0)
     """
     entries: dict[str, str | dict[str, Any]] = {}
     for entry in own:
         entries[check_name(entry)] = entry if isinstance(entry, str) else dict(entry)
+    limits_of: dict[str, Mapping[str, Any]] = {
+        **{name: {**limits, "since_s": round(since_s, 9)} for name, limits in _AFTER.items()},
+        "stale_values": {"since_s": round(changed_s + LATEST_S, 9)},
+        **_ALWAYS,
+    }
     for name in ALWAYS:
-        limits = dict(_ALWAYS.get(name, {}))
-        if name in _AFTER:
-            limits |= {**_AFTER[name], "since_s": round(settled_s + _LATER.get(name, 0.0), 9)}
+        limits = limits_of.get(name, {})
         given = table_of(entries.get(name, name))
         if limits and not given.get("off"):
-            entries[name] = given | limits
+            entries[name] = {**given, **limits}
+    entries.setdefault(RETURNS, RETURNS)
     return list(entries.values())

@@ -11,7 +11,6 @@ from pathlib import Path
 import msgspec
 
 from scenarios.chaos.chaos_run import ChaosRow, seed_of
-from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema.scenario_writing import to_toml
@@ -21,7 +20,7 @@ TABLE, FAILURES = "chaos.csv", "failures"
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
-    *("passed", "trips", "history_sha256", "links_sha256", "took_s"),
+    *("passed", "trips", "since_s", "history_sha256", "links_sha256", "took_s"),
 )
 
 
@@ -58,7 +57,7 @@ class ChaosFolder:
         rows = (self.rows[number] for number in sorted(self.rows))
         write_whole(self.path / TABLE, [_line(COLUMNS), *map(self._cells, rows)])
 
-    def write_failure(self, violated: str, row: ChaosRow, schedule: Schedule) -> Path:
+    def write_failure(self, violated: str, row: ChaosRow, simplest: ChaosRow) -> Path:
         """Write the scenario of a failure; return its file.
 
         Parameters
@@ -67,12 +66,13 @@ class ChaosFolder:
             Name of the check that fails, or of what else is asked.
         row : ChaosRow
             The run in which it was found.
-        schedule : Schedule
-            Its schedule, or what it was shrunk to.
+        simplest : ChaosRow
+            The same run, or that of what its schedule was shrunk to.
         """
         file = self.path / FAILURES / f"{violated}.toml"
         file.parent.mkdir(exist_ok=True)
         seed = seed_of(self._seed, row.number)
+        schedule = simplest.schedule
         fewer = len(schedule) < len(row.schedule)
         remarks = [
             f"Found by chaos: {row.violated[violated]}"[:300],
@@ -82,7 +82,9 @@ class ChaosFolder:
             *(f"  {disturbance}" for disturbance in sorted(schedule, key=lambda it: it.begins_s)),
         ]
         scenario = msgspec.structs.replace(
-            self._base.disturbed(schedule, seed), name=f"{self._base.scenario.name[:16]}-{violated}"[:31], title=""
+            self._base.disturbed(schedule, seed, simplest.since_s),
+            name=f"{self._base.scenario.name[:16]}-{violated}"[:31],
+            title="",
         )
         write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
         return file
@@ -92,7 +94,7 @@ class ChaosFolder:
             *(row.number, seed_of(self._seed, row.number), "violated" if row.violated else "passed"),
             *(" ".join(sorted(row.violated)), "; ".join(row.violated[name] for name in sorted(row.violated))),
             *(len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
-            *(" ".join(row.passed), row.trips, row.history_sha256, row.links_sha256, row.took_s),
+            *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
         )
         return _line(cells)
 

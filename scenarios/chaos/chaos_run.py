@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import gc
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
 from time import monotonic
 
 import msgspec
 
+from scenarios.chaos.chaos_checks import WITHIN_S
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase, base_of
 from scenarios.chaos.schedule_search import shrunk
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.record import Recorded
+from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
 from scenarios.run import BrokenRunError, Driver, Request, run_case, verdicts_on
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.sweep.sweep_case import plant_at_start
+from wire.messages import PlantEvent
 
 ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "ends",
@@ -32,6 +36,9 @@ links balance; it repeats to the byte; processes give the bytes of one process."
 
 ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES)
 """All of them."""
+
+LONGER_RUNS = 6
+"""Most times that a run with trips is done, each longer than the one before: after three trips inverters stay off."""
 
 COLLECTED = 10
 """Runs after which a worker looks for garbage: each leaves some ten MB in cycles."""
@@ -57,6 +64,8 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     """Of all verdicts of its emulated links."""
     trips: int = 0
     """Number of events in which inverters tripped."""
+    since_s: float = 0.0
+    """Run time (s) from which on it was to be restored: that of the last change, or later, as inverters tripped."""
     took_s: float = 0.0
     """Wall-clock time (s)."""
 
@@ -91,8 +100,8 @@ def run_number(text: str, seed: int, number: int, schedule: Schedule, driver: Dr
     return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver)
 
 
-def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driver) -> Schedule:
-    """Return the simplest schedule found that violates what a run violates.
+def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driver) -> ChaosRow:
+    """Return the run of the simplest schedule found that violates what a run violates.
 
     Parameters
     ----------
@@ -111,7 +120,7 @@ def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driv
         row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=violated == REPEATS)
         return violated in row.violated
 
-    return shrunk(base, seed, number, fails)
+    return run_schedule(base, shrunk(base, seed, number, fails), seed_of(seed, number), number, driver)
 
 
 def run_schedule(
@@ -143,12 +152,11 @@ def run_schedule(
     if number % COLLECTED == 0:
         gc.collect()
     began = monotonic()
-    scenario = base.disturbed(schedule, seed)
-    row = _judged(base, scenario, number, schedule, driver)
+    row = _once_restored(base, schedule, seed, number, driver)
     if driver == "processes":
-        row = compared(row, _judged(base, scenario, number, schedule, "inprocess"), SAME_IN_PROCESSES)
+        row = compared(row, _once_restored(base, schedule, seed, number, "inprocess"), SAME_IN_PROCESSES)
     if again:
-        row = compared(row, _judged(base, scenario, number, schedule, driver), REPEATS)
+        row = compared(row, _once_restored(base, schedule, seed, number, driver), REPEATS)
     return msgspec.structs.replace(row, took_s=round(monotonic() - began, 3))
 
 
@@ -170,12 +178,41 @@ def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:
 
 def run_scenario(base: ChaosBase, driver: Driver = "inprocess") -> ChaosRow:
     """Run the scenario of a base as it stands, and judge it by its own checks."""
-    return _judged(base, base.scenario, 0, (), driver)
+    return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver)[0]
 
 
-def _judged(base: ChaosBase, scenario: ScenarioModel, number: int, schedule: Schedule, driver: Driver) -> ChaosRow:
-    """Run a scenario once in a temporary folder."""
-    row = ChaosRow(number=number, schedule=schedule)
+def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float:
+    """Return the run time (s) from which on a run with trips is to be restored; 0 for one without.
+
+    It is that of the last trip or return. While inverters are off, it is later by the time in which voltage and
+    frequency are to become normal, and by that for which they must be.
+
+    Parameters
+    ----------
+    events : Iterable[PlantEvent]
+        Events of the plant.
+    enter_service_s : float
+        How long voltage and frequency must be normal before an inverter returns (s).
+    """
+    events = tuple(events)
+    last = max((event.t for event in events if event.kind == "trip"), default=0.0)
+    return round(last + (WITHIN_S + enter_service_s if tripped_inverters(events) else 0.0), 9)
+
+
+def _once_restored(base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver) -> ChaosRow:
+    """Run a scenario with a schedule; if inverters trip, again and so long that they are judged after their return."""
+    since_s = base.changed_s(schedule)
+    for _ in range(LONGER_RUNS):
+        row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
+        row, restored_s = _judged(base, base.disturbed(schedule, seed, since_s), row, driver)
+        if restored_s <= since_s:
+            break
+        since_s = restored_s
+    return row
+
+
+def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver) -> tuple[ChaosRow, float]:
+    """Run a scenario once in a temporary folder; return its result, and from when on it is to be restored (s)."""
     with tempfile.TemporaryDirectory(prefix="gridpeers-chaos-") as folder:
         request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=Path(folder), lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
@@ -184,10 +221,11 @@ def _judged(base: ChaosBase, scenario: ScenarioModel, number: int, schedule: Sch
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
             verdicts = verdicts_on(request, base.case, record, recorded.events)
         except BrokenRunError as error:
-            return msgspec.structs.replace(row, violated={ENDS: str(error)})
+            return msgspec.structs.replace(row, violated={ENDS: str(error)}), 0.0
         except Exception as error:
-            return msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"})
-        return _with_verdicts(row, recorded, verdicts)
+            return msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}), 0.0
+        restored_s = restored_from(recorded.events, scenario.protection.enter_service)
+        return _with_verdicts(row, recorded, verdicts), restored_s
 
 
 def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:
@@ -208,7 +246,7 @@ def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdi
         violated=violated,
         history_sha256=recorded.sha256,
         links_sha256=recorded.links.sha256,
-        trips=sum(event.kind == "trip" for event in recorded.events),
+        trips=sum(bool(tripped_by(event)) for event in recorded.events),
     )
 
 

@@ -84,8 +84,21 @@ class ChaosBase:
         ends = [fault.from_s if fault.to_s is None else fault.to_s for fault in faults]
         return max([*ends, *(event.t_s for event in self.scenario.events)], default=0.0)
 
-    def disturbed(self, schedule: Schedule, seed: int) -> ScenarioModel:
+    def changed_s(self, schedule: Schedule) -> float:
+        """Return the run time (s) of the last change with a schedule."""
+        return max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
+
+    def disturbed(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> ScenarioModel:
         """Return the scenario with a schedule that `is_possible`, and with a seed.
+
+        Parameters
+        ----------
+        schedule : Schedule
+            The disturbances.
+        seed : int
+            Seed of the messages' fates.
+        since_s : float, optional
+            Run time (s) from which on it is to be restored, if that is later than the last change.
 
         Raises
         ------
@@ -93,7 +106,7 @@ class ChaosBase:
             If the schedule is not possible, with the reasons.
         """
         problems = Problems("chaos")
-        scenario, _ = check_tables(self._tree(schedule, seed), Path("chaos.toml"), problems, _read_feeder)
+        scenario, _ = check_tables(self._tree(schedule, seed, since_s), Path("chaos.toml"), problems, _read_feeder)
         problems.raise_if_any()
         return scenario
 
@@ -120,14 +133,14 @@ class ChaosBase:
                 kept = (*kept, disturbance)
         return kept
 
-    def _tree(self, schedule: Schedule, seed: int) -> dict[str, Any]:
+    def _tree(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> dict[str, Any]:
         """Return the tables of the scenario with a schedule."""
-        settled = max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
-        T_c = self.scenario.time.T_c_s
-        end = round(ceil((settled + WITHIN_S + JUDGED_S) / T_c - 1e-6) * T_c, 9)
+        changed, T_c = self.changed_s(schedule), self.scenario.time.T_c_s
+        since = max(changed, since_s)
+        end = round(ceil((since + WITHIN_S + JUDGED_S) / T_c - 1e-6) * T_c, 9)
         tree: dict[str, Any] = {**self.tree, "seed": seed}
         tree["time"] = self.tree["time"] | {"end_s": end}
-        tree["checks"] = chaos_checks(self.scenario.checks, settled)
+        tree["checks"] = chaos_checks(self.scenario.checks, changed, since)
         tree["event"] = merged_events(self.tree.get("event", []), schedule)
         for table in ("link", "partition", "node"):
             added = [dict(it.entry) for it in sorted(schedule, key=lambda it: it.begins_s) if it.table == table]

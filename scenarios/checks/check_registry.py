@@ -35,6 +35,7 @@ _PLACES = {
     "oscillation": "physics.oscillation_check:Oscillation",
     "steady": "physics.steady_check:SteadyEnd",
     "power_balance": "physics.balance_check:PowerBalance",
+    "returns": "physics.return_check:Returned",
     "message_account": "communication.account_check:MessageAccount",
     "heal": "communication.heal_check:Rejoined",
     "stale_values": "communication.stale_check:StaleValues",
@@ -49,7 +50,10 @@ CHECKS: Registry[Any] = Registry(
 )
 """Checks by name; those of gridpeers come first."""
 
-ALWAYS = tuple(CHECKS.own)
+RETURNS = "returns"
+"""Judges a run whose scenario asks for it: many end before an inverter that trips may return."""
+
+ALWAYS = tuple(name for name in CHECKS.own if name != RETURNS)
 """Checks that judge every run, unless its scenario switches one off."""
 
 

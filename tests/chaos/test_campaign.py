@@ -86,7 +86,7 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
     again, _ = load_scenario(failure.file)
 
     assert failure.violated == "frequency"
-    assert 1 <= len(failure.schedule) <= 3 < len(failure.row.schedule)
+    assert 1 <= len(failure.simplest.schedule) <= 3 < len(failure.row.schedule)
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
 

@@ -1,0 +1,33 @@
+"""Check of returns: inverters that have tripped are in service again at the end of a run."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+
+from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+
+
+class Returned:
+    """At the end of the run, every inverter that has tripped is in service again, unless its agent had it leave.
+
+    A run must be long enough for that: an inverter returns `protection.enter_service_s` after voltage and frequency at
+    its terminals have become normal. After three trips it stays off.
+    """
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield the inverters that are off, the first to trip first: how often each has tripped, and its last cause."""
+        trips = Counter(name for event in case.events for name in tripped_by(event))
+        if not trips:
+            raise NotJudgedError("no inverter tripped")
+        off = tripped_inverters(case.events)
+        for name in sorted(off.keys() & set(case.history.inverters), key=lambda name: (off[name].t, name)):
+            yield Violation(
+                text=f"not back in service, {off[name].text}",
+                t=off[name].t,
+                agent=name,
+                value=trips[name],
+                unit="trips",
+            )
