@@ -6,6 +6,7 @@ import numpy as np
 
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.error import NoSolutionError
+from plant.dynamics.foreseen_cache import ForeseenCache
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.controller_pass import Units
 from plant.dynamics.kernel.solve import solve_network
@@ -19,9 +20,6 @@ TOLERANCE = 1e-11
 
 WORTH = 40
 """Iterations of a network solution that cost as much time as new sparse factors."""
-
-KEPT = 64
-"""Number of factored networks to keep, 1 MB each: enough for all scheduled ones, and a bound for many switchings."""
 
 
 class LiveNetwork:
@@ -49,8 +47,8 @@ class LiveNetwork:
 
     def __init__(self, circuit: Circuit, inverters: Inverters) -> None:
         self._inverters = inverters
-        self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
-        self._unsourced: dict[Circuit, Circuit] = {}
+        self._reductions: ForeseenCache[tuple[Circuit, bytes], Reduction] = ForeseenCache()
+        self._unsourced: ForeseenCache[Circuit, Circuit] = ForeseenCache()
         self.substation_on = True
         """Whether the ideal sources are connected; `plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
@@ -63,21 +61,16 @@ class LiveNetwork:
         self._excess = 0
         self._parts: IslandParts | None = None
 
-    def reduced(self, circuit: Circuit) -> Reduction:
-        """Factor a circuit, once; call it ahead of a scheduled event to save this work in the event's step."""
+    def reduced(self, circuit: Circuit, *, foreseen: bool = False) -> Reduction:
+        """Factor a circuit, once; call it ahead of a scheduled event (`foreseen`) to save this work in its step."""
         units = self._inverters
         if not self.substation_on:
-            if circuit not in self._unsourced:
-                if len(self._unsourced) == KEPT:
-                    del self._unsourced[next(iter(self._unsourced))]
-                self._unsourced[circuit] = circuit.without_source()
-            circuit = self._unsourced[circuit]
-        key = circuit, units.connected.tobytes()
-        if key not in self._reductions:
-            if len(self._reductions) == KEPT:
-                del self._reductions[next(iter(self._reductions))]
-            self._reductions[key] = reduce_network(circuit, units.y_f, units.forming, units.connected)
-        return self._reductions[key]
+            circuit = self._unsourced.get(circuit, circuit.without_source, foreseen=foreseen)
+        return self._reductions.get(
+            (circuit, units.connected.tobytes()),
+            lambda: reduce_network(circuit, units.y_f, units.forming, units.connected),
+            foreseen=foreseen,
+        )
 
     def change(self, circuit: Circuit) -> None:
         """Take another circuit, or the same with other connected inverters; call `solve` next."""

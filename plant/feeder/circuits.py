@@ -6,15 +6,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from plant.dynamics import Circuit, PlantError
+from plant.dynamics.foreseen_cache import ForeseenCache
 from plant.network import Network
 from plant.network.loads import LoadBranches
 
-KEPT = 64
-"""Number of circuits to keep: enough for all scheduled ones, and a bound for many changes of loads."""
-
 
 class Circuits:
-    """A feeder's circuits; each is made at the first call for its switches and loads, and then kept.
+    """A feeder's circuits; each is made at the first call for its switches and loads, and kept as in `ForeseenCache`.
 
     Parameters
     ----------
@@ -26,26 +24,24 @@ class Circuits:
         self._network = network
         self._loads = {network: network.loads()}
         """Load branches of each network of which circuits are kept: one for each state of the loads."""
-        self._made: dict[tuple[Network, frozenset[str]], Circuit] = {}
+        self._made: ForeseenCache[tuple[Network, frozenset[str]], Circuit] = ForeseenCache()
 
     def change_loads(self, network: Network) -> None:
         """Go on with the same network with other loads."""
         self._network = network
 
-    def of(self, closed: frozenset[str], network: Network | None = None) -> Circuit:
+    def of(self, closed: frozenset[str], network: Network | None = None, *, foreseen: bool = False) -> Circuit:
         """Return the circuit with these switches closed, with the present loads or with those of another network.
+
+        One that is `foreseen`, for an event to come, stays.
 
         Raises
         ------
         PlantError
             If ideal devices tie an inverter to another: their sharing would be undetermined.
         """
-        key = (self._network if network is None else network), closed
-        if key not in self._made:
-            if len(self._made) == KEPT:
-                del self._made[next(iter(self._made))]
-            self._made[key] = circuit_of(key[0], closed, self._loads_of(key[0]))
-        return self._made[key]
+        of = self._network if network is None else network
+        return self._made.get((of, closed), lambda: circuit_of(of, closed, self._loads_of(of)), foreseen=foreseen)
 
     def _loads_of(self, network: Network) -> LoadBranches:
         """Return the load branches of a network."""

@@ -128,7 +128,7 @@ class Plant:
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # scheduled networks are factored now: in wall-clock time an event must not be late
         for circuit in self._foreseen():
-            self._dynamics.network.reduced(circuit)
+            self._dynamics.network.reduced(circuit, foreseen=True)
 
     def load_step(self) -> None:
         """Compile or load the inner loop now; else the first `advance` does, which takes seconds in its first use."""
@@ -284,7 +284,7 @@ class Plant:
         loaded = dict(self._loads.foreseen())
         for step in sorted({*switched, *loaded}):
             closed, network = switched.get(step, closed), loaded.get(step, network)
-            yield self._circuits.of(closed, network)
+            yield self._circuits.of(closed, network, foreseen=True)
 
     def _change_network(self, step: int) -> None:
         """Change the loads and operate the switches of this step, all at once."""

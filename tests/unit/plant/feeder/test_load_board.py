@@ -9,6 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from plant.dynamics import live_network
+from plant.dynamics.foreseen_cache import ROOM
 from plant.equipment.load_powers import set_power
 from plant.equipment.named_loads import named_loads, with_powers
 from plant.feeder import Plant
@@ -253,3 +254,28 @@ def test_all_models_of_load_are_scaled(network: Network) -> None:
             for network in (whole, less)
         ]
         np.testing.assert_allclose(drawn[1], 0.5 * drawn[0], atol=1e-9)
+
+
+def test_loads_set_by_hand_do_not_push_out_what_an_event_to_come_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In wall-clock time an event must not be late, so its network is factored at the start, and stays."""
+    made = []
+
+    def reduce_network(*arguments: Any) -> Any:
+        made.append(arguments[0])
+        return original(*arguments)
+
+    original = live_network.reduce_network
+    monkeypatch.setattr(live_network, "reduce_network", reduce_network)
+    back = LoadEvent(t=2.0, load="48", setting=LoadSetting(factor=1.0))
+    later = replace(ISLANDED, t=2.0)
+    p = plant("microgrid123", later, loads=(LoadEvent(t=1.9, load="48", setting=LoadSetting(factor=1.3)), back))
+    at_start = len(made)
+    for number in range(ROOM + 2):
+        p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * (number + 1)))
+        p.advance()
+    by_hand = len(made) - at_start
+    run(p, 2.1 - p.tick * T_C)
+
+    assert (at_start, by_hand) == (3, ROOM + 2)
+    assert len(made) == at_start + by_hand
+    assert [event.t for event in p.take_events() if event.kind == "switch"] == [2.0]
