@@ -12,6 +12,7 @@ import pandas as pd
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.running import read
 from gridpeers.runs.showing import shown_in_notebooks
+from scenarios.results.findings import SHARED
 from scenarios.schema.scenario_errors import ScenarioError
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import flatten
@@ -20,6 +21,9 @@ from wire.driver.command_line import command_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+OF_ISLAND = ", island "
+"""Between a metric and the first inverter of the island that it is of, in a table."""
 
 RunSource = Result | Results | str | Path
 """A result, results of several cases, or the folder of either."""
@@ -88,7 +92,10 @@ class Comparison:
 
     @cached_property
     def table(self) -> pd.DataFrame:
-        """Metrics of both and their difference (second minus first), a row per (window, metric), or (case, ...)."""
+        """Metrics of both and their difference (second minus first), a row per (window, metric), or (case, ...).
+
+        What is shared has a row for each island where a window has several, e.g. "MPSI, island inv4".
+        """
         frames = {case: _table(*pair, self.names) for case, pair in self._pairs.items()}
         if list(frames) == [""]:
             return frames[""]
@@ -133,13 +140,32 @@ class Comparison:
 
 
 def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
-    """Return the metrics of one pair of cases; windows that one of them lacks are nan there."""
-    columns = [run.metrics.drop(columns="reasons").stack(future_stack=True) for run in (a, b)]
-    frame = pd.concat(columns, axis=1, keys=names, sort=False)
+    """Return the metrics of one pair of cases; windows and islands that one of them lacks are nan there."""
+    frame = pd.concat([_column(run) for run in (a, b)], axis=1, keys=names, sort=False)
     frame.index.names = ["window", "metric"]
+    both = set(a.islands.index.get_level_values("window")) & set(b.islands.index.get_level_values("window"))
+    frame = frame.loc[[row for row in _in_order(frame.index) if not (row[0] in both and row[1] in SHARED)]]
     frame["difference"] = frame[names[1]] - frame[names[0]]
     frame.attrs["units"] = dict(a.metrics.attrs["units"])
     return frame
+
+
+def _column(run: Result) -> pd.Series:
+    """Return the metrics of one case by window and metric; after those of the whole, what each island shares."""
+    whole = run.metrics.drop(columns="reasons").stack(future_stack=True)
+    islands = {
+        (window, f"{name}{OF_ISLAND}{island}"): row[name]
+        for (window, island), row in run.islands.iterrows()
+        for name in SHARED
+    }
+    return pd.concat([whole, pd.Series(islands, dtype=float)]) if islands else whole
+
+
+def _in_order(rows: pd.MultiIndex) -> list[tuple[str, str]]:
+    """Return the rows of a table with those of islands below the row of their metric."""
+    windows = list(dict.fromkeys(window for window, _ in rows))
+    metrics = list(dict.fromkeys(metric.partition(OF_ISLAND)[0] for _, metric in rows))
+    return sorted(rows, key=lambda row: (windows.index(row[0]), metrics.index(row[1].partition(OF_ISLAND)[0])))
 
 
 def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:

@@ -134,7 +134,7 @@ def _record(run: RecordSource) -> RunRecord:
 
 MISSING = (
     "-: no number: not steady at the end of the window, or never restored (f, and MPSI where it counts); metrics.json "
-    "has the reasons"
+    "has the reasons. Where there are several islands, each shares for itself and has rows of its own"
 )
 """Line below a table in which numbers are missing."""
 
