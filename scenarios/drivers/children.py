@@ -28,6 +28,9 @@ LAST_LINES = 12
 GRACE = 2.0
 """Time (s) that processes have to leave after SIGTERM."""
 
+HEAD_START = 2.0
+"""Longest time (s) for which a plant that is asked to leave is waited for before the agents are asked, too."""
+
 
 class Child:
     """One started process.
@@ -171,9 +174,16 @@ class Children:
     def end(self) -> None:
         """End all: ask, wait a short while, then kill. By process id, never by name."""
         try:
-            # The plant first: an agent that ends before it is an inverter that leaves the network.
-            for child in sorted(self.running(), key=lambda child: child.name != PLANT):
+            # The plant first, and gone: an agent that is asked while its plant is there leaves the network.
+            plants = [child for child in self.running() if child.name == PLANT]
+            for child in plants:
                 child.signal(signal.SIGTERM)
+            gone_by = monotonic() + HEAD_START
+            for child in plants:
+                child.join(gone_by)
+            for child in self.running():
+                if child not in plants:
+                    child.signal(signal.SIGTERM)
             self.wait(GRACE)
         finally:  # a second Ctrl-C shortens the wait and nothing else
             for child in self.running():

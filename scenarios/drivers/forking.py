@@ -22,7 +22,7 @@ AVAILABLE = sys.platform == "linux"
 """Whether this system has what forking needs; elsewhere every process is started anew."""
 
 
-PATIENCE = 5.0
+PATIENCE = 15.0
 """Longest wait (s) for a new process: the plant's server imports for 1 s, but where its step is cached for another
 processor it would compile for a minute, without a word and deaf to Ctrl-C."""
 

@@ -26,8 +26,8 @@ from wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, T
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
 
-LEAVING = 2.5
-"""Time (s) that processes have to close at the end by themselves."""
+LEAVING = 10.0
+"""Time (s) that processes have to close at the end by themselves; most take 0.1 s, on a busy machine some take 3 s."""
 
 AFTERMATH = 0.3
 """The same when the run broke: processes that die of it do so in this time, the others are ended."""
