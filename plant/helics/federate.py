@@ -27,8 +27,11 @@ FAREWELL = 3.0
 
 BEFORE = "before t = 0"
 
-ASK = 1.5
-"""Longest wait (s) for the answer where the others are."""
+ASK = 5.0
+"""Longest wait (s) for the answer where the others are; it comes at once, but for a busy machine."""
+
+LATER = 3.0
+"""Time (s) for which the process is heard out once its own wait for the broker is over."""
 
 
 class HelicsError(RuntimeError):
@@ -73,6 +76,7 @@ class HelicsFederate:
                 "wait": 0.9 * deadline,
             },
             late,
+            deadline + LATER,
         )
 
     def begin(
