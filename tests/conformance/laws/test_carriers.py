@@ -76,7 +76,7 @@ def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp
 
 def test_an_fmu_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None:
     """A scenario gives them as those of any law; an unknown one is told with what there is."""
-    slower = written({**fmu, "k_p": 0.0014})
+    slower = written({**fmu, **PATIENT, "k_p": 0.0014})
 
     assert slower.sha256 == gp.load("islanding").replace({"gains.k_p": 0.0014, **SHORT}).run("IV").sha256
     with pytest.raises(gp.ScenarioError, match=re.escape('case.IV.law.k_pp: unknown parameter; did you mean "k_p"?')):

@@ -11,7 +11,7 @@ import pytest
 
 import gridpeers as gp
 from tests.conformance.laws.law_runs import SHORT, islanding, written
-from tests.conformance.laws.test_carriers import PROGRAM
+from tests.conformance.laws.test_carriers import PATIENT, PROGRAM
 
 BAD = "tests.conformance.laws.bad_laws"
 
@@ -59,8 +59,8 @@ def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) ->
 ])  # fmt: skip
 def test_a_program_that_fails_is_named_and_leaves_no_process(failure: str, said: str) -> None:
     """Rubbish, a wrong answer, an error of its own, death or silence."""
-    law = {"command": [*PROGRAM["command"], failure], "time_limit_s": 0.5}
-    result = written(law)
+    limit = {"time_limit_s": 0.5} if failure == "hangs" else PATIENT
+    result = written({"command": [*PROGRAM["command"], failure], **limit})
     told = list(result.events[result.events["kind"] == "law"]["text"])
 
     assert len(told) == 9
