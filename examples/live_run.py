@@ -35,7 +35,7 @@ with tempfile.TemporaryDirectory() as parent:
             gridpeers("stop", "inv2")
             gridpeers("status")
             gridpeers("down")
-            run.communicate(timeout=30)
+            run.communicate(timeout=90)  # its report takes some seconds
         finally:
             run.terminate()
 

@@ -15,8 +15,8 @@ from types import TracebackType
 
 from tests.command_line import invoke
 
-DEADLINE = 40.0
-"""Longest wait (s) for any line; on an idle machine all come within 3 s."""
+DEADLINE = 80.0
+"""Longest wait (s) for any line, of a command that runs; on an idle machine all come within 3 s."""
 
 LIMIT = 512 * 1024
 """Greatest size (bytes) of any file: the plant's compiled loop fits, the history of 7 s does not."""
@@ -87,6 +87,14 @@ class Terminal:
                 if over or not self._news.wait(end - monotonic()):
                     why = "it has ended" if over else f"not within {deadline:g} s"
                     raise AssertionError(f"{self}: no line with {pattern!r}: {why}. It printed:\n{self.text}")
+
+    def shows(self, text: str, deadline: float = DEADLINE) -> None:
+        """Wait until a text stands anywhere in what it has printed."""
+        end = monotonic() + deadline
+        with self._news:
+            while text not in self.text:
+                waits = self._reader.is_alive() and self._news.wait(end - monotonic())
+                assert waits or text in self.text, f"{self}: no {text!r}. It printed:\n{self.text}"
 
     def signal(self, number: int) -> None:
         """Send a signal to the process."""

@@ -1,4 +1,4 @@
-"""Fill the disk under runs, and read what they leave behind: ``python -m tests.record.full_disk``.
+"""Fill the disk under runs, and read what they leave behind: ``python -m tests.record.full_disk [KIND ...]``.
 
 Every run writes into a small file system in memory, in a namespace of its own (``unshare``, Linux), and another file
 fills it under way: down to a little room, which the run's other files get, or to none at all.
@@ -63,15 +63,15 @@ class Kind(NamedTuple):
     """Begin of its status at the end."""
 
 
-def kinds() -> list[Kind]:
-    """Return the runs: each clock with a little room and with none, and a live one."""
+def kinds() -> dict[str, Kind]:
+    """Return the runs by name: each clock with a little room and with none, and a live one."""
     found = []
     for room, status in ((LITTLE, "complete: "), (0, "broken: ")):
         for clock in ("simulated", "wall"):
             words = ("run", "calm.toml", "--clock", clock)
             found.append(Kind(f"{clock}, {room / 1e6:g} MB left", words, room, status))  # type: ignore[arg-type]
     live = ("up", "calm.toml", "--run", "full", "--listen", free_endpoint(), "--for", "6")
-    return [*found, Kind("live, 0 MB left", live, 0, "broken: ")]
+    return {kind.name: kind for kind in (*found, Kind("live, 0 MB left", live, 0, "broken: "))}
 
 
 def has_namespaces() -> bool:
@@ -134,11 +134,13 @@ def check(kind: Kind, folder: Path, printed: str, code: int) -> str:
 
 
 def main() -> None:
-    """Run all kinds in a namespace of its own."""
+    """Run some kinds, all if none is named, in a namespace of its own."""
     if sys.argv[1:2] != [INSIDE]:
-        os.execvp(OWN_NAMESPACE[0], [*OWN_NAMESPACE, sys.executable, "-m", "tests.record.full_disk", INSIDE])
+        words = [sys.executable, "-m", "tests.record.full_disk", INSIDE, *sys.argv[1:]]
+        os.execvp(OWN_NAMESPACE[0], [*OWN_NAMESPACE, *words])
+    known = kinds()
     with tempfile.TemporaryDirectory() as name:
-        for number, kind in enumerate(kinds()):
+        for number, kind in enumerate(known[each] for each in sys.argv[2:] or known):
             disk = Path(name) / f"disk{number}"
             try:
                 print(filled(kind, disk, Path(name) / f"kept{number}"), flush=True)

@@ -1,4 +1,4 @@
-"""An intruder on a host of its own: ``python -m tests.security.intrude ENDPOINT RUN KEYS NAME ATTACK``.
+"""An intruder on a host of its own: ``python -m tests.security.intrude ENDPOINT RUN KEYS NAME ATTACK SECONDS``.
 
 It asks the plant a question, attacks in the run's present epochs and time, and asks again. It prints "kept out" once
 the second answer has come, which proves that the plant has had the attack's bytes before; "no access" if no answer
@@ -19,14 +19,13 @@ from wire.messages import Answer, Command, Measurement, Message, Nameplate, Stat
 LIE = 12345.0
 """Set-point (W) that no honest agent has."""
 
-LONGEST = 8.0
-"""Wait (s) for an answer; those that come take 0.2 s."""
-
 
 class Attacker:
     """What an intruder knows, and what it says."""
 
-    def __init__(self, intruder: Intruder, run: str) -> None:
+    def __init__(self, intruder: Intruder, run: str, longest: float) -> None:
+        self._longest = longest
+        """Wait (s) for an answer; those that come take 0.2 s on an idle machine."""
         self._session, self._intruder, self._keys = intruder.session, intruder, Keys(run)
         self._own, self._stolen = self._keys.answer(self._session.id), self._keys.answer("z1")
         self._epochs: dict[str, int] = {}
@@ -38,7 +37,7 @@ class Attacker:
     def ask(self, lies: list[tuple[str, Message]]) -> Answer | None:
         """Say lies and ask for the plant's status, again and again; return its answer, None if none comes in time."""
         question = Command(sender="visitor", epoch=0, seq=2, t=0.0, verb="status", reply_to=self._session.id)
-        end = monotonic() + LONGEST
+        end = monotonic() + self._longest
         while monotonic() < end:
             self._intruder.says(*lies, (self._keys.request, question))
             answer = None
@@ -84,11 +83,11 @@ class Attacker:
         return [(keys.command, Command(sender="visitor", epoch=0, seq=1, t=0.0, verb="down", reply_to="z1"))]
 
 
-def main(endpoint: str, run: str, folder: str, name: str, attack: str) -> str:
+def main(endpoint: str, run: str, folder: str, name: str, attack: str, longest: str) -> str:
     """Attack; return what came of it."""
     shown = None if folder == "-" else credentials(Path(folder), name)
     with Intruder(endpoint, shown) as intruder:
-        attacker = Attacker(intruder, run)
+        attacker = Attacker(intruder, run, float(longest))
         known = attacker.ask([])
         answer = known
         for _ in range(2):

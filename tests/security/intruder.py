@@ -20,7 +20,7 @@ from wire.trust.credentials import Credentials
 from wire.trust.key_folder import open_credentials
 from wire.trust.member import ROLES
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """Longest wait (s) for anything."""
 
 

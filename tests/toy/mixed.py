@@ -55,7 +55,7 @@ class Mixed(ProcessRun):
         try:
             outcome = super().__call__(**more)
             for process in self.foreigners:
-                process.wait(timeout=10.0)
+                process.wait(timeout=60.0)
             return outcome
         finally:
             for process in self.foreigners:

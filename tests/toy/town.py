@@ -23,6 +23,7 @@ from wire.codec import RejectedError, decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys
 from wire.messages import (
+    PLANT,
     AgentStatus,
     Answer,
     Command,
@@ -34,8 +35,11 @@ from wire.messages import (
     Telemetry,
 )
 
-PATIENCE = 20.0
-"""Longest wait (s) for anything; a busy machine is slow, and nothing here should take a tenth of it."""
+PATIENCE = 60.0
+"""Longest wait (s) for anything; a busy machine is slow, and nothing here should take a thirtieth of it.
+
+A plant that ends by itself with an error ends the wait at once.
+"""
 
 
 class Town:
@@ -115,6 +119,7 @@ class Town:
             self.plant_config, self.agent_configs.values(), folder, self._ended, plant_command=plant_command
         )
         self.children = self.supervisor.children
+        self._signalled: set[int] = set()
         self.status: dict[str, AgentStatus] = {}
         self.states: dict[str, State] = {}
         self.events: list[PlantEvent] = []
@@ -177,6 +182,7 @@ class Town:
 
     def signal(self, name: str, number: int) -> None:
         """Send a signal to the process of a name."""
+        self._signalled.add(self.children[name].pid)
         self.children[name].signal(number)
 
     def command(self, verb: Any, argument: str | dict[str, Any] = "") -> Answer:
@@ -201,9 +207,18 @@ class Town:
         while not condition():
             left = end - monotonic()
             assert left > 0.0, f"not within {patience:g} s: {what}; {self}"
-            for kind, key, payload, _ in self.session.inbox.take(1, left):
+            broke = self._plant_broke()  # asked before the last messages are taken, of which one may be awaited
+            events = self.session.inbox.take(1, 1.0 if broke else left)
+            for kind, key, payload, _ in events:
                 self._take(kind, key, payload)
+            assert events or not broke or condition(), f"{broke}\nIn vain: {what}; {self}"
         return self
+
+    def _plant_broke(self) -> str:
+        """Return how the plant ended by itself with an error; empty if it did not."""
+        plants = [child for child in self.children if child.name == PLANT]
+        ended = not plants or plants[-1].status in (None, 0) or plants[-1].pid in self._signalled
+        return "" if ended else plants[-1].report(f"after t = {self.t:g} s")
 
     def was_put_off(self) -> bool:
         """Whether the plant tells that its schedule was put off."""

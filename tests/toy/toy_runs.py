@@ -13,7 +13,7 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.process_driver import run_processes
 from tests.toy import toy_plant
-from wire.messages import Telemetry
+from wire.messages import PlantEvent, Telemetry
 
 TOY = (toy_plant.__file__,)
 """Command of the toy plant's process."""
@@ -36,9 +36,19 @@ class ProcessRun:
     def __init__(self, plant: PlantConfig, agents: Sequence[AgentConfig], log_dir: Path) -> None:
         self.plant, self.agents, self.log_dir = plant, agents, log_dir
         self.rows: Rows = []
+        self.events: list[PlantEvent] = []
         self.children: Children | None = None
         self.pids: list[int] = []
         self._at: list[tuple[float, Callable[[], None]]] = []
+        self._steps: list[tuple[Callable[[], bool], Callable[[], None]]] = []
+
+    def once(self, condition: Callable[[], bool], do: Callable[[], None]) -> None:
+        """Do something as soon as a condition on rows and events holds, after what earlier calls of this do."""
+        self._steps.append((condition, do))
+
+    def time_of(self, text: str) -> float:
+        """Run time (s) of the last event with a text in it; infinite if there is none."""
+        return next((event.t for event in reversed(self.events) if text in event.text), float("inf"))
 
     def at(self, t: float, do: Callable[[], None]) -> None:
         """Do something as soon as telemetry of t (s) or later is in."""
@@ -52,7 +62,7 @@ class ProcessRun:
     def __call__(self, **more: Any) -> Outcome:
         """Run; afterwards no process is left."""
         try:
-            return run_processes(
+            outcome = run_processes(
                 self.plant,
                 self.agents,
                 self.log_dir,
@@ -60,6 +70,8 @@ class ProcessRun:
                 on_start=self._started,
                 **{"plant_command": TOY} | more,
             )
+            assert self._steps == [], f"{len(self._steps)} steps were not reached; {outcome}"
+            return outcome
         finally:
             later = [] if self.children is None else [child.pid for child in self.children]
             assert [pid for pid in {*self.pids, *later} if exists(pid)] == []
@@ -70,10 +82,13 @@ class ProcessRun:
 
     def _take(self, telemetry: Telemetry) -> None:
         self.rows += telemetry.rows
+        self.events += telemetry.events
         due = [do for t, do in self._at if telemetry.t >= t]
         self._at = [(t, do) for t, do in self._at if telemetry.t < t]
         for do in due:
             do()
+        while self._steps and self._steps[0][0]():
+            self._steps.pop(0)[1]()
 
 
 def exists(pid: int) -> bool:

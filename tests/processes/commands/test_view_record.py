@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
 
-WAIT = 60_000
+WAIT = 80_000
 """Longest wait (ms) for anything on the page."""
 
 ISLANDED = """
@@ -213,7 +213,6 @@ def test_a_click_leaves_the_keys_with_the_time_and_the_address_keeps_it(
         recorded_run(tmp_path / "it.toml", case, tmp_path / "run" / case)
     view = desk.open_bare("view", "run", "--port", "0")
     page = page_of(browser, view.expect(r"open (http://\S+) in a browser")[1])
-    page.set_default_timeout(15_000)
     page.set_viewport_size({"width": 1400, "height": 900})
     shows(page, 1.0)
 

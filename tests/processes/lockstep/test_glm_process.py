@@ -51,7 +51,7 @@ def test_a_killed_import_leaves_no_process_and_no_folder(model: Path) -> None:
 
     assert reading.returncode == -signal.SIGKILL
     for each in watched:
-        assert select.select([each], [], [], 10.0)[0] == [each]
+        assert select.select([each], [], [], 60.0)[0] == [each]
         os.close(each)
     assert not Path(scratch).exists()
 

@@ -129,7 +129,7 @@ def test_gridlabd_ends_with_a_killed_plant(tmp_path: Path) -> None:
     assert "plant was killed by SIGKILL" in outcome.broke
     assert len(watched) == 2  # GridLAB-D, and the shell that removes the folder
     for each in watched:
-        assert select.select([each], [], [], 10.0)[0] == [each]
+        assert select.select([each], [], [], 60.0)[0] == [each]
         os.close(each)
     assert not folders[0].exists()
 

@@ -25,7 +25,7 @@ QUIET = [
 ]
 """A browser that asks nobody outside."""
 
-WAIT = 40_000
+WAIT = 80_000
 """Longest wait (ms) for anything on the page."""
 
 SLOW = "0.2"

@@ -34,12 +34,14 @@ def test_a_killed_command_leaves_a_record(clock: Clock, tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not has_namespaces(), reason="no file system can be mounted in a namespace of its own here")
-def test_on_a_full_disk_a_record_ends_and_is_read() -> None:
+@pytest.mark.parametrize("kind", kinds())
+def test_on_a_full_disk_a_record_ends_and_is_read(kind: str) -> None:
     """On a small disk that is filled under way: the run says so once, ends as it can, and leaves no empty file."""
-    done = subprocess.run([sys.executable, "-m", "tests.record.full_disk"], capture_output=True, text=True, timeout=200)
+    command = [sys.executable, "-m", "tests.record.full_disk", kind]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=250)
 
     assert done.returncode == 0, done.stdout + done.stderr
-    assert done.stdout.count("and is read") == len(kinds())
+    assert done.stdout.count("and is read") == 1
 
 
 ENDED = r"the record run\.mcap ends at \d\.\d\d s: File too large"

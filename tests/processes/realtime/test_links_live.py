@@ -6,6 +6,7 @@ import csv
 import math
 import re
 import signal
+from itertools import pairwise
 from pathlib import Path
 
 from msgspec.structs import replace
@@ -170,9 +171,11 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
     for link in (("inv2", "inv3"), ("inv3", "inv2")):
         assert {fate == "partition" for t, fate in found[link].values() if 0.5 <= t < 0.9} == {True}
         assert {fate == "partition" for t, fate in found[link].values() if not 0.5 <= t < 0.9} == {False}
-    asleep = [t for t, _ in found["inv3", "inv2"].values() if 1.2 <= t < 1.7]
-    assert asleep == []
-    assert max(t for t, _ in found["inv3", "inv2"].values()) > 1.8
+    sent = sorted(t for t, _ in found["inv3", "inv2"].values())
+    asleep, awake = max(pairwise(sent), key=lambda pair: pair[1] - pair[0])  # a busy machine may pause it late
+    assert asleep > 0.9
+    assert awake - asleep > 0.3
+    assert awake > 1.7
 
 
 LINK = ("inv1", "inv4")

@@ -62,11 +62,13 @@ def test_terminals_in_the_order_of_people(desk: Desk) -> None:
     """
     early = desk.open("agent", "inv2")
     early.expect("inv2: seeks the plant of run lab at tcp/127.0.0.1:")
-    early.expect("inv2: no plant yet of run lab at .*; 2 of 60 s waited")
+    early.expect(r"inv2: no plant yet of run lab at .*; \d+ of 60 s waited")
     plant = plant_of(desk, "--out", "here", wait=3.0)
-    plant.expect("inv2 joined")
-    plant.expect("started without the agents of inv1, inv3, inv4, ")
+    without = plant.expect("started without the agents of (inv1, .*inv3, inv4, .*)")
     early.expect("inv2: joins at t = ")
+    plant.shows("inv2 joined")  # within the 3 s, unless the machine is busy
+    came = plant.text.index("inv2 joined") < plant.text.index(without[0])
+    assert ("inv2" in without[1]) == (not came)
     late = desk.open("agent", "inv1")
     late.expect("inv1: joins at t = ")
     watch = desk.open("watch")
@@ -180,6 +182,15 @@ def test_what_befalls_an_agent_or_the_plant_is_told_in_the_terminals(desk: Desk)
     first.expect("inv1: the plant is gone; holds, and seeks it again")
 
 
+def status_of_another_run(endpoint: str) -> tuple[int, str]:
+    """Ask for a run that is not there, for longer if the machine is too busy for a link to the one that is."""
+    for wait in ("1", "8", "40"):
+        code, text = invoke("status", "--run", "other", "--connect", endpoint, "--wait", wait)
+        if "runs there" in text:
+            break
+    return code, text
+
+
 def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
     """An agent without inverter, a second one of a name, no such switch, no such run, one that is there: exit 2."""
     plant_of(desk)
@@ -192,9 +203,7 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
         "inv2: another agent of this name takes part in run lab already": (agents[1].end(), agents[1].text),
         'no agent "inv9" is running; running are: inv2': desk.type("stop", "inv9"),
         'switch "13-15": no such switch': desk.type("event", "open", "13-15"),
-        rf"no plant of run other at {endpoint} within 1 s \(runs there: lab\)": invoke(
-            "status", "--run", "other", "--connect", endpoint, "--wait", "1"
-        ),
+        rf"no plant of run other at {endpoint} within \d+ s \(runs there: lab\)": status_of_another_run(endpoint),
     }
     for what, (code, text) in said.items():
         errors = [line for line in text.splitlines() if line.startswith("gridpeers: ")]

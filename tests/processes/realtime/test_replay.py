@@ -176,7 +176,7 @@ def test_the_command_names_the_first_difference(run_of: Callable[[str], Result],
 
 def test_a_record_that_was_cut_off_is_replayed_up_to_there(tmp_path: Path) -> None:
     """Kill -9 of the command: all that is in the record is the same, and a change from 0.3 s on has its effect."""
-    left = killed(tmp_path / "run", "wall", 1.0)
+    left = killed(tmp_path / "run", "wall", 2.0)
 
     done = gp.replay(left.record)
     changed = gp.counterfactual(left.record, without="inv1 <-> inv4", since=0.3)

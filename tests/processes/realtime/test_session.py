@@ -51,8 +51,8 @@ def test_a_subscription_proven_by_a_query_is_in_place() -> None:
 
 
 def take_one(session: Session) -> tuple[str, str, bytes]:
-    """The next event, which must come within 5 s."""
-    until, events = monotonic() + 5.0, []
+    """The next event, which must come within a minute."""
+    until, events = monotonic() + 60.0, []
     while not events:
         assert monotonic() < until, "nothing came"
         events = session.inbox.take(1, until - monotonic())
@@ -82,16 +82,14 @@ def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_o
         sender.watch("gridpeers/t/alive/**")
         assert take_one(sender) == ("appeared", "gridpeers/t/alive/b", b"")
         holder.send_signal(signal.SIGSTOP)
-        longest = 0.0
-        for _ in range(1000):  # 60 MB: more than the kernel keeps of a connection
+        longest, gone = 0.0, False
+        while not gone:  # more than the kernel keeps of a connection, until the link is closed
             began = monotonic()
             sender.publish("gridpeers/t/telemetry", bytes(60_000))
             longest = max(longest, monotonic() - began)
-            if longest > 0.1:
-                break
-        assert 0.1 < longest < 2.0
+            gone = any(event[:2] == ("vanished", "gridpeers/t/alive/b") for event in sender.inbox.take(1, 0.0))
+        assert 0.1 < longest < 5.0, "of the fifth of a second a busy machine makes more, and never Zenoh's five"
         holder.send_signal(signal.SIGCONT)
-        assert take_one(sender) == ("vanished", "gridpeers/t/alive/b", b"")
         assert take_one(sender) == ("appeared", "gridpeers/t/alive/b", b"")
     finally:
         holder.kill()

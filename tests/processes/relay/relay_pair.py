@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import random
 import socket
 from collections.abc import Callable
+from contextlib import suppress
 from struct import pack, unpack_from
 from time import monotonic
 from types import TracebackType
@@ -15,7 +17,7 @@ KEY = "gridpeers/pair/probe"
 HELLO = -1
 """Number of a greeting."""
 
-PATIENCE = 30.0
+PATIENCE = 60.0
 """Longest wait (s) for two to find each other."""
 
 SIZE = 100
@@ -29,11 +31,13 @@ NEVER = 1 << 30
 
 
 def free_endpoint(transport: str) -> str:
-    """Endpoint at a port of the loopback that nobody uses."""
+    """Endpoint at a port of the loopback that nobody uses, nor gets by asking for any: relays do that meanwhile."""
     kind = socket.SOCK_STREAM if transport == "tcp" else socket.SOCK_DGRAM
-    with socket.socket(socket.AF_INET, kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"{transport}/127.0.0.1:{probe.getsockname()[1]}"
+    for port in random.SystemRandom().sample(range(20_000, 32_000), 100):
+        with socket.socket(socket.AF_INET, kind) as probe, suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return f"{transport}/127.0.0.1:{port}"
+    raise AssertionError("a hundred ports are in use")
 
 
 class Times(Inbox):

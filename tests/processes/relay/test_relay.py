@@ -16,7 +16,7 @@ import pytest
 from netem.draws import Stream
 from netem.relay import EndpointError, Faults, FaultsError, Relay, RelayCommandError, RelayError
 
-PATIENCE = 20.0
+PATIENCE = 60.0
 """Longest wait (s) of a socket; on an idle machine none waits long."""
 
 

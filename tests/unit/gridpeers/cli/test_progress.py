@@ -74,7 +74,7 @@ def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -
 
     with progress.explained(explained.set) as tell:
         tell("I", 0.0, 1.0)
-        assert explained.wait(timeout=10.0)
+        assert explained.wait(timeout=100.0)
 
 
 def test_work_that_takes_long_is_explained_and_quick_work_is_not(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -82,12 +82,12 @@ def test_work_that_takes_long_is_explained_and_quick_work_is_not(monkeypatch: py
     explained, too_late = threading.Event(), threading.Event()
     monkeypatch.setattr(progress, "PATIENCE", 0.0)
     with progress.explained_work(explained.set):
-        assert explained.wait(timeout=10.0)
+        assert explained.wait(timeout=100.0)
     monkeypatch.setattr(progress, "PATIENCE", 3600.0)
     before = set(threading.enumerate())
     with progress.explained_work(too_late.set):
         (timer,) = set(threading.enumerate()) - before
-    timer.join(timeout=10.0)
+    timer.join(timeout=100.0)
 
     assert not timer.is_alive()
     assert not too_late.is_set()

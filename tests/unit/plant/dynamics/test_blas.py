@@ -20,13 +20,13 @@ def test_a_thread_that_is_through_does_not_lift_the_limit_under_another() -> Non
     def first() -> None:
         with one_thread():
             inside.set()
-            leave.wait(10.0)
+            leave.wait(100.0)
 
     with threadpool_limits(2, user_api="blas"):
         before = _threads()
         thread = Thread(target=first)
         thread.start()
-        inside.wait(10.0)
+        assert inside.wait(100.0)
         with one_thread():
             leave.set()
             thread.join()
