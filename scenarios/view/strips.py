@@ -23,7 +23,8 @@ MANY, WIDE_STEP = 30, 0.1
 
 Point = tuple[float, tuple[float | None, ...]]
 """Run time (s); then f (Hz), P (pu of the rating), Q (pu of the rating) and V (pu) of each inverter, all f first; then
-MPSI and MQSI. None stands for a value that is not known, not finite, or of an inverter off the network."""
+MPSI and MQSI over all inverters on the network, whatever their islands. None stands for a value that is not known, not
+finite, or of an inverter off the network."""
 
 
 class Strips:

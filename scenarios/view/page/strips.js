@@ -5,8 +5,8 @@ const QUANTITIES = [
   { key: "P", label: "P", unit: "pu", digits: 3, least: 0.05 },
   { key: "Q", label: "Q", unit: "pu", digits: 3, least: 0.02 },
   { key: "V", label: "V", unit: "pu", digits: 4, least: 0.01 },
-  { key: "MPSI", label: "MPSI", unit: "", digits: 3, least: 0.02, zero: true },
-  { key: "MQSI", label: "MQSI", unit: "", digits: 3, least: 0.02, zero: true },
+  { key: "MPSI", label: "MPSI, all inverters", unit: "", digits: 3, least: 0.02, zero: true },
+  { key: "MQSI", label: "MQSI, all inverters", unit: "", digits: 3, least: 0.02, zero: true },
 ];
 
 export class Strips {
