@@ -23,7 +23,7 @@ from scenarios.chaos.chaos_run import (
 from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.schedule_search import BATCH, drawn
-from scenarios.checks.check_registry import chosen_checks
+from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete
 from scenarios.run import Driver
 from scenarios.sweep.workers import on_this_machine
@@ -81,13 +81,15 @@ class Summary:
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
         yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
-        for name in (*ASKED, *chosen_checks(base.scenario.checks)):
+        for name in dict.fromkeys((*ASKED, *chosen_checks(base.scenario.checks), RETURNS)):
             passed = sum(name in row.passed for row in rows)
             failed = sorted(row.number for row in rows if name in row.violated)
             if passed or failed:
                 first = f"run {failed[0]}" if failed else ""
                 yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
-        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips"
+        collapses = sum(bool(row.collapse) for row in rows)
+        beyond = f"; {collapses} collapsed at a change before any agent could act" if collapses else ""
+        yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for failure in self.failures:
             yield f"{failure.violated}, run {failure.row.number}: {failure.row.violated[failure.violated]}"
             yield from (f"    {it}" for it in sorted(failure.simplest.schedule, key=lambda it: it.begins_s))

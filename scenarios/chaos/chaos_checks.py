@@ -32,6 +32,9 @@ _AFTER: Mapping[str, Mapping[str, Any]] = {
 }
 """Checks that are judged from the last change, trip or return on, with their limits."""
 
+RESTORED = frozenset({*_AFTER, "oscillation", RETURNS})
+"""Checks of what control restores; the others hold whatever is done to a run."""
+
 TAIL_S = 2.0
 """Tail of the run (s) in which nothing may oscillate any more."""
 

@@ -91,8 +91,8 @@ class ChaosFolder:
 
     def _cells(self, row: ChaosRow) -> str:
         cells = (
-            *(row.number, seed_of(self._seed, row.number), "violated" if row.violated else "passed"),
-            *(" ".join(sorted(row.violated)), "; ".join(row.violated[name] for name in sorted(row.violated))),
+            *(row.number, seed_of(self._seed, row.number), _status(row), " ".join(sorted(row.violated))),
+            "; ".join([*(row.violated[name] for name in sorted(row.violated)), *filter(None, [row.collapse])]),
             *(len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
             *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
         )
@@ -102,6 +102,11 @@ class ChaosFolder:
 def again(file: Path) -> str:
     """Return the command that runs a failure once more."""
     return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
+
+
+def _status(row: ChaosRow) -> str:
+    """Return the status of a run in a word."""
+    return "violated" if row.violated else "collapse" if row.collapse else "passed"
 
 
 def _line(cells: Iterable[object]) -> str:

@@ -7,10 +7,11 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 from time import monotonic
+from typing import NamedTuple
 
 import msgspec
 
-from scenarios.chaos.chaos_checks import WITHIN_S
+from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase, base_of
 from scenarios.chaos.schedule_search import shrunk
@@ -58,6 +59,8 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     """Checks, and what else is asked, that it passed."""
     violated: dict[str, str] = {}
     """Those that it violated, with the sentence of each."""
+    collapse: str = ""
+    """Why it is not judged by what control restores: a change made inverters trip before any agent could act."""
     history_sha256: str = ""
     """Of the bytes of its history.csv; empty if it broke."""
     links_sha256: str = ""
@@ -178,7 +181,19 @@ def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:
 
 def run_scenario(base: ChaosBase, driver: Driver = "inprocess") -> ChaosRow:
     """Run the scenario of a base as it stands, and judge it by its own checks."""
-    return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver)[0]
+    return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver).row
+
+
+def collapse_at_change(scenario: ScenarioModel, events: Iterable[PlantEvent]) -> str:
+    """Return event and first trip of a run if this comes within a control period of that, "" if not.
+
+    No agent can act in between: measurements of after the event are not decided on before the next tick.
+    """
+    first = next((event for event in events if tripped_by(event)), None)
+    if first is None:
+        return ""
+    since = (event for event in scenario.events if -1e-9 <= first.t - event.t_s <= scenario.time.T_c_s + 1e-9)
+    return next((f"{event.label}: at t = {first.t:g} s {first.text}" for event in since), "")
 
 
 def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float:
@@ -204,15 +219,39 @@ def _once_restored(base: ChaosBase, schedule: Schedule, seed: int, number: int, 
     since_s = base.changed_s(schedule)
     for _ in range(LONGER_RUNS):
         row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
-        row, restored_s = _judged(base, base.disturbed(schedule, seed, since_s), row, driver)
-        if restored_s <= since_s:
+        judged = _judged(base, base.disturbed(schedule, seed, since_s), row, driver)
+        if judged.restored_s <= since_s:
             break
-        since_s = restored_s
-    return row
+        since_s = judged.restored_s
+    row, collapse = judged.row, judged.collapse
+    if not collapse or row.violated.keys().isdisjoint(RESTORED):
+        return row
+    changes = tuple(disturbance for disturbance in schedule if disturbance.table == "event")
+    if len(changes) < len(schedule):  # a fault of links or agents before may have led to it
+        plain = ChaosRow(number=number, schedule=changes)
+        collapse = _judged(base, base.disturbed(changes, seed), plain, "inprocess").collapse
+    if collapse.partition(":")[0] != judged.collapse.partition(":")[0]:
+        return row
+    return msgspec.structs.replace(
+        row,
+        passed=tuple(name for name in row.passed if name not in RESTORED),
+        violated={name: text for name, text in row.violated.items() if name not in RESTORED},
+        collapse=judged.collapse,
+    )
 
 
-def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver) -> tuple[ChaosRow, float]:
-    """Run a scenario once in a temporary folder; return its result, and from when on it is to be restored (s)."""
+class JudgedRun(NamedTuple):
+    """A run once done."""
+
+    row: ChaosRow
+    restored_s: float = 0.0
+    """Run time from which on it is to be restored (s)."""
+    collapse: str = ""
+    """See `collapse_at_change`."""
+
+
+def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver) -> JudgedRun:
+    """Run a scenario once in a temporary folder."""
     with tempfile.TemporaryDirectory(prefix="gridpeers-chaos-") as folder:
         request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=Path(folder), lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
@@ -221,11 +260,12 @@ def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Dri
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
             verdicts = verdicts_on(request, base.case, record, recorded.events)
         except BrokenRunError as error:
-            return msgspec.structs.replace(row, violated={ENDS: str(error)}), 0.0
+            return JudgedRun(msgspec.structs.replace(row, violated={ENDS: str(error)}))
         except Exception as error:
-            return msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}), 0.0
+            return JudgedRun(msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}))
         restored_s = restored_from(recorded.events, scenario.protection.enter_service)
-        return _with_verdicts(row, recorded, verdicts), restored_s
+        collapse = collapse_at_change(scenario, recorded.events)
+        return JudgedRun(_with_verdicts(row, recorded, verdicts), restored_s, collapse)
 
 
 def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:
