@@ -44,6 +44,7 @@ from wire.messages import Pacing, PlantEvent, Telemetry
 if TYPE_CHECKING:
     from plant.plant_interface import PlantLike
     from scenarios.checks.check_verdict import CheckVerdict
+    from scenarios.checks.judging import JudgingStop
     from scenarios.live.numbers.departures import Departures
     from scenarios.results.event_windows import CaseRecord
     from scenarios.results.report import RunReport
@@ -163,6 +164,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             flush=True,
         )
     from scenarios.checks.checks_file import FILE, verdicts_json
+    from scenarios.checks.judging import JudgingStop
     from scenarios.results.evaluation.claims import judge, judged
     from scenarios.results.findings import find
     from scenarios.results.report import RunReport, plain
@@ -181,10 +183,11 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
-    checks = {case: verdicts_on(request, case, record, recorded[case].events) for case, record in cases.items()}
+    stop = JudgingStop()
+    checks = {case: verdicts_on(request, case, record, recorded[case].events, stop) for case, record in cases.items()}
     write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
-        if request.lasting:
+        if request.lasting and stop.raised is None:
             from scenarios.results.plots.drawing import drawing_of
 
             last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
@@ -204,21 +207,22 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             folder=place + "/" if request.lasting else "",
         )
         write_whole(folder / "report.txt", plain(report))
+    stop.end()
     ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
     set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
     return report
 
 
 def verdicts_on(
-    request: Request, case: str, record: CaseRecord, events: tuple[PlantEvent, ...]
+    request: Request, case: str, record: CaseRecord, events: tuple[PlantEvent, ...], stop: JudgingStop | None = None
 ) -> tuple[CheckVerdict, ...]:
-    """Return the verdicts of the checks on a case."""
+    """Return the verdicts of the checks on a case; see `judge_case`."""
     from scenarios.checks.checked_case import CheckedCase
     from scenarios.checks.judging import judge_case
 
     scenario, folder = request.scenario, request.folder / case
     checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, events, folder)
-    return judge_case(checked, checks_of(scenario))
+    return judge_case(checked, checks_of(scenario), stop)
 
 
 def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:

@@ -15,6 +15,9 @@ SHOWN_VIOLATIONS = 20
 MOST_VIOLATIONS = 1_000_000
 """Violations after which a check is asked for no more: some seconds, and a check that never ends yields ever more."""
 
+INTERRUPTED = "interrupted"
+"""Reason of a check that was not judged because somebody ended the run while it, or one before it, judged."""
+
 
 class NotJudgedError(Exception):
     """A check cannot judge this run; the text is the reason, such as what the record lacks."""
@@ -88,4 +91,6 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
     failed = [verdict for verdict in verdicts if verdict.status == "failed"]
     idle = len(verdicts) - passed - len(failed)
     line = f"{passed} of {passed + len(failed)} checks passed" + (f", {idle} not judged" if idle else "")
-    return "; ".join([line, *(verdict.sentence for verdict in failed)])
+    ended = [verdict.check for verdict in verdicts if verdict.status == "not judged" and verdict.reason == INTERRUPTED]
+    late = [f"{', '.join(ended)} not judged: {INTERRUPTED}"] if ended else []
+    return "; ".join([line, *late, *(verdict.sentence for verdict in failed)])

@@ -1,24 +1,60 @@
-"""Judge a recorded case by checks: each may fail without harm to the others."""
+"""Judge a recorded case by checks: each may fail without harm to the others, and one that takes long is named."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from itertools import islice
+from threading import Timer
 from typing import Any
 
 import numpy as np
 
 from scenarios.checks.check_registry import CHECKS
-from scenarios.checks.check_verdict import MOST_VIOLATIONS, SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation
+from scenarios.checks.check_verdict import (
+    INTERRUPTED,
+    MOST_VIOLATIONS,
+    SHOWN_VIOLATIONS,
+    CheckVerdict,
+    NotJudgedError,
+    Violation,
+)
 from scenarios.checks.checked_case import CheckedCase
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, made
 from wire.plugins.registry import PluginError
 from wire.printable import printable
 
+PATIENCE = 10.0
+"""Time (s) after which a check that still judges is named: those of an hour of nine agents in wall-clock time take
+minutes together, all others seconds, and one of a user's may never return."""
 
-def judge_case(case: CheckedCase, checks: Mapping[str, Plugin]) -> tuple[CheckVerdict, ...]:
+
+class JudgingStop:
+    """Takes a request to end while cases are judged, for a caller that writes what is judged by then before it ends.
+
+    Parameters
+    ----------
+    requests : type[BaseException], optional
+        Errors that are such requests.
+    """
+
+    def __init__(self, *requests: type[BaseException]) -> None:
+        self.requests = requests or (KeyboardInterrupt,)
+        self.raised: BaseException | None = None
+        """The request, for the caller to raise again; None if there was none."""
+
+    def end(self) -> None:
+        """Raise the request again, if there was one."""
+        if self.raised is not None:
+            raise self.raised
+
+
+def judge_case(
+    case: CheckedCase, checks: Mapping[str, Plugin], stop: JudgingStop | None = None
+) -> tuple[CheckVerdict, ...]:
     """Return the verdict of each check on a case.
 
     A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged.
@@ -29,22 +65,56 @@ def judge_case(case: CheckedCase, checks: Mapping[str, Plugin]) -> tuple[CheckVe
         The case.
     checks : Mapping[str, Plugin]
         The checks by their names in the verdict (`check_registry.chosen_checks`).
+    stop : JudgingStop, optional
+        Takes a request to end: this check and all further ones are not judged. Without it the request goes through.
     """
     with np.errstate(all="ignore"):  # a value that is no number is within no limit, or has its own reason
-        return tuple(_verdict(name, plugin, case) for name, plugin in checks.items())
+        return tuple(_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items())
+
+
+def _unless_stopped(name: str, plugin: Plugin, case: CheckedCase, stop: JudgingStop | None) -> CheckVerdict:
+    if stop is None:
+        return _verdict(name, plugin, case)
+    if stop.raised is None:
+        try:
+            return _verdict(name, plugin, case)
+        except stop.requests as request:
+            stop.raised = request
+    return CheckVerdict(check=name, status="not judged", reason=INTERRUPTED)
+
+
+@contextmanager
+def _named_if_slow(name: str, plugin: Plugin, case: CheckedCase) -> Iterator[None]:
+    """Say once which check judges, if it takes long: it may never return, and nothing else moves meanwhile."""
+    module = plugin.use.partition(":")[0]
+    of = f" of {module}" if module != plugin.use else ""
+    timer = Timer(PATIENCE, tell, (f"check {name}{of} has been judging case {case.case} for {PATIENCE:g} s",))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def tell(text: str) -> None:
+    """Say on standard error what judging waits for."""
+    with suppress(OSError, ValueError):  # nobody reads it any more
+        print(f"{printable(text, 300)}; Ctrl-C ends the run, and keeps what is recorded", file=sys.stderr, flush=True)
 
 
 def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
+    violations: list[Violation] = []
+    count = 0
     try:
-        found = made(CHECKS, plugin)(case)
-        if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
-            raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
-        violations: list[Violation] = []
-        count = 0
-        for count, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
-            checked = _checked(violation)
-            if count <= SHOWN_VIOLATIONS:
-                violations.append(checked)
+        with _named_if_slow(name, plugin, case):
+            found = made(CHECKS, plugin)(case)
+            if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
+                raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
+            for count, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
+                checked = _checked(violation)
+                if count <= SHOWN_VIOLATIONS:
+                    violations.append(checked)
     except NotJudgedError as error:
         return CheckVerdict(check=name, status="not judged", reason=printable(str(error), 300) or "no reason given")
     except PluginError as error:

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import FILE, verdicts_json
-from scenarios.checks.judging import judge_case
+from scenarios.checks.judging import JudgingStop, judge_case
 from scenarios.live.live_folders import Folders
 from scenarios.live.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Departures, compare, few
@@ -43,6 +43,11 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
         How the plant kept pace.
     figures : bool, optional
         Whether its figures are drawn.
+
+    Raises
+    ------
+    StoppedError, KeyboardInterrupt
+        If a signal ends it. What checks were about to judge is not judged then, and the report says so.
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
@@ -52,7 +57,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     checked = CheckedCase.of(
         departures.happened, feeder, case, record.history, record.windows, recorded.events, metrics.folder / case
     )
-    checks = {case: judge_case(checked, checks_of(scenario))}
+    stop = JudgingStop(StoppedError, KeyboardInterrupt)
+    checks = {case: judge_case(checked, checks_of(scenario), stop)}
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
@@ -69,7 +75,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     )
     write_whole(metrics.folder / FILE, verdicts_json(checks))
     write_whole(metrics.folder / "report.txt", plain(report))
-
+    stop.end()
     if not figures:
         return report
     from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else

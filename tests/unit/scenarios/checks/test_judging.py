@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import gridpeers as gp
 from scenarios.checks import judging
@@ -16,11 +18,17 @@ from scenarios.checks.check_registry import ALWAYS, CHECKS
 from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import read_verdicts, verdicts_json
-from scenarios.checks.judging import judge_case
+from scenarios.checks.judging import JudgingStop, judge_case
+from scenarios.record.record_reader import RunRecord
+from scenarios.run import Request, run
+from scenarios.schema import load_scenario
 from tests.unit.scenarios.checks.cases import ran
 from wire.plugins.plugin import Plugin, plugin_problems
 
 HERE = __name__
+
+NAMED = Event()
+"""Set when `waits_to_be_named` has been named."""
 
 
 class Nadir:
@@ -91,6 +99,90 @@ def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytes
 
     assert (found.status, found.count, found.violations[-1].text) == ("failed", 1000, f"x{SHOWN_VIOLATIONS - 1}")
     assert next(numbers) == 1000
+
+
+def test_a_check_that_judges_for_long_is_named_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """While it judges, or yields: this one goes on only when it has been named."""
+    told: list[str] = []
+    named = Event()
+
+    def tell(text: str) -> None:
+        told.append(text)
+        named.set()
+
+    monkeypatch.setattr(judging, "tell", tell)
+    monkeypatch.setattr(judging, "PATIENCE", 0.0)
+
+    def waits(case: CheckedCase) -> Iterator[Violation]:
+        assert named.wait(60.0)
+        yield Violation(text="late")
+
+    assert judged(waits, monkeypatch).count == 1
+    assert told == ["check mine has been judging case IV for 0 s"]
+    monkeypatch.setattr(judging, "PATIENCE", 1e6)
+    assert judged(lambda case: (), monkeypatch).status == "passed"
+    assert len(told) == 1
+
+
+def test_of_a_check_of_ones_own_the_module_is_named(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On standard error, with what can be done."""
+    monkeypatch.setattr(judging, "PATIENCE", 0.0)
+    monkeypatch.setattr(judging, "tell", lambda text, real=judging.tell: (real(text), NAMED.set()))
+    judge_case(ran().checked_case, {"slow": Plugin(use=f"{HERE}:waits_to_be_named")})
+
+    assert capsys.readouterr().err == (
+        f"check slow of {HERE} has been judging case IV for 0 s; Ctrl-C ends the run, and keeps what is recorded\n"
+    )
+
+
+def waits_to_be_named(case: CheckedCase) -> tuple[()]:
+    """A check that returns when it has been named."""
+    assert NAMED.wait(60.0)
+    return ()
+
+
+def interrupted(case: CheckedCase) -> tuple[()]:
+    """A check that a person ends by Ctrl-C."""
+    raise KeyboardInterrupt
+
+
+def test_a_request_to_end_leaves_the_rest_not_judged() -> None:
+    """For whoever writes what is judged by then; for all others it goes through."""
+    checks = {"frequency": Plugin(use="frequency"), "mine": Plugin(use=f"{HERE}:interrupted")}
+    checks["steady"] = Plugin(use="steady")
+    stop = JudgingStop()
+    found = judge_case(ran().checked_case, checks, stop)
+
+    assert [verdict.sentence for verdict in found] == [
+        "frequency passed", "mine not judged: interrupted", "steady not judged: interrupted",
+    ]  # fmt: skip
+    assert summary(found) == "1 of 1 checks passed, 2 not judged; mine, steady not judged: interrupted"
+    assert isinstance(stop.raised, KeyboardInterrupt)
+    with pytest.raises(KeyboardInterrupt):
+        stop.end()
+    with pytest.raises(KeyboardInterrupt):
+        judge_case(ran().checked_case, checks)
+
+
+def test_ctrl_c_while_a_check_judges_ends_the_run_with_record_and_verdicts(tmp_path: Path) -> None:
+    """The folder says that it is not whole; what is recorded, measured and judged by then is in it."""
+    scenario, feeder = load_scenario("islanding")
+    own = [{"use": f"{HERE}:interrupted"}]
+    scenario = replace(scenario, cases={"IV": scenario.cases["IV"]}, checks=own)
+    request = Request(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
+    with pytest.raises(KeyboardInterrupt):
+        run(request, lambda case, t, end: None)
+
+    verdicts = {verdict.check: verdict for verdict in read_verdicts(tmp_path / "checks.json")["IV"]}
+    assert verdicts["frequency"].status == "passed"
+    assert verdicts["interrupted"].sentence == "interrupted not judged: interrupted"
+    assert "interrupted not judged: interrupted" in (tmp_path / "report.txt").read_text()
+    assert RunRecord.open(tmp_path / "IV").complete
+    assert (tmp_path / "metrics.json").exists()
+    assert (tmp_path / "status.txt").read_text() == "broken: interrupted from the keyboard\n"
+    assert not (tmp_path / "plots").exists()
 
 
 def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
