@@ -205,7 +205,12 @@ class LockstepAgent(AgentNode):
         Of n agents that hear each other, each takes n - 1 states a tick, and in one process all of them so.
         """
         name = self._states_on.get(key)
-        if name is not None and self._grant is None and self._links is None and not self._ending:
+        if (
+            name is not None
+            and self._grant is None
+            and not self._ending
+            and (self._links is None or name in self._links.clear)  # no fault ever acts on its link
+        ):
             try:
                 message = decode(payload)
             except RejectedError:
