@@ -17,10 +17,14 @@ from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
 from scenarios.results.findings import SHARED, Findings
 from scenarios.results.metrics import Steady
+from scenarios.results.report_table import GAP, Grid, folded
 from scenarios.results.steadiness import STEADY
 
 _WIDE = 10_000
-"""Characters of a line that nobody's table or sentence reaches: text in a file is not wrapped."""
+"""Characters of a line that nobody's sentence reaches: text in a file is not wrapped."""
+
+_TABLE = 140
+"""Characters of a table in a file: with four events it would have 200 and more."""
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 
@@ -45,17 +49,6 @@ class RunReport:
     """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
     """Folder of the results; "" for one that goes with them."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Grid:
-    """A table as text."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    legend: str = ""
-    """Lines below it; may be empty."""
 
 
 _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
@@ -90,7 +83,7 @@ def show(report: RunReport, console: Console) -> None:
 
 def _print(report: RunReport, console: Console) -> None:
     """Print the blocks of a report, with a blank line between them."""
-    blocks = [[*_rendered(grid)] for grid in grids(report)]
+    blocks = [[*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)]
     if report.verdicts:
         width = max(len(verdict.claim.text) for verdict in report.verdicts)
         lines: list[RenderableType] = []
@@ -117,14 +110,16 @@ def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
     return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
 
-def _rendered(grid: Grid) -> Iterator[RenderableType]:
+def _rendered(grid: Grid, width: int) -> Iterator[RenderableType]:
+    """Yield the lines and tables of a grid, whose parts are at most so wide (characters)."""
     yield Text(grid.title, style="bold")
-    table = Table(box=None, padding=(0, 2, 0, 0))
-    for number, column in enumerate(grid.header):
-        table.add_column(Text(column), justify="left" if number == 0 else "right", vertical="bottom")
-    for row in grid.rows:
-        table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
-    yield table
+    for part in folded(grid, width):
+        table = Table(box=None, padding=(0, GAP, 0, 0))
+        for number, column in enumerate(part.header):
+            table.add_column(Text(column), justify="left" if number == 0 else "right", vertical="bottom")
+        for row in part.rows:
+            table.add_row(*(Text(cell, style="red" if cell.endswith("!") else "") for cell in row))
+        yield table
     if grid.legend:
         yield Text(grid.legend, style="dim")
 

@@ -2,6 +2,7 @@
 
 import io
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -86,6 +87,22 @@ def test_colours_are_for_terminals_only(terminal: bool) -> None:
     assert "inv3 [died] at t = 2 s" in out.getvalue()
     if not terminal:
         assert out.getvalue() == plain(report())
+
+
+def test_tables_of_many_events_are_folded_to_the_width_of_the_terminal() -> None:
+    """No line of a table is longer, no event is torn apart, and every number is there; a file has room for more."""
+    few = report(judged=False)
+    steady = few.findings.results["IV"]["event1"]
+    found = Findings(results={"IV": {f"event{i}": steady for i in range(1, 7)}}, P_set0=0.65, GFL=("inv2",))
+    many = replace(few, findings=found, notes=[], folder="")
+    out = io.StringIO()
+
+    show(many, Console(file=out, width=80, force_terminal=True, color_system=None))
+
+    on_terminal, in_file = out.getvalue(), plain(many)
+    assert max(map(len, on_terminal.splitlines())) <= 80 < max(map(len, in_file.splitlines())) <= 140
+    assert on_terminal.count("0.65 s") == in_file.count("0.65 s") == 6
+    assert on_terminal.count("restored in") == in_file.count("restored in") == 6
 
 
 def test_what_several_islands_share_together_is_not_told() -> None:
