@@ -21,6 +21,9 @@ from wire.messages import PLANT, Measurement, Nameplate, State, Stop
 from wire.node import Route
 from wire.plant_follower import PlantFollower
 
+_KEPT = State, Measurement
+"""Messages that links deliver and a node keeps: as a tuple, for a union would be made anew for every message."""
+
 
 class AgentNode(PlantFollower):
     """One agent as a participant of a run.
@@ -156,7 +159,7 @@ class AgentNode(PlantFollower):
     def _hear_late(self, at: float) -> None:
         """Use the messages that the emulated links have delivered by now (s of run time)."""
         for message in arrived(self._links, at, self.rejects, self.admission):
-            if isinstance(message, State | Measurement):
+            if isinstance(message, _KEPT):
                 self._keep(message, at)
 
     def _keep(self, message: State | Measurement, at: float) -> None:

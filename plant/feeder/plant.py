@@ -224,13 +224,13 @@ class Plant:
         first, last = self.tick * self._steps, (self.tick + 1) * self._steps
         self._events += self._closings.check_waiting(first)
         planned = (*self._switches.steps, *self._limits, *self._loads.steps)
-        scheduled = sorted({s for s in planned if first < s < last} | {last})
+        scheduled = [s for s in planned if first < s < last]
         step = first
         while step < last:
             self._change_network(step)
             for limit in self._limits.get(step, ()):
                 self._limit(limit)
-            stop = min(min(s for s in scheduled if s > step), step + self._in_service.quiet)
+            stop = min([last, step + self._in_service.quiet, *(s for s in scheduled if s > step)])
             out = self._dynamics.run(stop - step)
             if (limiting := out[:, :, 6] > 0.0).any():
                 for k in np.flatnonzero(limiting.any(axis=1)).tolist():

@@ -233,6 +233,8 @@ def run_inprocess(
             side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_journal)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
+    for node in (side, *agents):
+        node.routes.clear()  # methods of the node: in a cycle all that the run had would stay
     return Outcome(
         broke=side.outcome,
         reproducible=side.reproducible,

@@ -59,6 +59,8 @@ class EmulatedLinks:
         for node in config.netem.nodes:
             if node.slow_s or (node.pause and not config.real_nodes):
                 self._intervals.setdefault(node.name, []).append(_interval(node))
+        self._pauses = tuple(at for at in self._intervals.get(name, ()) if math.isinf(at.slow))
+        """When the receiver itself is paused."""
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link."""
@@ -84,11 +86,11 @@ class EmulatedLinks:
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out what has arrived by now (s of run time): a paused receiver takes it when it goes on."""
-        return () if self.stalled(now) else self._receiver.due(now)
+        return () if self._pauses and self.stalled(now) else self._receiver.due(now)
 
     def stalled(self, t: float) -> bool:
         """Return whether the receiver itself is paused at t (s of run time)."""
-        return any(at.holds(t) and math.isinf(at.slow) for at in self._intervals.get(self._name, ()))
+        return bool(self._pauses) and any(at.holds(t) for at in self._pauses)
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Change what the links do to messages sent at t (s of run time) or later.

@@ -47,7 +47,13 @@ def pack(args: tuple[Any, ...]) -> tuple[tuple[Any, ...], bytes]:
     """
     kinds, words = [], []
     for arg in args:
-        kind, packed = _packed(arg)
+        kind: Any = _NUMBERS.get(type(arg))
+        if kind is not None:
+            packed = _PACK[type(arg)](arg)
+        elif (seen := _seen.get(id(arg))) is not None:
+            _, kind, packed = seen
+        else:
+            kind, packed = _packed(arg)
         kinds.append(kind)
         words.append(packed)
     return tuple(kinds), b"".join(words)

@@ -144,6 +144,9 @@ class SummaryPass:
         self._counts: dict[Link, LinkCounts] = {}
         self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         self._used = False
+        self._alike: dict[str, tuple[Uses, list[OldUse]]] = {}
+        """What each agent's decision in force uses, and the last entries in `oldest` of these links; not where quiet
+        states change the ages from tick to tick."""
         self._t = self._flushed = 0.0
 
     def state(self, agent: str, state: SentState) -> None:
@@ -191,6 +194,7 @@ class SummaryPass:
     def finish(self, unreadable: int) -> CommunicationSummary:
         """Return what was found, once the record is at its end."""
         self._flush(inf)
+        self._decided.clear()  # they tell this object what they find: in a cycle all of it would stay
         return CommunicationSummary(
             info=self._info,
             t_end=self._t_end,
@@ -227,18 +231,33 @@ class SummaryPass:
 
     def _use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
         """Look at the states of neighbours that an own state came of."""
-        for use in uses.each:
-            if not use.unused:
-                self._used = True
-                self._note_age(state, use)
+        alike = self._alike.get(agent)
+        if alike is not None and alike[0] is uses:
+            for old in alike[1]:
+                old.last = state.t
+        else:
+            self._note_ages(agent, state, uses)
         if self._simulated:
             self._ticks.use(agent, state, uses, new=new)
         self._heals.use(agent, state, uses, new=new)
 
+    def _note_ages(self, agent: str, state: SentState, uses: Uses) -> None:
+        """Note the ages of all values that an own state came of."""
+        used = [use for use in uses.each if not use.unused]
+        for use in used:
+            self._used = True
+            self._note_age(state, use)
+        if all(self._is_plain(use.age) for use in used):
+            self._alike[agent] = uses, [self._oldest[use.link][-1] for use in used]
+
+    def _is_plain(self, age: float | None) -> bool:
+        """Return whether an age (s) counts as it is, whatever states its sender kept in force."""
+        return age is None or not 1.5 * self._info.T_c < age < inf
+
     def _note_age(self, state: SentState, use: NeighbourUse) -> None:
         """Note the age of a value, counted from the last tick at which its sender kept it in force."""
         age = inf if use.age is None else use.age
-        if 1.5 * self._info.T_c < age < inf and (number := use.number_at(state.number)) is not None:
+        if not self._is_plain(age) and (number := use.number_at(state.number)) is not None:
             kept = self._sent[use.link[0]].window_at(state.t).kept_until(number)
             age = max(0.0, age - (kept - number) * self._info.T_c)
         old = self._oldest[use.link]
