@@ -179,6 +179,20 @@ def test_who_is_implausible_ages_out_and_comes_back_slowly() -> None:
     assert law.step(own(t=1.0), [neighbour("a", 0.6)], T).P_set - 0.5 == pytest.approx(full)
 
 
+@pytest.mark.parametrize(("T_out", "held_back"), [(0.0, False), (0.2, True)])
+def test_a_neighbour_that_was_only_ever_implausible_is_held_back_if_it_is_distrusted(
+    T_out: float, held_back: bool
+) -> None:
+    """Nothing of it has counted, so no rate limits its first plausible value; one that lied is no such stranger."""
+    law = Resilient(F=0, tolerance=0.1, rate=0.5, T_out=T_out)
+    law.step(own(t=1.0), [neighbour("a", 5.0)], T)
+    P_set = law.step(own(t=1.0 + T), [neighbour("a", 0.9)], T).P_set
+    trusted = 1.0 if not T_out else 1.0 - (1.0 - math.exp(-T / T_out)) * math.exp(-T / (10.0 * T_out))
+    expected = neighbour("a", 0.51 if held_back else 0.9)._replace(weight=trusted)
+
+    assert P_set == pytest.approx(Resilient(F=0).step(own(), [expected], T).P_set, abs=1e-12)
+
+
 def test_distrust_without_a_tolerance_is_refused() -> None:
     """Nobody would ever be implausible, so that T_out did nothing."""
     with pytest.raises(ValueError, match=r"has T_out = 0\.5 s and no tolerance, so that nobody is ever implausible"):
