@@ -111,9 +111,8 @@ def _rules(own: Member, other: Member, *, star: bool) -> Iterator[Rule]:
 
 def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
     """Return the key on which messages of this kind go from one member to another; empty if none do."""
-    relayed, relays = star and writer.role == "plant", star and reader.role == "plant"
-    writes, reads = relayed or writer.role in spec.writers, relays or reader.role in spec.readers
-    if not (writes and reads):
+    relayed = star and writer.role == "plant"  # what it relays it may read itself, so the way to it needs no more
+    if not ((relayed or writer.role in spec.writers) and reader.role in spec.readers):
         return ""
     inverter = "*"
     if "agent" in spec.writers and not relayed:

@@ -108,6 +108,16 @@ def test_a_relay_passes_on_to_each_what_it_may_hear_and_takes_from_each_its_own(
     assert "command" not in puts(VIEWER, PLANT, star=True)
 
 
+def test_a_relay_may_read_whatever_others_write() -> None:
+    """So in a star the way to the plant needs no rule of its own, and a second plant gets nothing by being one."""
+    assert all("plant" in spec.readers for spec in describe() if spec.writers != ("plant",))
+    second = Member(name="plant2", role="plant")
+
+    to_agents = {"control", "stop_request/inv1/a1", "measurement/inv1", "link_request/inv1"}
+    assert to_agents <= puts(PLANT, INV1, star=True)
+    assert not to_agents & puts(PLANT, second, star=True)
+
+
 @pytest.mark.parametrize("role", ["plant", "agent", "operator", "viewer"])
 def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None:
     """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's."""
