@@ -51,8 +51,8 @@ class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def to_one_agent(self) -> bool:
-        """Whether an agent may read it only with its own name in the key."""
-        return self.kind == "publication" and "<inverter>" in self.expression and "agent" not in self.writers
+        """Whether an agent may read it only with its own name in the key, or ask for it with that alone."""
+        return self.kind != "token" and "<inverter>" in self.expression and "agent" not in self.writers
 
     def pattern(self, inverter: str = "*") -> str:
         """Return Zenoh's key expression for these keys in all runs, of one inverter or of all."""

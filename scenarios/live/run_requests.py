@@ -130,15 +130,20 @@ def configuration(client: RunClient, name: str) -> AgentConfig:
     """
     known = configurations(client, name)
     if name not in known:
-        there = f"inverters are {', '.join(in_order(known))}" if known else "the plant names none"
+        there = f"inverters are {', '.join(in_order(known))}" if known else "the plant has no configuration for it"
         raise NobodyError(f'no inverter "{name}" in {client.where}; {there}')
     return known[name]
 
 
 def configurations(client: RunClient, name: str = "") -> dict[str, AgentConfig]:
-    """Return configurations of agents by name: all that came until that of `name`, or any, was there."""
+    """Return configurations of agents by name: all that came until that of `name`, or any, was there.
+
+    With the certificate of an agent it asks for that of `name` alone: access rules let an agent ask for no other.
+    """
     known: dict[str, AgentConfig] = {}
-    client.fetch(client.keys.config("*"))
+    credentials = client.where.credentials
+    is_agent = credentials is not None and credentials.own.role == "agent"
+    client.fetch(client.keys.config(name if is_agent else "*"))
     end = monotonic() + HANDOUT
     while not (name in known if name else known) and (left := end - monotonic()) > 0.0:
         for _, payload, _ in client.take(left):

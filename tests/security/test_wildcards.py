@@ -61,6 +61,25 @@ def test_nobody_sees_a_token_that_a_member_holds_for_another(town: Town, lab: Pa
             token.undeclare()
 
 
+def test_an_agent_gets_no_configuration_but_its_own(town: Town, lab: Path) -> None:
+    """It asks for another's and for all before its own, which alone is answered."""
+    own, others = town.keys.config("inv3"), (town.keys.config("inv1"), town.keys.config("*"))
+    for name in ("inv1", "inv3"):
+        town.session.answer(town.keys.config(name), b"{}")
+    answered: set[str] = set()
+    with Intruder(town.endpoint, credentials(lab, "inv3")) as intruder:
+        intruder.linked(4)
+
+        def come() -> bool:
+            for key in (*others, own):
+                intruder.session.fetch(key)
+            answered.update(key for kind, key, _, _ in intruder.session.take(1, 0.2) if kind == "message")
+            return own in answered
+
+        town.until(come, "the own configuration")
+    assert answered == {own}
+
+
 def test_nobody_is_asked_in_anothers_place(town: Town, lab: Path) -> None:
     """A queryable on the nameplate of inv1, on configurations or on everything gets no query; the own one does."""
     (instance,) = (key.rpartition("/")[2] for key in town.tokens if "/alive/agent/inv1/" in key)

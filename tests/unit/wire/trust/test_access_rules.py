@@ -120,9 +120,9 @@ def test_a_relay_may_read_whatever_others_write() -> None:
 
 @pytest.mark.parametrize("role", ["plant", "agent", "operator", "viewer"])
 def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None:
-    """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's."""
+    """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's, to whom it is for."""
     member = Member(name="inv1" if role == "agent" else role, role=role)
-    rules = rules_between(INV3, member)
+    rules = rules_between(INV2, member)
     held = {key for key in CONCRETE if allowed(rules, "ingress", "liveliness_token", key)}
     answered = {key for key in CONCRETE if allowed(rules, "ingress", "reply", key)}
 
@@ -131,9 +131,25 @@ def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None
         "plant": {DEMO.alive_plant(7), recorder}, "agent": {own}, "operator": {recorder}, "viewer": set(),
     }[role]  # fmt: skip
     assert answered == {
-        "plant": {DEMO.config(name) for name in ("inv1", "inv2", "inv9")},
+        "plant": {DEMO.config("inv2")},
         "agent": {DEMO.nameplate("inv1", "a1")},
     }.get(role, set())
+
+
+@pytest.mark.parametrize("star", [False, True])
+def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
+    """Operators and viewers ask for all; of nameplates an agent asks for those of the others."""
+
+    def asked(member: Member, of: Member) -> set[str]:
+        rules = rules_between(of, member, star=star)
+        return {"/".join(key.split("/")[2:]) for key in CONCRETE if allowed(rules, "ingress", "query", key)}
+
+    configurations = {f"config/{name}" for name in ("inv1", "inv2", "inv9")}
+    assert configurations & asked(INV1, PLANT) == {"config/inv1"}
+    assert configurations <= asked(OPERATOR, PLANT)
+    assert configurations <= asked(VIEWER, PLANT)
+    assert asked(INV1, INV2) == {"nameplate/inv2/a1"}
+    assert not allowed(rules_between(PLANT, INV1, star=star), "ingress", "query", DEMO.config("*"))
 
 
 def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
