@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -132,38 +132,69 @@ def _draw_switch(switch: Switch, at: Places, axes: Axes) -> None:
     axes.plot(*_middle(switch, at), marker="s", ms=5, mfc=face, mec="black", zorder=3)
 
 
+class _Marked(NamedTuple):
+    """A label of the diagram."""
+
+    text: str
+    size: float
+    """Of its type (pt)."""
+    place: tuple[float, float]
+    """Of its mark (drawing units)."""
+    gap: float
+    """From the middle of the mark (pt)."""
+    bold: bool = False
+    optional: bool = False
+    """Whether it is left out where it has no room."""
+
+
 def _draw_labels(feeder: Feeder, at: Places, axes: Axes) -> None:
-    """Write the names of substation, inverters and switches beside their marks, where they cover least."""
-    marked: list[tuple[str, float, tuple[float, float], float, bool]] = []  # text, size, place, gap, bold
+    """Write the names of substation, inverters and switches beside their marks, where they cover least.
+
+    Then those of buses, where they cover nothing.
+    """
+    marked: list[_Marked] = []
     if feeder.source is not None:
-        marked.append(("substation", 10.0, at[feeder.source.bus], 9.0, False))
+        marked.append(_Marked("substation", 10.0, at[feeder.source.bus], 9.0))
     inverters = (*feeder.inverters, *feeder.spares)
     if len(feeder.inverters) <= MOST_LABELS:
-        marked += [(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, True) for row in inverters]
+        marked += [
+            _Marked(f"{row.name}{' (spare)' * row.spare}", 10.0, at[row.bus], 8.0, bold=True) for row in inverters
+        ]
+    loads: list[str] = []
     if len(feeder.buses) <= MANY:
-        marked += [(one.alias or one.name, 7.5, _middle(one, at), 6.0, False) for one in feeder.switches]
+        marked += [_Marked(one.alias or one.name, 7.5, _middle(one, at), 6.0) for one in feeder.switches]
+        loads = list(feeder.load_by_bus())
+        taken = {row.bus for row in inverters} | ({feeder.source.bus} if feeder.source else set())
+        names = dict.fromkeys((*loads, *(bus.name for bus in feeder.buses)))
+        marked += [_Marked(bus, 5.5, at[bus], 4.0, optional=True) for bus in names if bus not in taken]
     axes.figure.draw_without_rendering()  # type: ignore[union-attr]  # lays the figure out; subfigures are not used
     ends = [(a, b) for a, b, _ in feeder.branches()] + [(one.from_bus, one.to_bus) for one in feeder.switches]
     lines = _on_paper(axes, [at[bus] for pair in ends for bus in pair]).reshape(-1, 4)
-    marks = _on_paper(axes, [at[row.bus] for row in inverters] + [place for _, _, place, _, _ in marked])
-    places_on_paper = marks[len(inverters) :]
-    widths = [5.0] * len(inverters) + [0.6 * gap for _, _, _, gap, _ in marked]
+    places_on_paper = _on_paper(axes, [one.place for one in marked])
     labels = [
-        Label(text, size, (float(x), float(y)), gap)
-        for (text, size, _, gap, _), (x, y) in zip(marked, places_on_paper, strict=True)
+        Label(one.text, one.size, (float(x), float(y)), one.gap, one.optional)
+        for one, (x, y) in zip(marked, places_on_paper, strict=True)
     ]
-    sides = label_sides(labels, lines, np.column_stack([marks, widths]))
-    for (text, size, place, gap, bold), (right, up) in zip(marked, sides, strict=True):
-        distance = gap if 0 in (right, up) else 0.7 * gap
+    sure = [not one.optional for one in marked]
+    marks = np.vstack([_on_paper(axes, [at[row.bus] for row in inverters]), places_on_paper[sure]])
+    widths = [5.0] * len(inverters) + [0.6 * one.gap for one in marked if not one.optional]
+    dots = np.column_stack([_on_paper(axes, [at[bus] for bus in loads]), np.full(len(loads), 1.8)])
+    sides = label_sides(labels, lines, np.vstack([np.column_stack([marks, widths]), dots]))
+    for one, side in zip(marked, sides, strict=True):
+        if side is None:
+            continue
+        right, up = side
+        distance = one.gap if 0 in side else 0.7 * one.gap
         axes.annotate(
-            text,
-            place,
+            one.text,
+            one.place,
             (distance * right, distance * up),
             textcoords="offset points",
             ha=("center", "left", "right")[right],
             va=("center", "bottom", "top")[up],
-            size=size,
-            weight="bold" if bold else "normal",
+            size=one.size,
+            color="#555555" if one.optional else "black",
+            weight="bold" if one.bold else "normal",
             zorder=5,
             path_effects=HALO,
         )

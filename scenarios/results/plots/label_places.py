@@ -33,10 +33,14 @@ class Label(NamedTuple):
     """Of the mark (pt)."""
     gap: float
     """From the middle of the mark to the label (pt)."""
+    optional: bool = False
+    """Whether it is left out where it would cover anything."""
 
 
-def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[tuple[int, int]]:
+def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[tuple[int, int] | None]:
     """Return the side of its mark on which each label stands, one of `SIDES`; those that come first choose first.
+
+    None stands for an optional label that has no room.
 
     Parameters
     ----------
@@ -49,14 +53,17 @@ def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[t
     """
     words = np.empty((0, 4))
     boxes = np.column_stack([marks[:, :2] - marks[:, 2:], marks[:, :2] + marks[:, 2:]])
-    chosen = []
+    chosen: list[tuple[int, int] | None] = []
     for label in labels:
-        costs = []
-        for preference, side in enumerate(SIDES):
+        covered = []
+        for side in SIDES:
             box = _box(label, side)
-            on = _length_within(box, lines) + WORD * _common(box, words) + MARK * _common(box, boxes)
-            costs.append(on + PREFERENCE * preference)
-        side = SIDES[int(np.argmin(costs))]
+            covered.append(_length_within(box, lines) + WORD * _common(box, words) + MARK * _common(box, boxes))
+        best = int(np.argmin(np.array(covered) + PREFERENCE * np.arange(len(SIDES))))
+        if label.optional and covered[best] > 0.0:
+            chosen.append(None)
+            continue
+        side = SIDES[best]
         chosen.append(side)
         words = np.vstack([words, _box(label, side)])
     return chosen

@@ -101,7 +101,9 @@ def test_no_word_covers_another_and_none_of_the_substation_lies_on_a_branch(name
     boxes = {text.get_text(): text.get_window_extent() for text in axes.texts}
     branches = [path.transformed(axes.transData) for path in axes.collections[0].get_paths()]
 
-    assert len(boxes) == 1 + len(feeder.inverters) + len(feeder.spares) + len(feeder.switches)
+    inverters, buses = (*feeder.inverters, *feeder.spares), {bus.name for bus in feeder.buses}
+    assert len(set(boxes) - buses) == 1 + len(inverters) + len(feeder.switches)
+    assert len(set(boxes) & buses) > 0.9 * (len(buses) - len(inverters) - 1)
     assert [(one, other) for one, other in combinations(boxes, 2) if boxes[one].overlaps(boxes[other])] == []
     assert not any(branch.intersects_bbox(boxes["substation"], filled=False) for branch in branches)
 
@@ -112,8 +114,10 @@ def test_a_word_stands_where_no_branch_leads(degrees: tuple[int, ...]) -> None:
     label = Label("substation", 10.0, (30.0, 40.0), 9.0)
     lines = np.array([(30.0, 40.0, 30.0 + 200.0 * cos(radians(d)), 40.0 + 200.0 * sin(radians(d))) for d in degrees])
 
-    ((right, up),) = label_sides([label], lines, np.array([[30.0, 40.0, 5.0]]))
+    (side,) = label_sides([label], lines, np.array([[30.0, 40.0, 5.0]]))
 
+    assert side is not None
+    right, up = side
     width, height = 62.0, 12.0
     gap = 9.0 if 0 in (right, up) else 6.3
     middle = 30.0 + right * (gap + width / 2.0), 40.0 + up * (gap + height / 2.0)
@@ -128,3 +132,12 @@ def test_a_second_word_gives_way_to_the_first() -> None:
     first, second = label_sides([label, label], np.empty((0, 4)), np.empty((0, 3)))
 
     assert first != second
+
+
+def test_the_name_of_a_bus_that_has_no_room_is_left_out() -> None:
+    """Branches on all sides leave no room for what is optional; everything else has its place."""
+    star = [(0.0, 0.0, 50.0 * cos(radians(d)), 50.0 * sin(radians(d))) for d in range(0, 360, 15)]
+    needed = Label("inv1", 10.0, (0.0, 0.0), 8.0)
+
+    assert label_sides([needed, needed._replace(optional=True)], np.array(star), np.empty((0, 3)))[1] is None
+    assert label_sides([needed._replace(optional=True)], np.empty((0, 4)), np.empty((0, 3))) == [(1, 1)]
