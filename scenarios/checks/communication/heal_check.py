@@ -46,10 +46,14 @@ class Rejoined:
     def _took(self, found: CommunicationSummary, heal: Heal) -> float | None:
         """Return after what time (s) a new value was used, infinity if never; None if that cannot be told.
 
-        It cannot unless the sender speaks to its neighbours, and the receiver decides, for the limit's time after.
+        It cannot if the link was lost again too soon; nor unless one process of the sender speaks to its neighbours,
+        and one of the receiver decides, for the limit's time after.
         """
         if heal.took is not None:
             return heal.took
+        if heal.lost_again < inf:
+            return inf if self.within_s < heal.waited < inf else None
         src, dst = (found.sent[name] for name in heal.link)
         until = heal.t + self.within_s
-        return inf if src.spoke_at >= until and dst.decided_at >= until else None
+        lasts = all(any(first <= heal.t and last >= until for first, last in it.epochs.values()) for it in (src, dst))
+        return inf if lasts and src.spoke_at >= until and dst.decided_at >= until else None

@@ -36,6 +36,10 @@ class Heal:
     took: float | None = None
     """After what time (s) the receiver used something that the sender has sent since; None if it never did. Times in
     which one of them stood still, as it was paused, do not count."""
+    lost_again: float = inf
+    """When (s) the link was next cut, or began to lose messages."""
+    waited: float = inf
+    """For how long (s) both decided at every tick up to then, if nothing new was used before; else infinite."""
 
 
 class Heals:
@@ -53,6 +57,7 @@ class Heals:
 
     def __init__(self, info: RecordInfo, t_end: float, sent: Mapping[str, SentStates]) -> None:
         self._sent = sent
+        self._T_c = info.T_c if info.simulated else None
         self._coming: dict[Link, deque[Heal]] = defaultdict(deque)
         """Heals of each link, in the order of time."""
         self._waiting: dict[str, list[Heal]] = defaultdict(list)
@@ -72,6 +77,9 @@ class Heals:
         for t, outcome in zip(trace.t, trace.outcome, strict=True):
             if outcome in CUTS:
                 self._was_cut.add(link)
+                for heal in self._healed[link]:
+                    if heal.t < t:
+                        heal.lost_again = min(heal.lost_again, t)
             elif link in self._was_cut and not isinstance(outcome, str):
                 self._was_cut.discard(link)
                 self._add(Heal(link, t))
@@ -97,7 +105,23 @@ class Heals:
                 src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
                 begins = max(_at_work_since(src, used, heal.t), _at_work_since(dst, state.number, heal.t))
                 heal.took = max(0.0, state.t - begins)
-        self._waiting[agent] = [heal for heal in waiting if heal.took is None]
+            elif state.t > heal.lost_again:
+                heal.waited = self._waited(heal, state)
+        self._waiting[agent] = [heal for heal in waiting if heal.took is None and heal.waited == inf]
+
+    def _waited(self, heal: Heal, state: SentState) -> float:
+        """Return for how long (s) both had been at work without a break when a link was lost again.
+
+        In simulated time numbers are ticks, so that pauses show; else it is the time in which both had a process.
+        """
+        src, dst = (self._sent[name] for name in heal.link)
+        begins = _at_work_since(dst.window_at(state.t), state.number, heal.t)
+        if self._T_c is not None:
+            last, window = round(heal.lost_again / self._T_c) - 1, src.window_at(state.t)
+            begins = max(begins, _at_work_since(window, last, heal.t) if window.decided(last) else inf)
+            return max(0.0, heal.lost_again - begins)
+        lives = (min(last, heal.lost_again) - max(first, begins) for first, last in src.epochs.values())
+        return max((0.0, *lives))
 
     def found(self) -> list[Heal]:
         """Return the heals of links over which an agent listens, in the order of links and time."""
@@ -123,17 +147,17 @@ def _at_work_since(window: StateWindow, number: int, t: float) -> float:
     return max(t, window.t(number) or 0.0)
 
 
-def _ends(spans: Iterable[Span]) -> Iterator[float]:
-    """Yield when (s) a link is whole again: cuts may overlap, and messages may go on being lost after one."""
+def _ends(spans: Iterable[Span]) -> Iterator[tuple[float, float]]:
+    """Yield when (s) a link is whole again, and until when: cuts may overlap, and losses may go on after one."""
     until, was_cut = -inf, False
     for span in sorted((it for it in spans if it.kind in LOSSES), key=lambda it: it.from_s):
         if span.from_s > until:
             if was_cut:
-                yield until
+                yield until, span.from_s
             was_cut = False
         until, was_cut = max(until, span.to_s), was_cut or span.kind in CUTS
     if was_cut:
-        yield until
+        yield until, inf
 
 
 def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
@@ -146,5 +170,5 @@ def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
             continue
         for link in ((src, dst) for src in names for dst in names if src != dst):
             ends = _ends(setup.netem.spans(LinkEnds(*link), setup.microgrids))
-            yield from (Heal(link, t) for t in ends if t < t_end)
+            yield from (Heal(link, t, lost_again=again) for t, again in ends if t < t_end)
         return

@@ -172,6 +172,37 @@ def test_a_split_that_outlasts_its_heal_is_caught() -> None:
     assert all("no new value of inv2 is used after the cut ended at 2.16 s" in one.text for one in found.violations)
 
 
+@pytest.mark.parametrize(("again_s", "count"), [(2.5, 0), (3.5, 1)])
+def test_a_heal_is_judged_by_the_time_until_its_link_is_lost_again(again_s: float, count: int) -> None:
+    """Where nothing comes through a cut's end, its link must have been whole for the limit's time to be named."""
+    spans = [(1.5, 2.0), (again_s, 3.8)]
+    changes = repr([{"on": "inv2 -> inv1", "cut": True, "from_s": a, "to_s": b} for a, b in spans])
+    case = ran_with((("case.IV.link", changes), ("time.end_s", "4.5"))).checked_case
+    content = case.content
+    decisions = {
+        agent: [(epoch, deaf(entry) if agent == "inv1" and entry.tick < 180 else entry) for epoch, entry in entries]
+        for agent, entries in content.decisions.items()
+    }
+    found = verdict(with_content(case, replace(content, decisions=decisions)), "heal", within_s=1.0)
+
+    assert [one.text for one in found.violations] == [
+        "no new value of inv2 is used after the cut ended at 2 s" for _ in range(count)
+    ]
+
+
+def test_a_heal_is_not_judged_while_its_receiver_is_away() -> None:
+    """inv2 leaves when a cut ends and comes back into another one: neither end is held against anybody."""
+    links = [
+        {"on": "* <-> *", "cut": True, "from_s": 1.94, "to_s": 1.98},
+        {"on": "inv6 <-> *", "cut": True, "from_s": 2.28, "to_s": 4.02},
+    ]
+    changes = {"case.IV.link": links, "time.end_s": 5.5}
+    run = gp.load("plug-n-play").replace(changes).run("IV")  # its record goes with it
+    found = verdict(run.checked_case, "heal", within_s=1.0)
+
+    assert found.sentence == "heal passed"
+
+
 def deaf(entry: Any) -> Any:
     """A decision that leaves inv2 out, as a state that was never heard."""
     if "inv2" not in entry.neighbours:
