@@ -53,7 +53,7 @@ def copies_of(outcome: Outcome) -> tuple[tuple[float, Count | None], ...]:
     return ((float(outcome), None),) if isinstance(outcome, int | float) else outcome
 
 
-class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
+class LinkCounts(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """Counts of the messages of one link: sent + duplicated = delivered + dropped + in_flight."""
 
     sent: Count
@@ -68,6 +68,8 @@ class LinkCounts(msgspec.Struct, frozen=True, kw_only=True):
     """Arrived with a flipped bit; delivered, or dropped by "checksum"."""
     in_flight: Count
     """Not arrived yet."""
+    lies: Count = 0
+    """States among those sent that say something else here than their sender has decided."""
 
     @property
     def closes(self) -> bool:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from msgspec.structs import replace
+
+from netem.ledger import LinkCounts
 from netem.liar import HeardFrom, LiveHearing, lies_about
 from netem.models import INSTANT
 from netem.models.lie import lie_in_words
@@ -52,6 +56,8 @@ class EmulatedLinks:
         self._dropped_before = 0
         self._liars: dict[str, LiveHearing] = {}
         """Senders about whom lies are told here at some time."""
+        self._lies: Counter[str] = Counter()
+        """States that say something else here than their sender has decided, by sender."""
         self._node_events: list[tuple[float, str, str]] = []
         """Beginnings and ends of lies that are to come: run time (s), agent, sentence."""
         self._begin()
@@ -75,7 +81,10 @@ class EmulatedLinks:
                     return True
                 at += interval.slow
         if src in self._liars and type(message) is State:
-            message = self._liars[src].told(message)
+            told = self._liars[src].told(message)
+            if told is not message and told != message:
+                self._lies[src] += 1
+            message = told
         self._receiver.offer(src, message.seq, t, at, payload, message)
         return True
 
@@ -130,12 +139,17 @@ class EmulatedLinks:
 
     def status(self, t: float) -> bytes:
         """Return the `LinkStatus` at t (s of run time) of each link, by sender, that has or had a fault."""
-        counts, statuses = self._receiver.counts(), {}
+        counts, statuses = self._counts(), {}
         for src in self._senders:
             if self._receiver.was_impaired(src, t):
                 holds = tuple(words(kind, span.model) for kind, span in self._receiver.holding(src, t).items())
                 statuses[src] = LinkStatus(holds=holds, counts=counts.get(src))
         return encode_statuses(statuses)
+
+    def _counts(self) -> dict[str, LinkCounts]:
+        """Return the counts of the messages of each sender so far."""
+        counts = self._receiver.counts()
+        return counts | {src: replace(counts[src], lies=lies) for src, lies in self._lies.items()}
 
     def restart(self) -> None:
         """Forget all commands and all messages on their way: the run's time starts from 0 again."""
@@ -147,6 +161,7 @@ class EmulatedLinks:
         self.clear.clear()
         self._receiver = Receiver(self._name, config.netem, config.microgrids, keep_trace=config.keep_trace)
         self._schedules = LinkSchedules(config.netem, config.microgrids)
+        self._lies.clear()
         self._liars = {
             src: LiveHearing(HeardFrom(config.netem.seed, src, self._name, lies))
             for src in self._senders
@@ -162,7 +177,7 @@ class EmulatedLinks:
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out what the links did since the last report, as encoded `LinkReportData`; the last is never empty."""
-        receiver, counts = self._receiver, self._receiver.counts()
+        receiver, counts = self._receiver, self._counts()
         if not last and not any(book.sent for book in counts.values()):
             return ()
         return report_data(receiver.take_trace(), counts, receiver.trace_sha256, receiver.take_failures())

@@ -179,9 +179,7 @@ class LinkRecord:
 
     def _json(self, check: Report | None) -> str:
         """Return the text of links.json: the hash of all verdicts, the counts of every link, the tests if any."""
-        counts = [
-            {"src": src, "dst": dst, **msgspec.structs.asdict(of)} for (src, dst), of in sorted(self.counts.items())
-        ]
+        counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]
         whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
         whole |= {"tests": [row._asdict() for row in check.rows]} if check else {}
         whole |= {"failures": sorted(self.failures)} if self.failures else {}
@@ -190,8 +188,12 @@ class LinkRecord:
     def _lines(self, check: Report | None) -> Iterator[str]:
         """Yield the lines for the report."""
         dropped: Counter[str] = Counter()
-        for counts in self.counts.values():
+        lies: Counter[str] = Counter()
+        for (src, _), counts in sorted(self.counts.items()):
             dropped.update(counts.dropped)
+            lies[src] += counts.lies
+        false = ", ".join(f"{count} of {src}" for src, count in lies.most_common() if count)
+        false = f", false states: {false}" if false else ""
         shares = (f"{reason} {100.0 * count / self.sent:.2f} %" for reason, count in dropped.most_common())
         checked = ""
         if check is not None:
@@ -199,7 +201,7 @@ class LinkRecord:
             checked = "; self-check: " + (f"{tested} tests, {failed or 'none'} failed" if tested else "nothing to test")
         yield (
             f"emulated links: {self.sent} messages over {sum(of.sent > 0 for of in self.counts.values())} links, "
-            f"dropped: {', '.join(shares) or 'none'}{checked} (links.json, links.csv)"
+            f"dropped: {', '.join(shares) or 'none'}{false}{checked} (links.json, links.csv)"
         )
         yield from (f"WARNING: {warning}" for warning in (*self.warnings, *(check.warnings if check else ())))
         if self.failures:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -71,6 +72,14 @@ def test_lies_have_the_same_story_in_one_process_and_in_many(scenario: Path) -> 
 
     assert together.rows == alone.rows
     assert together.links.sha256 == alone.links.sha256
+    assert together.links.counts == alone.links.counts
+    lies = Counter[str]()
+    for (src, _), counts in alone.links.counts.items():
+        lies[src] += counts.lies
+    assert lies["inv8"] == 5 * 8  # the five ticks of its 0.1 s, to each other agent
+    assert lies["inv3"] == 25 * 8
+    assert set(+lies) == {"inv1", "inv3", "inv4", "inv5", "inv7", "inv8"}
+    assert not any(counts.lies for counts in truth.links.counts.values())
     assert together.outcome.events == alone.outcome.events
     assert truth.rows != alone.rows
     assert truth.rows[20:30] == alone.rows[20:30]  # before 0.3 s

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from msgspec.structs import replace
 
 from netem.ledger import LinkCounts
 from netem.models.copies import Corrupt, Duplicate
@@ -89,6 +90,23 @@ def test_the_recorder_of_a_case_writes_the_files_of_its_links(tmp_path: Path, fi
     assert files == {"history.csv" if finished else "history.partial.csv", "events.csv", "links.csv", "links.json"}
     assert json.loads((tmp_path / "IV" / "links.json").read_text())["accounts"][0]["sent"] == 1
     assert recorded is None or recorded.link_lines[0].startswith("emulated links: 1 messages over 1 links")
+
+
+def test_the_line_of_the_report_says_whose_states_were_false(tmp_path: Path) -> None:
+    """A link that lies drops nothing, and its run is none of a sound network; links.json has the number too."""
+    record = LinkRecord()
+    counts = LinkCounts(sent=50, duplicated=0, delivered=50, dropped={}, corrupted=0, in_flight=0)
+    for receiver, lies in (("inv1", 20), ("inv4", 22)):
+        of = {"inv2": replace(counts, lies=lies), "inv3": counts}
+        for data in report_data((), of, ""):
+            record(LinkReport(sender=receiver, epoch=1, seq=0, t=0.0, data=data))
+
+    (line,) = record.write(tmp_path)
+    assert line == (
+        "emulated links: 200 messages over 4 links, dropped: none, false states: 42 of inv2 (links.json, links.csv)"
+    )
+    accounts = json.loads((tmp_path / "links.json").read_text())["accounts"]
+    assert [each.get("lies") for each in accounts] == [20, 22, None, None]
 
 
 def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path) -> None:
