@@ -18,7 +18,7 @@ from agents.graphs import GraphError
 from agents.island_detector import IslandDetector
 from agents.laws.call import LawError, decide, start_law
 from agents.laws.in_force import law_in_force
-from agents.laws.law import NOTHING, Law, Neighbour, Own
+from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
 from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
 from wire.messages import OFF, Measurement, Nameplate, State
@@ -48,7 +48,7 @@ def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) 
         nameplate.m_p,
         nameplate.m_q,
         nameplate.P_rated,
-        MappingProxyType(state.shared) if state.shared else NOTHING,  # all agents of a process see this one
+        MappingProxyType(state.shared) if state.shared else NOTHING_SHARED,  # all agents of a process see this one
     )
     _converted[name] = state, nameplate, age, weight, neighbour
     return neighbour
@@ -303,7 +303,7 @@ class Agent:
             self._law_runs = False
         around = self._around(measurement.t, neighbours, ages)  # on hold too, to learn the usual ages of links
         self.around = around
-        shared, send = NOTHING, True
+        shared, send = NOTHING_SHARED, True
         if self._takes_part and not measurement.grid_connected:
             own = self._own(measurement)
             try:

@@ -30,7 +30,7 @@ step."""
 T_GAP = 0.2
 """Longest time (s) between two own measurements over which the frequency counts as known."""
 
-RETRY, LONGEST = 10.0, 600.0
+RETRY, LONGEST_RETRY = 10.0, 600.0
 """Time (s) until the first retry of a neighbour out of step, and the longest; it doubles each time."""
 
 TRUSTED = 10.0
@@ -133,7 +133,7 @@ class IslandDetector:
             pair.back, pair.tried, pair.since, pair.slip = None, t, None, 0.0
         if pair.back is None and abs(pair.slip) > self._slip_max:
             again = pair.tried is not None and t - pair.tried < TRUSTED
-            pair.hold = min(2.0 * pair.hold, LONGEST) if again else RETRY
+            pair.hold = min(2.0 * pair.hold, LONGEST_RETRY) if again else RETRY
             pair.back = t + pair.hold
         return pair.back is not None
 

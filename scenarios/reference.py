@@ -38,7 +38,7 @@ from scenarios.schema.scenario_model import (
     Time,
 )
 from wire import bounds, keys, messages
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import KINDS
 from wire.plugins.registry import PluginError, Registry
 from wire.schema.table_schema import fields_of
@@ -115,7 +115,10 @@ def _keys() -> Iterator[str]:
 def _messages() -> Iterator[str]:
     yield "# Messages"
     yield ""
-    yield f"msgpack maps with a field `type` that names the message, and their CRC-32; SI units; at most {LIMIT} bytes."
+    yield (
+        "msgpack maps with a field `type` that names the message, and their CRC-32; SI units; "
+        f"at most {LONGEST_MESSAGE} bytes."
+    )
     yield "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:"
     yield "counted by kind, logged once and dropped."
     common = {doc.name for doc in field_docs(messages.Message)}

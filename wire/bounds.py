@@ -13,7 +13,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-LIMIT = 256_000
+LONGEST_MESSAGE = 256_000
 """Longest message in bytes: room for a row of telemetry on `MOST_INVERTERS` inverters with long names. All other
 messages are a hundredth of it."""
 
@@ -46,7 +46,7 @@ Label = Annotated[str, msgspec.Meta(max_length=200, pattern=_PRINTABLE)]
 Text = Annotated[str, msgspec.Meta(max_length=4000, pattern=_PRINTABLE)]
 """A sentence for people: up to 4000 printable characters on one line."""
 
-Data = Annotated[bytes, msgspec.Meta(max_length=LIMIT)]
+Data = Annotated[bytes, msgspec.Meta(max_length=LONGEST_MESSAGE)]
 """Bytes that no core reads."""
 
 Tree = Annotated[dict[str, Any], msgspec.Meta(max_length=16)]

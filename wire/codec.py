@@ -17,7 +17,7 @@ from zlib import crc32
 
 import msgspec
 
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.messages import AnyMessage, Message
 from wire.printable import printable
 
@@ -96,8 +96,8 @@ def decode(payload: bytes) -> AnyMessage:
     global _latest
     if payload is _latest[0]:
         return _latest[1]
-    if len(payload) > LIMIT:
-        raise RejectedError("oversized", f"{len(payload)} bytes, at most {LIMIT} are allowed")
+    if len(payload) > LONGEST_MESSAGE:
+        raise RejectedError("oversized", f"{len(payload)} bytes, at most {LONGEST_MESSAGE} are allowed")
     if crc32(payload) != _SOUND:
         raise RejectedError("corrupt", f"{len(payload)} bytes that do not end in their CRC-32")
     try:

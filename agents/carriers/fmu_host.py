@@ -17,7 +17,7 @@ import msgspec
 from agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
 from agents.carriers.fmu_interface import named as variables
 from agents.laws.call import LawError, decide, start_law
-from agents.laws.law import LIMITS, NOTHING, Law, Neighbour, Own, SetPoints
+from agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints
 from wire.plugins.anybody import ANYTHING, named
 
 
@@ -83,7 +83,7 @@ class LoadedFmu(Law):
         self._fmu.doStep(currentCommunicationPoint=self._t, communicationStepSize=T)
         self._t += T
         got = self._get()
-        shared = {name: got[f"shared_{name}"] for name in self._shared} or NOTHING
+        shared = {name: got[f"shared_{name}"] for name in self._shared} or NOTHING_SHARED
         return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
 
     def close(self) -> None:

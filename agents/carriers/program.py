@@ -19,7 +19,7 @@ from agents.agent_config import LawChoice
 from agents.carriers.process_group import LEAVING, ProcessGroup
 from agents.carriers.time_limit import FIRST
 from agents.laws.call import LawError
-from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints, limits_in
+from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
 from wire.printable import printable
 
 LONGEST_LINE = 100_000
@@ -94,7 +94,7 @@ class ProgramLaw(Law):
         if decision.P_set is None or decision.V_set is None:
             missing = "P_set" if decision.P_set is None else "V_set"
             raise LawError(f"{self._name} answered a step at t = {own.t:.6g} s without {missing}; e.g. {EXAMPLE}")
-        shared: Mapping[str, float] = decision.shared or NOTHING
+        shared: Mapping[str, float] = decision.shared or NOTHING_SHARED
         return SetPoints(decision.P_set, decision.V_set, shared, decision.send)
 
     def end_input(self) -> None:

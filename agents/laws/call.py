@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from agents.laws.law import NOTHING, Law, Neighbour, Own, SetPoints
+from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
 from wire.bounds import MOST_SHARED, SHARED_LIMIT
 from wire.plugins.anybody import ANYTHING, named
 from wire.printable import printable
@@ -71,7 +71,7 @@ def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
     if not (type(P_set) is type(V_set) is float and isfinite(P_set) and isfinite(V_set)):
         P_set, V_set = _number("P_set", P_set, own.t), _number("V_set", V_set, own.t)
     elif (
-        shared is NOTHING
+        shared is NOTHING_SHARED
         and send is True
         and law.P_set_min <= P_set <= law.P_set_max
         and law.V_set_min <= V_set <= law.V_set_max
@@ -80,7 +80,7 @@ def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
     return SetPoints(
         min(max(P_set, law.P_set_min), law.P_set_max),
         min(max(V_set, law.V_set_min), law.V_set_max),
-        NOTHING if shared is NOTHING else _checked(shared, own.t),
+        NOTHING_SHARED if shared is NOTHING_SHARED else _checked(shared, own.t),
         bool(send),
     )
 

@@ -18,7 +18,7 @@ from wire.schema.plausible import Range, Unit
 from wire.schema.relations import Below
 from wire.schema.table_reading import parameter_values
 
-NOTHING: Mapping[str, float] = MappingProxyType({})
+NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""
 
 
@@ -84,7 +84,7 @@ class Neighbour(NamedTuple):
     """Its Q-V droop (pu)."""
     P_rated: float
     """Its rating (W)."""
-    shared: Mapping[str, float] = NOTHING
+    shared: Mapping[str, float] = NOTHING_SHARED
     """Further values that its law shares."""
 
 
@@ -95,7 +95,7 @@ class SetPoints(NamedTuple):
     """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
     V_set: float
     """Set-point of voltage (pu of own nominal); the agent limits it to V_set_min, V_set_max."""
-    shared: Mapping[str, float] = NOTHING
+    shared: Mapping[str, float] = NOTHING_SHARED
     """Further values for the neighbours, at most 16, each by a name of letters, digits and "_"."""
     send: bool = True
     """Whether the neighbours get the state. If not, they keep the last one that they heard."""

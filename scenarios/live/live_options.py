@@ -10,7 +10,7 @@ from agents.agent_config import AgentConfig
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
 from scenarios.live.feeder_map import feeder_map
-from scenarios.live.run_address import LONGEST, UsageError, check_duration, check_wait
+from scenarios.live.run_address import LONGEST_TIME, UsageError, check_duration, check_wait
 from scenarios.live.run_speed import SPEEDS
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
@@ -112,7 +112,7 @@ def configure(
         schedule=(),  # in a live run, people let agents leave and join
         end=end,
         connect=beyond,
-        wait_for_agents=min(options.wait, LONGEST),  # JSON has no infinity
+        wait_for_agents=min(options.wait, LONGEST_TIME),  # JSON has no infinity
         strict=options.strict,
         feeder_map=msgspec.to_builtins(diagram),
         agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},

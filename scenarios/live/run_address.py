@@ -19,7 +19,7 @@ RUN = "gridpeers"
 ENDPOINT = "tcp/127.0.0.1:7447"
 """Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
 
-LONGEST = 1e9
+LONGEST_TIME = 1e9
 """Longest time (s) of any option, some 30 years; clocks do not reach much further."""
 
 PROBE = 1.0
@@ -123,8 +123,8 @@ def check_wait(wait: float) -> float:
 
 def check_duration(seconds: float | None) -> None:
     """Raise UsageError if a duration (s) cannot be one; None has no end."""
-    if seconds is not None and not 0.0 < seconds <= LONGEST:
-        raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST:g} s, got {seconds:g} s")
+    if seconds is not None and not 0.0 < seconds <= LONGEST_TIME:
+        raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST_TIME:g} s, got {seconds:g} s")
 
 
 def check_endpoint(option: str, text: str) -> str:

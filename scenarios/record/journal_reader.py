@@ -9,7 +9,7 @@ import msgpack
 import msgspec
 
 from scenarios.record.record_info import RecordInfo
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import CRC, sound
 from wire.journal import AnyEntry, Entry, Exchange
 from wire.messages import AnyMessage, Measurement, State
@@ -36,9 +36,10 @@ def raw_entries(data: bytes) -> Iterator[Any]:
     ValueError
         Where the bytes end within a value, or make none.
     """
-    unpacker = msgpack.Unpacker(max_buffer_size=LIMIT, max_array_len=LIMIT, max_map_len=LIMIT, strict_map_key=False)
-    if len(data) > LIMIT:
-        raise ValueError(f"{len(data)} bytes, a part of a journal has at most {LIMIT}")
+    most = LONGEST_MESSAGE
+    unpacker = msgpack.Unpacker(max_buffer_size=most, max_array_len=most, max_map_len=most, strict_map_key=False)
+    if len(data) > most:
+        raise ValueError(f"{len(data)} bytes, a part of a journal has at most {most}")
     unpacker.feed(data)
     end = 0
     while True:

@@ -14,7 +14,7 @@ from scenarios.live.feeder_map import read_feeder_map
 from scenarios.record.journal_reader import entries_of, values_of
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
-from wire.bounds import LIMIT, MOST_COUNT
+from wire.bounds import LONGEST_MESSAGE, MOST_COUNT
 from wire.messages import LinkReport
 
 NO_UTF8 = b"\x81\xa4typ\xe5\x01"
@@ -32,8 +32,8 @@ def test_a_map_with_a_list_as_key_is_no_message_and_no_journal() -> None:
 
 def test_a_journal_longer_than_a_message_is_refused_before_it_is_read() -> None:
     """The buffer of msgpack would overflow with an error of its own."""
-    with pytest.raises(ValueError, match=f"{LIMIT + 1} bytes"):
-        list(entries_of(bytes(LIMIT + 1)))
+    with pytest.raises(ValueError, match=f"{LONGEST_MESSAGE + 1} bytes"):
+        list(entries_of(bytes(LONGEST_MESSAGE + 1)))
 
 
 def test_a_text_that_is_no_utf8_is_no_report() -> None:

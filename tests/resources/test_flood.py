@@ -9,7 +9,7 @@ from pathlib import Path
 
 from tests.resources.trial import Trial, Watch, attack_on, attacking
 from tests.toy.town import Town
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.driver.session import Session
 
 TWO = ("inv1", "inv2")
@@ -37,7 +37,7 @@ def test_floods_of_strangers_are_counted_and_control_goes_on(tmp_path: Path) -> 
 
             def counted() -> bool:
                 for name in TWO:
-                    someone.publish(town.keys.state(name), bytes(LIMIT + 1))
+                    someone.publish(town.keys.state(name), bytes(LONGEST_MESSAGE + 1))
                 return watch.rejected() >= 2 and "oversized" in {kind for _, kind in watch.drops()}
 
             town.until(counted, "the long ones are counted and told")

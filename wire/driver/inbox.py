@@ -11,7 +11,7 @@ from time import monotonic
 from typing import Literal
 
 from wire.backlog import ROOM, SMALL, Backlog, Loss
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 
 Kind = Literal["message", "appeared", "vanished", "word"]
 """A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
@@ -94,7 +94,7 @@ class Inbox:
         """Put a message in that is one of many, or long, if it may wait."""
         _, key, payload = event
         size, known = len(payload), asked or self.is_known(key, payload)
-        if size > LIMIT and not asked:
+        if size > LONGEST_MESSAGE and not asked:
             self._refuse(key, size)
             return
         with self._guard:
@@ -120,7 +120,7 @@ class Inbox:
 
     def _refuse(self, key: str, size: int) -> None:
         with self._guard:
-            self._backlog.lose(key, "oversized", f"{size} bytes, at most {LIMIT} are allowed")
+            self._backlog.lose(key, "oversized", f"{size} bytes, at most {LONGEST_MESSAGE} are allowed")
 
     def take_losses(self) -> tuple[Loss, ...]:
         """Take out the messages that were dropped since the last call."""

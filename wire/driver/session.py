@@ -81,9 +81,9 @@ _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
 MOST_BYTES = 8_000_000
-"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have `wire.bounds.LIMIT`
-at most, a configuration or a feeder's diagram more. After a longer one it passes nothing more of that sender on that
-link."""
+"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have
+`wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it passes nothing
+more of that sender on that link."""
 
 MOST_UNPREPARED = 64
 """Publishers that are kept for keys that nobody has prepared, such as those of answers: anybody may ask, under as many

@@ -20,7 +20,7 @@ from scenarios.emulation.link_reports import LinkStatus, data_of
 from scenarios.record.record_reader import RunRecord
 from wire.messages import LinkReport, LinkRequest
 
-NOTHING = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
+NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
 """Counts of a link before its first message."""
 
 
@@ -57,7 +57,7 @@ class LinkFaults:
                 active = schedule.at(t).active
                 if active:
                     holds = tuple(words(kind, span.model) for kind, span in active.items())
-                    found.setdefault(dst, {})[src] = LinkStatus(holds=holds, counts=counts.get((src, dst), NOTHING))
+                    found.setdefault(dst, {})[src] = LinkStatus(holds=holds, counts=counts.get((src, dst), NO_MESSAGES))
         return found
 
     def _renew(self, config: EmulationConfig) -> None:
@@ -83,10 +83,10 @@ class LinkFaults:
         counts: dict[tuple[str, str], LinkCounts] = {}
         for part in self._index.near(since, until):
             for link, (sent, dropped) in self._verdicts_in(part).items():
-                before = counts.get(link, NOTHING)
+                before = counts.get(link, NO_MESSAGES)
                 lost = before.dropped.get("", 0) + _between(dropped, since, until)
                 number = before.sent + _between(sent, since, until)
-                counts[link] = msgspec.structs.replace(NOTHING, sent=number, dropped={"": lost})
+                counts[link] = msgspec.structs.replace(NO_MESSAGES, sent=number, dropped={"": lost})
         return counts
 
     def _read_verdicts(self, part: int) -> dict[tuple[str, str], tuple[list[float], list[float]]]:

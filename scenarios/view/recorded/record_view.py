@@ -22,7 +22,7 @@ from scenarios.view.link_states import LinkView
 from scenarios.view.liveness import LivenessView
 from scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
 from scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
-from scenarios.view.recorded.link_faults import NOTHING, LinkFaults
+from scenarios.view.recorded.link_faults import NO_MESSAGES, LinkFaults
 from scenarios.view.recorded.plant_rows import PlantRows
 from scenarios.view.run_view import Cursor, EventView, Frame, RunView
 from scenarios.view.strips import LENGTH
@@ -209,7 +209,7 @@ class RecordView:
         view.statuses(statuses, {name: sent[name] / span for name in agents}, t)
         for name in agents:
             if impaired := faults.get(name):
-                view.accounts(name, {src: replace(link, counts=NOTHING) for src, link in impaired.items()})
+                view.accounts(name, {src: replace(link, counts=NO_MESSAGES) for src, link in impaired.items()})
                 view.accounts(name, impaired)
 
     def _noted(self, one: InverterStatus, agents: Mapping[str, AgentMoment]) -> InverterStatus:

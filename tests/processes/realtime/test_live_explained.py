@@ -22,7 +22,7 @@ from scenarios.trace.flows import flows
 from tests.hostile.cases import sealed
 from tests.processes.realtime.test_live_record import recorded
 from tests.toy.toy_configs import toy_configs
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys
@@ -80,7 +80,7 @@ def hostile(epoch: int) -> dict[str, bytes]:
     """Return what a foreigner publishes as states of inv1, whose epoch it has heard, by the kind of its rejection."""
     state = State(sender="inv1", epoch=epoch, seq=10**6, t=1.0, P_set=0.0, V_set=277.0, Q=0.0)
     return {
-        "oversized": bytes(LIMIT + 1),
+        "oversized": bytes(LONGEST_MESSAGE + 1),
         "corrupt": b"\xff" * 100,
         "garbled": sealed(b"\xc1"),
         "unknown": sealed(msgspec.msgpack.encode({"type": "Rumour", "sender": "inv1"})),

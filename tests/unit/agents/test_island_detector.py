@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.island_detector import LONGEST, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
+from agents.island_detector import LONGEST_RETRY, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
 
 T, F_NOM, SLIP_MAX = 0.02, 60.0, 0.01
 
@@ -96,7 +96,7 @@ def test_whoever_was_apart_is_tried_again_ever_more_rarely() -> None:
 
     gaps = [b - a for a, b in pairwise(left)]
     assert gaps[:7] == pytest.approx([10, 20, 40, 80, 160, 320, 600], abs=1.0)
-    assert gaps[-1] == pytest.approx(LONGEST, abs=1.0)
+    assert gaps[-1] == pytest.approx(LONGEST_RETRY, abs=1.0)
 
 
 def test_after_some_time_in_step_the_next_time_apart_counts_as_the_first() -> None:

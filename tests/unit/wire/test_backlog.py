@@ -8,12 +8,12 @@ import pytest
 
 from tests.hostile.cases import packed, sound
 from wire.backlog import BYTES, MOST_OF_ONE, ROOM, SMALL, Backlog, Loss, is_marked
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import KINDS, decode, encode
 from wire.driver.inbox import Inbox
 from wire.messages import MESSAGES, Message, State
 
-LONG = bytes(LIMIT)
+LONG = bytes(LONGEST_MESSAGE)
 
 
 def state(epoch: int, seq: int = 0) -> bytes:
@@ -74,13 +74,13 @@ def test_long_messages_are_bounded_by_their_bytes() -> None:
     inbox = Inbox()
     inbox.is_known = lambda key, payload: key == "telemetry"
     for key in ("command", "telemetry"):
-        for _ in range(2 * BYTES // LIMIT):
+        for _ in range(2 * BYTES // LONGEST_MESSAGE):
             inbox.put(("message", key, LONG))
     taken = inbox.take(1, 0.0)
     inbox.put(("message", "command", LONG))
 
-    assert BYTES - LIMIT <= sum(len(payload) for _, _, payload, _ in taken) <= BYTES
-    assert sum(key == "command" for _, key, _, _ in taken) == BYTES // 4 // LIMIT
+    assert BYTES - LONGEST_MESSAGE <= sum(len(payload) for _, _, payload, _ in taken) <= BYTES
+    assert sum(key == "command" for _, key, _, _ in taken) == BYTES // 4 // LONGEST_MESSAGE
     assert len(inbox.take(1, 0.0)) == 1
 
 
@@ -88,7 +88,7 @@ def test_in_simulated_time_a_known_sender_waits_for_room_and_loses_nothing() -> 
     """The thread that brings messages stands still until the owner has read; so the sender is as slow as the owner."""
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: True
-    count = 2 * BYTES // LIMIT
+    count = 2 * BYTES // LONGEST_MESSAGE
 
     def bring() -> None:
         for _ in range(count):
@@ -103,16 +103,16 @@ def test_in_simulated_time_a_known_sender_waits_for_room_and_loses_nothing() -> 
     bringing.join()
 
     assert taken == count
-    assert most <= BYTES // LIMIT + 1
+    assert most <= BYTES // LONGEST_MESSAGE + 1
     assert inbox.take_losses() == ()
 
 
 def test_what_is_longer_than_a_message_never_waits() -> None:
     """The first is told with its length, all are counted."""
     inbox = Inbox()
-    for length in (LIMIT + 1, LIMIT + 2):
+    for length in (LONGEST_MESSAGE + 1, LONGEST_MESSAGE + 2):
         inbox.put(("message", "state/inv2", bytes(length)))
-    text = f"{LIMIT + 1} bytes, at most {LIMIT} are allowed"
+    text = f"{LONGEST_MESSAGE + 1} bytes, at most {LONGEST_MESSAGE} are allowed"
 
     assert inbox.take(1, 0.0) == []
     assert inbox.take_losses() == (Loss("state/inv2", "oversized", text, 2),)

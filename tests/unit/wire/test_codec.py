@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from msgspec import inspect
 
 from tests.hostile.cases import cases, packed, plain, sealed, sound
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import KINDS, RejectedError, RejectedMessages, decode, encode
 from wire.messages import (
     MESSAGES,
@@ -136,7 +136,7 @@ def test_rejects_are_told_apart() -> None:
     def kind_of_changed(**changes: Any) -> str:
         return kind_of(sealed(msgspec.msgpack.encode(whole | changes)))
 
-    assert kind_of(b"\xc1" * (LIMIT + 1)) == "oversized"
+    assert kind_of(b"\xc1" * (LONGEST_MESSAGE + 1)) == "oversized"
     assert kind_of(b"") == kind_of(encode(STATE)[:-1]) == kind_of(encode(STATE)[:-4]) == "corrupt"
     assert kind_of(sealed(b"")) == "garbled"
     assert kind_of_changed(type="Bomb") == "unknown"

@@ -6,10 +6,10 @@ import pytest
 
 import wire.driver.inbox
 from wire.backlog import BYTES, MOST_OF_ONE, ROOM
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.driver.inbox import Inbox
 
-LONG = bytes(LIMIT)
+LONG = bytes(LONGEST_MESSAGE)
 
 
 def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:
@@ -45,7 +45,7 @@ def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatc
     monkeypatch.setattr(wire.driver.inbox, "HELD", 3600.0)
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: True
-    each, senders = 4 * BYTES // LIMIT // 8, 8
+    each, senders = 4 * BYTES // LONGEST_MESSAGE // 8, 8
 
     def bring(key: str) -> None:
         for _ in range(each):
@@ -56,12 +56,12 @@ def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatc
         thread.start()
     taken = []
     while sum(taken) < each * senders:
-        wanted = min(each * senders - sum(taken), 3 * BYTES // LIMIT)
+        wanted = min(each * senders - sum(taken), 3 * BYTES // LONGEST_MESSAGE)
         taken.append(len(inbox.take(wanted, None)))
     for thread in bringing:
         thread.join()
 
-    assert max(taken) <= BYTES // LIMIT
+    assert max(taken) <= BYTES // LONGEST_MESSAGE
     assert inbox.take_losses() == ()
 
 
@@ -92,7 +92,7 @@ def test_a_message_that_has_waited_too_long_for_room_comes_in(monkeypatch: pytes
     monkeypatch.setattr(wire.driver.inbox, "HELD", 0.0)
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: key == "telemetry"
-    room = BYTES // LIMIT
+    room = BYTES // LONGEST_MESSAGE
     for _ in range(room + 2):
         inbox.put(("message", "telemetry", LONG))
 

@@ -16,7 +16,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import ToyPlant
-from wire.bounds import LIMIT
+from wire.bounds import LONGEST_MESSAGE
 from wire.codec import encode
 from wire.messages import Ready, State, Stop, Telemetry
 
@@ -204,7 +204,7 @@ def test_large_telemetry_is_split() -> None:
     run_inprocess(alone, (), telemetry.append, plant=ToyPlant(config))
 
     assert sum(len(message.rows) for message in telemetry) == 11
-    assert max(len(encode(message)) for message in telemetry) < LIMIT
+    assert max(len(encode(message)) for message in telemetry) < LONGEST_MESSAGE
     assert len(telemetry) > 3
 
 

@@ -178,4 +178,4 @@ def test_a_plant_can_wait_for_its_agents_for_ever() -> None:
     """An infinite --wait reaches the plant as a time that JSON can say."""
     plant, _ = configure(*load_scenario("islanding"), LiveOptions(run="lab", wait=float("inf")), "tcp/127.0.0.1:7447")
 
-    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == run_address.LONGEST
+    assert msgspec.json.decode(msgspec.json.encode(plant), type=PlantConfig).wait_for_agents == run_address.LONGEST_TIME
