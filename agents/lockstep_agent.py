@@ -181,6 +181,13 @@ class LockstepAgent(AgentNode):
             tick = "" if self._tick is None else f" at tick {self._tick}"
             self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
+    def is_noted(self, key: str) -> bool:
+        """Whether the holder of a token is noted, or is on the roster."""
+        match self.keys.parts(key):
+            case ("alive", "agent", name, instance) if self._processes.get(name) == instance:
+                return True
+        return super().is_noted(key)
+
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone; another agent of this process may have noted it before."""
         match self.keys.parts(key):

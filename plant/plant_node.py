@@ -27,6 +27,9 @@ from wire.timing.clock import ticks_until, time_of
 CLOSING = 2.0
 """Longest wait (s) for the other nodes to close."""
 
+MOST_RECORDERS = 20
+"""Recorders that are noted beside those that the run waits for: anybody may hold tokens."""
+
 STAYS = "its inverter stays on primary droop at its last set-points"
 """State of the inverter whose agent has died."""
 
@@ -63,7 +66,7 @@ class PlantNode(Node):
         self._end_tick = None if config.end is None else ticks_until(config.end, config.T_c)
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
-        """All present tokens of agents and recorders, refused ones too."""
+        """Present tokens of agents and recorders that take part."""
         self._schedule = AgentSchedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
@@ -93,17 +96,18 @@ class PlantNode(Node):
         """Note that a token appeared; of two processes of one name the first takes part."""
         self._note_token(key, now, appeared=True)
         match self.keys.parts(key):
-            case ("alive", "recorder", name):
+            case ("alive", "recorder", name) if self._has_room(name):
                 self._tokens.add(key)
                 self._recorders.add(name)
                 self._recorder_came(name, now)
+            case ("alive", "recorder", name):
+                self.rejects.add("excess", key, f"the token of recorder {name}; {MOST_RECORDERS} others hold tokens")
             case ("alive", "agent", name, instance):
-                self._tokens.add(key)
                 refusal = self._refusal(name, instance)
                 if refusal:
                     self._refuse(name, instance, refusal, now)
-                else:
-                    self._process_came(name, instance)
+                elif self._process_came(name, instance):
+                    self._tokens.add(key)
 
     def vanished(self, key: str, now: float) -> None:
         """Note that a token is gone, and with it its holder."""
@@ -116,6 +120,15 @@ class PlantNode(Node):
             case ("alive", "agent", name, instance) if self._forget_process(name, instance):
                 self._agent_gone(name, now)
         self._close_if_alone()
+
+    def is_noted(self, key: str) -> bool:
+        """Whether the holder of a token takes part."""
+        return key in self._tokens or super().is_noted(key)
+
+    def _has_room(self, recorder: str) -> bool:
+        """Whether a recorder is needed, noted already, or one of few."""
+        known = recorder in self._recorders or recorder in self.config.recorders
+        return known or len(self._recorders) < MOST_RECORDERS
 
     def _is_taken(self, name: str, instance: str) -> bool:
         """Whether another process holds a name."""

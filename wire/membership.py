@@ -62,6 +62,10 @@ class Membership:
         instances = self._instances.get(name)
         return len(self._instances) < MOST_INVERTERS if instances is None else len(instances) < MOST_PROCESSES
 
+    def notes(self, name: str, instance: str) -> bool:
+        """Return whether a process is noted, one that counts no more included; any thread may ask."""
+        return instance in self._instances.get(name, ()) or self._dismissed.get(name) == instance
+
     def appeared(self, name: str, instance: str) -> bool:
         """Note a token; return whether its process counts."""
         instances = self._instances.setdefault(name, [])

@@ -8,7 +8,7 @@ thread and does
     node.work(now)                                          for at most one piece of work, if it is ready
     for action in node.take_actions(): ...                  to perform the actions, in this order
     node.expire(now)                                        when `node.deadline` has passed
-    node.lost(loss, now)                                    for messages that it has dropped unread
+    node.lost(loss, now)                                    for messages and tokens that it has dropped unread
 
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
@@ -150,8 +150,18 @@ class Node:
         epoch = None if route is None else self.admission.epochs.get(route.sender)
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
+    def is_noted(self, key: str) -> bool:
+        """Whether the holder of a token is noted, so that its end must be known; see `wire.token_queue`.
+
+        Any thread may ask.
+        """
+        match self.keys.parts(key):
+            case ("alive", "agent", name, instance):
+                return self.members.notes(name, instance)
+        return False
+
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages that the driver has dropped unread; the journal has their number."""
+        """Count messages and tokens that the driver has dropped unread; the journal has their number."""
         self.rejects.add(loss.kind, loss.key, loss.text, count=loss.number)
         if self.traffic is not None:
             self.traffic.lost(loss.key, loss.kind, loss.number, now)
@@ -163,14 +173,15 @@ class Node:
 
     # ---------------------------------------------------------------- nameplates
 
-    def _process_came(self, name: str, instance: str) -> None:
-        """Note the token of an agent's process and ask it for its nameplate, unless too many processes are noted."""
+    def _process_came(self, name: str, instance: str) -> bool:
+        """Note the token of an agent's process and ask for its nameplate; return False if there is no room for it."""
         if self.members.has_room(name):
             self.members.appeared(name, instance)
             self._ask(name, instance)
-        else:
-            text = f"a token of {name}: too many processes hold tokens"
-            self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
+            return True
+        text = f"a token of {name}: too many processes hold tokens"
+        self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
+        return False
 
     def _ask(self, name: str, instance: str) -> None:
         """Ask a process for its nameplate."""

@@ -51,6 +51,7 @@ class GroupedNode(Protocol):
     def vanished(self, key: str, now: float) -> None: ...  # noqa: D102
     def received(self, key: str, payload: bytes, now: float) -> None: ...  # noqa: D102
     def is_known(self, key: str, payload: bytes) -> bool: ...  # noqa: D102
+    def is_noted(self, key: str) -> bool: ...  # noqa: D102
     def lost(self, loss: Loss, now: float) -> None: ...  # noqa: D102
     def work(self, now: float) -> bool: ...  # noqa: D102
     def expire(self, now: float) -> None: ...  # noqa: D102
@@ -201,8 +202,12 @@ class NodeGroup:
         """Whether a message looks like one of the sender of its key, to any of the nodes."""
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
+    def is_noted(self, key: str) -> bool:
+        """Whether any of the nodes has noted the holder of a token."""
+        return any(node.is_noted(key) for node in tuple(self._active))
+
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages that the driver has dropped unread; who waits for a lost answer asks again."""
+        """Count messages and tokens that the driver has dropped unread; who waits for a lost answer asks again."""
         query = self._open.pop(loss.key, None)
         if query is not None:
             self._queries.pop(loss.key.partition("#")[0], None)

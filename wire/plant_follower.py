@@ -9,6 +9,10 @@ from wire.keys import epoch_of
 from wire.messages import PLANT, AnyMessage
 from wire.node import Node, Route
 
+MOST_PLANTS = 64
+"""Plants of one run that may hold tokens: two, while one replaces another; those that a recorder has outlived; some
+that are mistaken."""
+
 
 class PlantFollower(Node):
     """Follow the present plant that sends first, until its token is gone.
@@ -29,11 +33,16 @@ class PlantFollower(Node):
         """Epochs of the present plants."""
 
     def _plant_appeared(self, part: str) -> bool:
-        """Note a plant's token by its last part; return False if that is no epoch."""
+        """Note a plant's token by its last part; return False if that is no epoch, or one of too many."""
         epoch = epoch_of(part)
-        if epoch is not None:
-            self._plants.add(epoch)
-        return epoch is not None
+        if epoch is None:
+            return False
+        if len(self._plants) >= MOST_PLANTS and epoch not in self._plants:
+            text = f"the token of one more plant; {MOST_PLANTS} hold tokens"
+            self.rejects.add("excess", self.keys.alive_plant(epoch), text)
+            return False
+        self._plants.add(epoch)
+        return True
 
     def _plant_vanished(self, part: str) -> bool:
         """Note that a plant's token is gone; return whether this node has no plant now."""
@@ -44,6 +53,13 @@ class PlantFollower(Node):
         if followed == epoch:
             self.admission.release(PLANT)
         return followed == epoch or not self._plants
+
+    def is_noted(self, key: str) -> bool:
+        """Whether the holder of a token is noted, be it a plant that is not followed."""
+        match self.keys.parts(key):
+            case ("alive", "plant", part):
+                return epoch_of(part) in self._plants
+        return super().is_noted(key)
 
     def is_known(self, key: str, payload: bytes) -> bool:
         """Whether a message looks like one of the sender of its key, be it a plant that is not followed yet."""

@@ -92,12 +92,13 @@ class LivePlantNode(PlantNode):
 
     def appeared(self, key: str, now: float) -> None:
         """Note that a token appeared; an agent that comes after the end has missed the `Stop` to all."""
-        parts = self.keys.parts(key)
-        if self.phase == "closing" and parts[:2] == ("alive", "agent"):
-            self._tokens.add(key)
-            self.stop(self.keys.stop_request(*parts[2:]), self.outcome or "the run has ended")
-        else:
-            super().appeared(key, now)
+        match self.keys.parts(key):
+            case ("alive", "agent", name, instance) if self.phase == "closing":
+                if self._may_tell(name, instance, now):
+                    self._tokens.add(key)
+                    self.stop(self.keys.stop_request(name, instance), self.outcome or "the run has ended")
+            case _:
+                super().appeared(key, now)
 
     def _refusal(self, name: str, instance: str) -> str:
         if name not in self.plant.inverters:
@@ -108,14 +109,20 @@ class LivePlantNode(PlantNode):
         return ""
 
     def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
-        if self._refusal_limit.admit("refused", now) is None:
-            text = f"a token of {name}, one of too many to be told that they are refused"
-            self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
+        if not self._may_tell(name, instance, now):
             return
         self._refusals += 1
         if self._refusals <= REFUSALS:
             self._say(f"refused {reason}" + ("; further refusals are not logged" * (self._refusals == REFUSALS)))
         super()._refuse(name, instance, reason, now)
+
+    def _may_tell(self, name: str, instance: str, now: float) -> bool:
+        """Return whether a process is told that it cannot take part; count it if too many are."""
+        if self._refusal_limit.admit("refused", now) is not None:
+            return True
+        text = f"a token of {name}, one of too many to be told that they are refused"
+        self.rejects.add("excess", self.keys.alive_agent(name, instance), text)
+        return False
 
     def _ask_again(self, now: float) -> None:
         """Ask for the nameplates that have not come."""

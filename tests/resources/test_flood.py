@@ -16,7 +16,7 @@ TWO = ("inv1", "inv2")
 
 
 def test_floods_of_strangers_are_counted_and_control_goes_on(tmp_path: Path) -> None:
-    """States, measurements, stops, questions, long messages of somebody: the run goes on, and says how many it got."""
+    """States, measurements, stops, questions, tokens, long messages of somebody: the run goes on, and says how many."""
     with Town(2, tmp_path).all() as town:
         found: dict[str, Trial] = {}
         watch = Watch(town)
@@ -30,6 +30,11 @@ def test_floods_of_strangers_are_counted_and_control_goes_on(tmp_path: Path) -> 
             town.until(lambda: watch.rejected() > 3_000, "thousands are counted")
             town.until(lambda: abs(town.rows[-1][1] - 60.0) < 0.005, "the frequency is restored meanwhile")
         found["foreign"] = watch.result(town.rows[watch.first_row :])
+        watch = Watch(town)
+        with attacking(attack_on(town, "tokens", 0.0, tokens=400), tmp_path):
+            town.until(lambda: watch.rejected() > 400, "the plant and the agents have counted them")
+            watch.run_on(0.5)
+        found["tokens"] = watch.result(town.rows[watch.first_row :])
         watch = Watch(town)
         someone = Session("someone", listen=("tcp/127.0.0.1:0",), connect=(town.endpoint,), clock="wall")
         try:
@@ -49,6 +54,7 @@ def test_floods_of_strangers_are_counted_and_control_goes_on(tmp_path: Path) -> 
 
         assert found["commands"].rejected > 0
         assert "corrupt" in found["foreign"].kinds
+        assert "excess" in found["tokens"].kinds
         assert "oversized" in found["long"].kinds
         for kind, trial in found.items():
             assert trial.rows > 0, kind

@@ -83,8 +83,12 @@ class Core(Protocol):
         """Whether a message looks like one of a known sender; called from any thread."""
         ...
 
+    def is_noted(self, key: str) -> bool:
+        """Whether the holder of a token is noted; called from any thread."""
+        ...
+
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages that were dropped unread."""
+        """Count messages and tokens that were dropped unread."""
         ...
 
     def work(self, now: float) -> bool:
@@ -154,7 +158,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     StoppedError
         If another thread asks the process to stop.
     """
-    session.inbox.is_known = core.is_known
+    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
     take = session.take
     limit = limit_log(log)
     now = monotonic()

@@ -7,11 +7,13 @@ from _thread import allocate_lock
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from math import inf
 from time import monotonic
 from typing import Literal
 
 from wire.backlog import ROOM, SMALL, Backlog, Loss
 from wire.bounds import LONGEST_MESSAGE
+from wire.token_queue import TokenEvent, TokenQueue
 
 Kind = Literal["message", "appeared", "vanished", "word"]
 """A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
@@ -29,7 +31,7 @@ sender that waits so long for each cannot bring many."""
 
 
 class Inbox:
-    """Queue events from Zenoh's threads to the owner's thread, within the bounds of `wire.backlog`.
+    """Queue events from Zenoh's threads to the owner's thread, within the bounds of `wire.backlog` and of tokens.
 
     The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine
     this is one wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
@@ -44,6 +46,9 @@ class Inbox:
     ----------
     is_known : Callable[[str, bytes], bool]
         Whether a message on a key is of a known sender; called from Zenoh's threads, and only when many wait.
+    is_noted : Callable[[str], bool]
+        Whether the owner has noted the holder of a token, so that it must learn of its end (`wire.token_queue`); called
+        from Zenoh's threads. By default it has noted everybody, and no token is lost.
 
     Examples
     --------
@@ -57,20 +62,21 @@ class Inbox:
 
     def __init__(self, *, holds: bool = False) -> None:
         self.is_known: Callable[[str, bytes], bool] = lambda key, payload: False
+        self.is_noted: Callable[[str], bool] = lambda key: True
         self._holds = holds
         self._events: deque[Stamped] = deque()
         self._needed = 1
         self._urgent = False
         self._wake = allocate_lock()
         self._wake.acquire()
-        self._backlog, self._guard = Backlog(), allocate_lock()
-        """The guard is held while the backlog is read or changed, and while a message that it has counted is put in."""
+        self._backlog, self._tokens, self._guard = Backlog(), TokenQueue(), allocate_lock()
+        """The guard is held while backlog or tokens are read or changed, and while what they admit is put in."""
         self._counted = False
         """Whether the backlog has counted any of the messages that wait, or one waits for room."""
         self._emptied = threading.Condition(self._guard)
 
     def put(self, event: Event, *, asked: bool = False) -> None:
-        """Put an event in, from any thread; drop and count a message for which there is no room.
+        """Put an event in, from any thread; drop and count a message or token for which there is no room.
 
         Parameters
         ----------
@@ -79,7 +85,9 @@ class Inbox:
         asked : bool, optional
             Whether it answers an own question.
         """
-        if event[0] != "message":
+        if event[0] == "appeared" or event[0] == "vanished":
+            self._put_token(event[0], event[1])
+        elif event[0] != "message":
             self._events.append((*event, monotonic()))
             self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
         elif len(self._events) < ROOM and len(event[2]) <= SMALL:
@@ -89,6 +97,17 @@ class Inbox:
         if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
+
+    def _put_token(self, kind: TokenEvent, key: str) -> None:
+        """Put a token in, or let it wait; the owner is woken for the first that waits too, as its time is near."""
+        at = monotonic()
+        with self._guard:
+            waited = self._tokens.waiting
+            comes = self._tokens.put(kind, key, at, self.is_noted)
+            if comes:
+                self._events.append((kind, key, b"", at))
+            if comes or (not waited and self._tokens.waiting):
+                self._urgent = True
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
         """Put a message in that is one of many, or long, if it may wait."""
@@ -123,11 +142,11 @@ class Inbox:
             self._backlog.lose(key, "oversized", f"{size} bytes, at most {LONGEST_MESSAGE} are allowed")
 
     def take_losses(self) -> tuple[Loss, ...]:
-        """Take out the messages that were dropped since the last call."""
-        if not self._backlog.has_losses:
+        """Take out the messages and tokens that were dropped since the last call."""
+        if not (self._backlog.has_losses or self._tokens.has_loss):
             return ()
         with self._guard:
-            return self._backlog.take_losses()
+            return self._backlog.take_losses() + self._tokens.take_loss()
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take all events out.
@@ -148,16 +167,25 @@ class Inbox:
         self._wake.acquire(blocking=False)  # forget an old wake
         self._needed = needed
         if len(events) < needed and not self._urgent:
-            self._wake.acquire(timeout=-1.0 if timeout is None else timeout)
+            self._wake.acquire(timeout=self._longest(timeout))
         self._urgent = False
         taken = []
         while events:
             taken.append(events.popleft())
-        if self._counted:
+        if self._counted or not self._tokens.is_idle:
             with self._guard:
-                while events:  # none that is counted waits any more
+                while events:  # none that is counted waits any more, and no token that comes in now
                     taken.append(events.popleft())
                 self._counted = False
                 self._backlog.emptied()
                 self._emptied.notify_all()
+                arrivals = self._tokens.taken(monotonic())
+            taken += [("appeared", key, b"", at) for key, at in arrivals]
         return taken
+
+    def _longest(self, timeout: float | None) -> float:
+        """Return how long to wait (s), until a token that waits may come in at the latest; -1 for no limit."""
+        due = self._tokens.due
+        if due == inf:
+            return -1.0 if timeout is None else timeout
+        return max(0.0, min(due - monotonic(), inf if timeout is None else timeout))

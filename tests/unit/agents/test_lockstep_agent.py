@@ -315,3 +315,14 @@ def test_a_state_of_a_later_tick_is_left_alone() -> None:
 
     assert lab.node.rejects.counts == {}
     assert lab.missing == [("State(4)", "inv2")]
+
+
+def test_the_process_on_the_roster_is_noted_until_its_token_is_gone() -> None:
+    """Its end must come in, whatever else is there; of a process that nobody has seen it need not."""
+    lab = Lab()
+    lab.token("inv2")
+    noted = [lab.node.is_noted(KEYS.alive_agent("inv2", instance)) for instance in ("inv2", "other")]
+    lab.token("inv2", gone=True)
+
+    assert noted == [True, False]
+    assert not lab.node.is_noted(KEYS.alive_agent("inv2", "inv2"))

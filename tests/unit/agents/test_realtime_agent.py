@@ -9,6 +9,7 @@ from agents.realtime.realtime_agent import RealtimeAgent
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 from wire.messages import Leave, Stop
+from wire.plant_follower import MOST_PLANTS
 
 
 def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:
@@ -321,6 +322,34 @@ def test_a_message_on_which_the_agent_fails_costs_only_itself() -> None:
     assert "in broken" in line
     assert "\x1b" not in line
     assert len(lab.decided()) == 1
+
+
+def test_the_plant_that_is_followed_stays_whoever_else_claims_to_be_one() -> None:
+    """A bounded number of others is noted, the rest counted; the run goes on, and ends with its own plant's token."""
+    lab = running("inv2")
+    for epoch in range(1_000, 2_000):
+        lab.side.appeared(KEYS.alive_plant(epoch), lab.now)
+    noted = [epoch for epoch in range(1_000, 2_000) if lab.side.is_noted(KEYS.alive_plant(epoch))]
+    lab.measure(1)
+    lab.go(T_C)
+
+    assert len(noted) == MOST_PLANTS - 1
+    assert lab.side.rejects.counts == {"excess": 1_000 - len(noted)}
+    assert lab.side.phase == "running"
+    lab.token("plant", gone=True)
+    assert lab.side.phase == "waiting"
+
+
+def test_of_a_token_it_says_whether_its_holder_is_noted() -> None:
+    """The others and the plant, as long as their tokens are there; not the own, and nobody of whom it knows nothing."""
+    lab = running("inv2")
+    tokens = KEYS.alive_agent("inv2", "a"), KEYS.alive_plant(1)
+    before = [lab.side.is_noted(key) for key in (*tokens, lab.side.token, KEYS.alive_agent("inv3", "x"), "x")]
+    lab.token("inv2", gone=True)
+    lab.token("plant", gone=True)
+
+    assert before == [True, True, False, False, False]
+    assert [lab.side.is_noted(key) for key in tokens] == [False, False]
 
 
 def test_a_token_that_no_plant_can_hold_is_no_plant() -> None:

@@ -52,6 +52,10 @@ class Node:
         """Drop the token."""
         self.known.discard(key)
 
+    def is_noted(self, key: str) -> bool:
+        """Whether it knows the token."""
+        return key in self.known
+
     def received(self, key: str, payload: bytes, now: float) -> None:
         """Keep the message."""
         self.heard.append((key, payload))
@@ -132,6 +136,17 @@ def test_nodes_inside_meet_without_the_session() -> None:
     assert (a.known, b.known) == ({"alive/b"}, {"alive/a"})
     assert a.heard == [("nameplate/b", b"I am b")]
     assert a.siblings == {"a", "b"}
+
+
+def test_a_token_is_noted_while_one_of_the_nodes_knows_its_holder() -> None:
+    """Then its end comes to all of them."""
+    a, b = Node("a"), Node("b")
+    both = group(a, b)
+    b.appeared("alive/c", 0.0)
+
+    assert both.is_noted("alive/c")
+    both.vanished("alive/c", 0.0)
+    assert not both.is_noted("alive/c")
 
 
 def test_a_node_that_has_finished_takes_its_token_along() -> None:

@@ -1,0 +1,179 @@
+"""Which tokens come to a process that somebody floods with them, and in which order."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from unittest.mock import patch
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from wire.driver.inbox import Inbox
+from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TokenEvent, TokenQueue
+
+ROOM = 5
+"""Strangers' tokens that may wait in the drawn sequences."""
+
+MEMBERS, WELCOME, REFUSED = ("m0", "m1"), ("w0", "w1", "w2"), tuple(f"s{i}" for i in range(40))
+
+
+class Process:
+    """A process that notes some holders, handles what it takes with delay, and knows the truth for comparison."""
+
+    def __init__(self) -> None:
+        self.queue, self.now = TokenQueue(), 0.0
+        self.pending: list[tuple[TokenEvent, str]] = []
+        """Events that have come in and are not taken yet."""
+        self.taken: list[tuple[TokenEvent, str]] = []
+        """Events that it has taken and not handled yet."""
+        self.noted: set[str] = set()
+        self.there: set[str] = set()
+        """Tokens that are held."""
+        self.seen: dict[str, list[TokenEvent]] = {}
+        """Events of each token in the order in which they came in."""
+        self.appeared = self.annihilated = self.lost = 0
+
+    def flip(self, key: str) -> None:
+        """Hold a token, or give it up."""
+        self.queue_bound()
+        waiting = self.queue.waiting
+        if key in self.there:
+            self.there.discard(key)
+            view = self.seen.get(key, [])
+            comes = self.queue.put("vanished", key, self.now, self.noted.__contains__)
+            self.annihilated += self.queue.waiting < waiting
+            owed = bool(view) and view[-1] == "appeared" and self.queue.waiting == waiting
+            if key in MEMBERS:  # its end is never lost, and never told of a token that never came
+                assert comes == owed
+            self._come("vanished", key, comes)
+        else:
+            self.there.add(key)
+            self.appeared += 1
+            self._come("appeared", key, self.queue.put("appeared", key, self.now, self.noted.__contains__))
+
+    def take(self, after: float) -> None:
+        """Handle what was taken before, and take what is there."""
+        self.now += after
+        for kind, key in self.taken:
+            if kind == "appeared" and key in MEMBERS + WELCOME:
+                self.noted.add(key)
+            elif kind == "vanished":
+                self.noted.discard(key)
+        self.taken, self.pending = self.pending, []
+        for key, at in self.queue.taken(self.now):
+            assert at <= self.now
+            self._come("appeared", key, True)
+        self.taken, self.pending = self.taken + self.pending, []
+        self.lost += sum(loss.number for loss in self.queue.take_loss())
+        assert sum(kind == "appeared" for kind, _ in self.taken) <= 2 * AT_ONCE
+
+    def queue_bound(self) -> None:
+        """What waits is bounded by the room, and by those that the process has noted."""
+        assert self.queue.waiting <= ROOM + len(MEMBERS + WELCOME) + 2 * AT_ONCE
+
+    def _come(self, kind: TokenEvent, key: str, comes: bool) -> None:
+        if comes:
+            self.pending.append((kind, key))
+            self.seen.setdefault(key, []).append(kind)
+
+
+@given(st.lists(st.one_of(st.sampled_from(MEMBERS + WELCOME + REFUSED), st.sampled_from((0.0, PAUSE))), max_size=150))
+def test_nobody_who_is_noted_goes_or_comes_unseen_whatever_strangers_do(steps: list[str | float]) -> None:
+    """In any order of tokens and takes: no end is lost, no two change places, what waits is bounded, all is counted."""
+    with patch("wire.token_queue.MOST_WAITING", ROOM):
+        process = Process()
+        for key in MEMBERS:
+            process.flip(key)
+        process.take(0.0)
+        process.take(PAUSE)
+        for step in steps:
+            process.flip(step) if isinstance(step, str) else process.take(step)
+        for _ in range(20):
+            process.take(PAUSE)
+
+    for key, events in process.seen.items():
+        assert events[0] == "appeared"
+        if key not in REFUSED:  # the end of who is not noted is of no use
+            assert all(a != b for a, b in pairwise(events)), (key, events)
+    assert process.noted & {*MEMBERS} == process.there & {*MEMBERS}
+    assert process.noted <= process.there  # nobody is believed to be there who has gone
+    arrived = sum(events.count("appeared") for events in process.seen.values())
+    assert process.appeared == arrived + process.annihilated + process.lost
+    assert process.queue.waiting == 0
+    assert process.queue.is_idle
+
+
+def test_of_a_flood_of_strangers_a_bounded_number_waits_and_the_rest_is_counted() -> None:
+    """A hundred thousand tokens: so many come in at once, so many wait, the others are one loss with their number."""
+    queue, count = TokenQueue(), 100_000
+    came = sum(queue.put("appeared", f"who{i}", 0.0, lambda key: False) for i in range(count))
+    (loss,) = queue.take_loss()
+
+    assert (came, queue.waiting) == (AT_ONCE, MOST_WAITING)
+    assert (loss.kind, loss.number) == ("excess", count - AT_ONCE - MOST_WAITING)
+    assert loss.key == f"who{AT_ONCE + MOST_WAITING}"
+    assert queue.take_loss() == ()
+
+
+def test_who_restarts_in_a_flood_of_strangers_is_seen_to_go_at_once_and_to_come_once_there_is_room() -> None:
+    """Its end does not wait behind the strangers; its return does, and is not dropped though their room is full."""
+    queue = TokenQueue()
+    for i in range(2 * MOST_WAITING):
+        queue.put("appeared", f"who{i}", 0.0, lambda key: False)
+
+    assert queue.put("vanished", "inv2", 0.0, lambda key: key == "inv2")
+    assert not queue.put("appeared", "inv2", 0.0, lambda key: key == "inv2")
+    came, now = [], 0.0
+    while queue.waiting:
+        came += [key for key, _ in queue.taken(now)]
+        now += PAUSE
+    assert came[-1] == "inv2"
+    assert len(came) == MOST_WAITING + 1
+
+
+def test_strangers_that_come_and_go_while_they_wait_leave_nothing() -> None:
+    """A million tokens that appear and vanish keep no room, and their ends are not told."""
+    queue = TokenQueue()
+    for i in range(AT_ONCE):
+        queue.put("appeared", f"first{i}", 0.0, lambda key: False)
+    for i in range(2 * MOST_WAITING):
+        assert not queue.put("appeared", f"who{i}", 0.0, lambda key: False)
+        assert not queue.put("vanished", f"who{i}", 0.0, lambda key: False)
+
+    assert queue.waiting == 0
+    assert queue.take_loss() == ()
+
+
+def test_an_inbox_wakes_its_owner_for_tokens_that_wait() -> None:
+    """An owner that sleeps till its messages come gets all tokens all the same, a few at a time, and in their order."""
+    inbox = Inbox()
+    inbox.is_noted = lambda key: False
+    for i in range(3 * AT_ONCE):
+        inbox.put(("appeared", f"who{i}", b""))
+    inbox.put(("vanished", "who0", b""))
+    inbox.put(("vanished", f"who{3 * AT_ONCE - 1}", b""))
+    taken: list[list[tuple[str, str]]] = []
+    while sum(map(len, taken)) < 3 * AT_ONCE:
+        taken.append([(kind, key) for kind, key, _, _ in inbox.take(10**9, None)])
+    expected = [("appeared", f"who{i}") for i in range(3 * AT_ONCE - 1)]
+    expected.insert(AT_ONCE, ("vanished", "who0"))
+
+    assert [event for events in taken for event in events] == expected
+    assert max(map(len, taken)) <= 2 * AT_ONCE
+    assert inbox.take_losses() == ()
+
+
+def test_an_owner_that_has_said_nothing_of_whom_it_notes_loses_no_token() -> None:
+    """Of as many as it likes: then nobody counts as a stranger."""
+    inbox = Inbox()
+    for i in range(AT_ONCE + 1):
+        inbox.put(("appeared", f"a{i}", b""))
+    with patch("wire.token_queue.MOST_WAITING", 1):
+        inbox.put(("appeared", "b", b""))
+        inbox.put(("vanished", "c", b""))
+    kinds = []
+    while len(kinds) < AT_ONCE + 3:
+        kinds += [kind for kind, *_ in inbox.take(10**9, None)]
+
+    assert kinds.count("appeared") == AT_ONCE + 2
+    assert inbox.take_losses() == ()

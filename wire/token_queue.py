@@ -1,0 +1,152 @@
+"""Decide which liveliness tokens come to a process, which wait, and which are dropped. Pure.
+
+Anybody may hold tokens, as many as he likes, and each costs the process that notes it a question. So
+
+- of the tokens that appear, `AT_ONCE` come in at once and as many after each `PAUSE`; the others wait, in their order;
+- up to `MOST_WAITING` of strangers wait; one more is dropped and counted. One of a noted holder always waits;
+- a token that vanishes while it waits leaves nothing: its process never knew of it;
+- a token that vanishes otherwise comes in at once if its holder is noted, and is of no use if not.
+
+So a noted holder is always seen to go, and to come back: the end and the return of its token are never lost and never
+change places. Noted holders are those that the process itself knows (`wire.node.Node.is_noted`). What has come in
+is noted only once the process has handled it, so until then it is remembered here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Literal, NamedTuple
+
+from wire.backlog import Loss
+from wire.bounds import MOST_INVERTERS
+from wire.membership import MOST_PROCESSES
+
+TokenEvent = Literal["appeared", "vanished"]
+
+AT_ONCE, PAUSE = 20, 0.01
+"""Appearing tokens that come in at once, and time (s) after which as many more do: 2,000 a second, of which each costs
+some 0.1 ms. The agents of the largest run are known within half a second, and no step waits for more than 20."""
+
+MOST_WAITING = MOST_PROCESSES * MOST_INVERTERS
+"""Strangers' tokens that may wait: as many as a process would note of all names together."""
+
+
+class Arrival(NamedTuple):
+    """A token that has waited and comes in now."""
+
+    key: str
+    at: float
+    """Time (s) at which it appeared."""
+
+
+class TokenQueue:
+    """The tokens that appear to a process, and vanish.
+
+    The owner calls `taken` once it has handled all that came in before, and has taken out all that came in since.
+
+    Examples
+    --------
+    >>> queue = TokenQueue()
+    >>> [queue.put("appeared", f"who{i}", 0.0, lambda key: False) for i in range(AT_ONCE + 2)].count(True) == AT_ONCE
+    True
+    >>> queue.put("vanished", "who20", 0.0, lambda key: False)
+    False
+    >>> queue.due, [key for key, _ in queue.taken(PAUSE)]
+    (0.01, ['who21'])
+    """
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, float] = {}
+        """Tokens that wait, and when they appeared (s), in their order."""
+        self._came: dict[str, bool] = {}
+        """Whether each token is there, as the owner will see by what has come in since it took the last events."""
+        self._handled: dict[str, bool] = {}
+        """The same by the events that it took then, and handles now."""
+        self._room, self._renewal = AT_ONCE, -inf
+        """Tokens that may yet come in before the next renewal of the room, and the time (s) of that."""
+        self._loss: Loss | None = None
+
+    def put(self, event: TokenEvent, key: str, at: float, is_noted: Callable[[str], bool]) -> bool:
+        """Take an event at a time (s); return whether it comes in now.
+
+        Parameters
+        ----------
+        event : {"appeared", "vanished"}
+            The event.
+        key : str
+            The token.
+        at : float
+            The time (s).
+        is_noted : Callable[[str], bool]
+            Whether the process has noted the holder of a token.
+        """
+        there = self._came.get(key, self._handled.get(key))
+        if event == "vanished":
+            if self._waiting.pop(key, None) is not None or not (is_noted(key) if there is None else there):
+                return False
+            self._came[key] = False
+            return True
+        if key in self._waiting:
+            return False
+        if not self._came:  # else an owner that is busy would have ever more to handle at once
+            self._renew(at)
+        if self._room and not self._waiting:
+            self._come(key)
+            return True
+        if len(self._waiting) < MOST_WAITING or there is False or (there is None and is_noted(key)):
+            self._waiting[key] = at
+        else:
+            self._lose(key)
+        return False
+
+    def taken(self, now: float) -> list[Arrival]:
+        """Note that the owner has handled what it took before, and has taken all that came in; let more come in."""
+        self._handled, self._came = self._came, {}
+        self._renew(now)
+        arrivals = []
+        while self._room and self._waiting:
+            key = next(iter(self._waiting))
+            arrivals.append(Arrival(key, self._waiting.pop(key)))
+            self._come(key)
+        self._handled.update(self._came)
+        self._came = {}
+        return arrivals
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether there is nothing for `taken` to do."""
+        return not (self._waiting or self._came or self._handled)
+
+    @property
+    def due(self) -> float:
+        """When the next of those that wait may come in (s); infinite if none waits."""
+        return self._renewal if self._waiting else inf
+
+    @property
+    def waiting(self) -> int:
+        """Number of tokens that wait."""
+        return len(self._waiting)
+
+    @property
+    def has_loss(self) -> bool:
+        """Whether tokens were dropped since the last `take_loss`."""
+        return self._loss is not None
+
+    def take_loss(self) -> tuple[Loss, ...]:
+        """Take out the tokens that were dropped since the last call, as one loss under the key of the first."""
+        loss, self._loss = self._loss, None
+        return () if loss is None else (loss,)
+
+    def _renew(self, now: float) -> None:
+        if now >= self._renewal:
+            self._room, self._renewal = AT_ONCE, now + PAUSE
+
+    def _lose(self, key: str) -> None:
+        if self._loss is None:
+            self._loss = Loss(key, "excess", f"{len(self._waiting)} tokens were waiting, of others", 0)
+        self._loss = self._loss._replace(number=self._loss.number + 1)
+
+    def _come(self, key: str) -> None:
+        self._room -= 1
+        self._came[key] = True
