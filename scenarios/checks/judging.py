@@ -95,6 +95,7 @@ def _named_if_slow(name: str, plugin: Plugin, case: CheckedCase) -> Iterator[Non
         yield
     finally:
         timer.cancel()
+        timer.join(1.0)  # the figures' processes are forked next, and a fork wants no other thread
 
 
 def tell(text: str) -> None:
