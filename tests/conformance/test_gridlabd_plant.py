@@ -27,6 +27,7 @@ UNIT = {"f": 1.0, "P": 350e3, "Q": 350e3, "V": 2401.8, "P_set": 350e3, "V_set": 
 def islanding() -> gp.Scenario:
     """The paper's experiment, its events early."""
     changes = {"plant.simulator": "gridlabd", "event[0].t_s": 0.1, "event[1].t_s": 1.1, "time.end_s": 2.1}
+    changes |= {"processes.deadline_s": 100.0}
     return gp.load("islanding").replace(changes)
 
 
@@ -42,6 +43,7 @@ def three_islands() -> gp.Scenario:
     return gp.Scenario(
         name="apart",
         time={"end_s": 0.2},
+        processes={"deadline_s": 100.0},
         plant={
             "simulator": "gridlabd",
             "load_factor": 0.9,

@@ -58,8 +58,11 @@ class Left(NamedTuple):
     """Wall time (s) by which the record ends before the history, at the pace of the run."""
 
 
-def killed(folder: Path, clock: Clock, after: float, who: str = "command") -> Left:
-    """Run a case until its first row is there, kill a process some time (s) later, and open what is left."""
+def killed(folder: Path, clock: Clock, after: float, who: str = "command", most: float = 30.0) -> Left:
+    """Run a case until its first row is there, kill a process some time (s) later, and open what is left.
+
+    It is killed earlier once the run has come so far (`most`, s of run time): a busy machine may wake this one late.
+    """
     folder.mkdir(parents=True)
     (folder / "long.toml").write_text(LONG + ("" if clock == "one process" else LOSSY), encoding="utf-8")
     pace = ("--driver", "inprocess") if clock == "one process" else ("--clock", clock)
@@ -68,7 +71,9 @@ def killed(folder: Path, clock: Clock, after: float, who: str = "command") -> Le
     history = folder / "out" / "IV" / PARTIAL
     try:
         began = wait_for_rows(command, history)
-        sleep(after)
+        latest = monotonic() + after
+        while (left := latest - monotonic()) > 0.0 and _last_time(history) < began[1] + most:
+            sleep(min(left, 0.05))
         process = command.pid if who == "command" else _process(command.pid, who)
         first, t = began
         os.kill(process, signal.SIGKILL)

@@ -28,8 +28,11 @@ from wire.messages import Telemetry
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
 
+PATIENCE = 100.0
+"""Deadline (s) of runs: GridLAB-D computes for seconds before it answers for the first time."""
+
 TWO_CASES = (
-    'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n'
+    'name = "two"\n[time]\nend_s = {end}\n[plant]\nsimulator = "gridlabd"\n[processes]\ndeadline_s = 100.0\n'
     '[case.one]\nsecondary = "none"\ngraph = "none"\n[case.other]\nsecondary = "none"\ngraph = "none"\n'
 )
 """A scenario of two short cases."""
@@ -39,9 +42,9 @@ def run_of(**changes: object) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
     """Islanding at 0.04 s on GridLAB-D, with some settings of the plant changed."""
     plant, agents = configs(*load_scenario("islanding"), "IV")
     event = replace(plant.settings.events[0], t=0.04)
-    return replace(
-        plant, end=20.0, settings=replace(plant.settings, simulator="gridlabd", events=(event,), **changes)
-    ), agents
+    settings = replace(plant.settings, simulator="gridlabd", events=(event,), **changes)
+    plant = replace(plant, end=20.0, deadline=PATIENCE, settings=settings)
+    return plant, tuple(replace(agent, deadline=PATIENCE) for agent in agents)
 
 
 def in_one_process(**changes: object) -> Outcome:
