@@ -22,14 +22,14 @@ from wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
 
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
-ANSWER = 5.0
-"""Longest wait (s) for the answer of a plant that is there."""
+ANSWER = 10.0
+"""Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
 
 ACKNOWLEDGED = 4.0
 """Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
 
-HANDOUT = 2.0
-"""Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds."""
+HANDOUT = 10.0
+"""Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds, or a busy second."""
 
 AGAIN = 0.1
 """Time (s) between two requests for the same thing."""
