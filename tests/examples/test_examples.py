@@ -16,7 +16,7 @@ EXECUTE = """
 import sys, nbformat
 from nbclient import NotebookClient
 book = nbformat.read(sys.argv[1], 4)
-NotebookClient(book, timeout=100, kernel_name="python3").execute()
+NotebookClient(book, timeout=250, startup_timeout=250, kernel_name="python3").execute()
 nbformat.write(book, "executed.ipynb")
 """
 

@@ -172,7 +172,7 @@ class Desk:
 
     def type(self, *words: str) -> tuple[int, str]:
         """Run a command to its end, in this process so that none need start; its exit status and what it printed."""
-        return invoke(*words, *self.options)
+        return invoke(*words, *self.options, "--wait", f"{DEADLINE:g}")
 
 
 def wait_for(file: Path, text: str) -> None:

@@ -12,11 +12,13 @@ import signal
 import subprocess
 import sys
 import tempfile
+from math import inf
 from pathlib import Path
 from time import monotonic, sleep
 from typing import Literal, NamedTuple
 
 from scenarios.record.recomputation import recomputed
+from scenarios.record.record_info import FILE
 from scenarios.record.record_reader import RunRecord
 from scenarios.results.record import PARTIAL
 from tests.record.reader_commands import assert_commands_read
@@ -58,10 +60,11 @@ class Left(NamedTuple):
     """Wall time (s) by which the record ends before the history, at the pace of the run."""
 
 
-def killed(folder: Path, clock: Clock, after: float, who: str = "command", most: float = 30.0) -> Left:
+def killed(folder: Path, clock: Clock, after: float, who: str = "command", most: float = inf) -> Left:
     """Run a case until its first row is there, kill a process some time (s) later, and open what is left.
 
-    It is killed earlier once the run has come so far (`most`, s of run time): a busy machine may wake this one late.
+    With `most` (s of run time) it is killed earlier, once the run has come so far, as a busy machine may wake this
+    process late; but not before its record has a chunk with rows.
     """
     folder.mkdir(parents=True)
     (folder / "long.toml").write_text(LONG + ("" if clock == "one process" else LOSSY), encoding="utf-8")
@@ -71,9 +74,10 @@ def killed(folder: Path, clock: Clock, after: float, who: str = "command", most:
     history = folder / "out" / "IV" / PARTIAL
     try:
         began = wait_for_rows(command, history)
-        latest = monotonic() + after
-        while (left := latest - monotonic()) > 0.0 and _last_time(history) < began[1] + most:
-            sleep(min(left, 0.05))
+        if most == inf:
+            sleep(after)
+        else:
+            _wait_for_chunk(command, history, monotonic() + after, began[1] + most)
         process = command.pid if who == "command" else _process(command.pid, who)
         first, t = began
         os.kill(process, signal.SIGKILL)
@@ -102,6 +106,16 @@ def wait_for_rows(command: subprocess.Popen[bytes], history: Path, more: int = 5
             return monotonic(), _last_time(history)
         sleep(0.02)
     raise AssertionError("no rows within 120 s")
+
+
+def _wait_for_chunk(command: subprocess.Popen[bytes], history: Path, until: float, t: float) -> None:
+    """Wait until a time (s, monotonic), or a run time (s) if that comes earlier, and until the record has grown."""
+    record = history.with_name(FILE)
+    size, deadline = record.stat().st_size, monotonic() + 120.0
+    while (monotonic() < until and _last_time(history) < t) or record.stat().st_size == size:
+        assert command.poll() is None, "the command ended by itself"
+        assert monotonic() < deadline, "the record has not grown within 120 s"
+        sleep(0.02)
 
 
 def _last_time(history: Path) -> float:

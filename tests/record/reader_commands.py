@@ -12,8 +12,10 @@ from tests.command_line import invoke
 def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
     """`metrics`, `why`, `trace` in both formats, and `replay` where there is one, do their work, and tell the cut.
 
-    Of a run that was killed in its first moments there may be no decision yet: then `why`, and `replay`, say so.
+    Of a run that was killed in its first moments there may be no decision yet: then `why`, and `replay`, say so. There
+    may not even be a row: then they say so too, or have nothing to show.
     """
+    begun = record.t_end > 0.0
     decided = next(record.decisions(agent), None) is not None
     file, folder, t = str(record.path), record.path.parent, f"{record.t_end:.3f}"
     commands = {
@@ -27,6 +29,10 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
         if (command := name.split()[0]) not in OWN_COMMANDS:
             continue
         code, printed = invoke(command, *arguments)
+        if not begun:
+            assert code in (0, 2)
+            assert "Traceback" not in printed
+            continue
         if not decided and command == "why":
             assert code == 2
             assert "had not decided anything" in printed or "no agent of" in printed
@@ -39,7 +45,7 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
         assert "Traceback" not in printed
         assert record.complete or command == "replay" or "cut off" in printed, f"{name}: {printed}"
     for made in (folder / "trace.pftrace", folder / "trace.svg"):
-        assert _size(made) > 500
+        assert not begun or _size(made) > 500
 
 
 def _size(file: Path) -> int:

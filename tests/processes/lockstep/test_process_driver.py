@@ -40,7 +40,7 @@ def killed_after(name: str, text: str) -> float:
 
 def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Path) -> None:
     """Kill -9: the run reaches its end, says who died and when, and is not reproducible; the rest restore 60 Hz."""
-    run = ProcessRun(*toy_configs(4, end=6.0), tmp_path)
+    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)  # long: the plant goes on while telemetry comes here
     run.at(0.4, lambda: run.child("inv3").signal(signal.SIGKILL))
     outcome = run()
     deaths = [event for event in outcome.events if event.kind == "roster"]
@@ -49,18 +49,18 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
     assert not outcome.reproducible
     assert [event.subject for event in deaths] == ["inv3"]
     assert "its inverter stays on primary droop at its last set-points" in deaths[0].text
-    assert run.rows[-1][0] == 6.0
+    assert run.rows[-1][0] == 20.0
     assert run.rows[-1][1] == pytest.approx(60.0, abs=0.01)
     assert last_P_set(run.rows[-1], 3) == last_P_set(run.rows[round(deaths[0].t / 0.02) + 2], 3)
     assert len(outcome.notes) == 1
-    assert 0.4 <= killed_after("inv3", outcome.notes[0]) < 6.0  # the command may notice it later than the plant does
+    assert 0.4 <= killed_after("inv3", outcome.notes[0]) <= 20.0  # the command may notice it later than the plant does
     assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
 
 
 def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tmp_path: Path) -> None:
     """Bytes and deaths do not depend on whether the plant relays, as in all other tests, or all have links to all."""
-    plant, agents = toy_configs(4, end=2.0)
-    star, mesh, hurt = (ProcessRun(plant, agents, tmp_path / name) for name in ("star", "mesh", "hurt"))
+    star, mesh = (ProcessRun(*toy_configs(4, end=2.0), tmp_path / name) for name in ("star", "mesh"))
+    hurt = ProcessRun(*toy_configs(4, end=20.0), tmp_path / "hurt")
     hurt.at(0.4, lambda: hurt.child("inv3").signal(signal.SIGKILL))
 
     assert [star().broke, mesh(star=False).broke] == ["", ""]
@@ -68,7 +68,7 @@ def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tm
     outcome = hurt(star=False)
     assert outcome.broke == ""
     assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
-    assert hurt.rows[-1][0] == 2.0
+    assert hurt.rows[-1][0] == 20.0
 
 
 def test_agents_of_a_killed_process_die_together(tmp_path: Path) -> None:

@@ -57,14 +57,14 @@ def test_a_foreign_agent_follows_who_leaves_and_returns(tmp_path: Path) -> None:
 
 def test_the_run_goes_on_without_a_foreign_agent_that_is_killed(tmp_path: Path) -> None:
     """Kill -9 in simulated time: an event names it, and the run reaches its end."""
-    plant, agents = toy_configs(4, end=6.0)
+    plant, agents = toy_configs(4, end=20.0)
     run = Mixed(plant, agents, tmp_path, foreign=("inv3",))
     run.at(0.4, lambda: run.foreigners[0].kill())
     outcome = run()
 
     assert outcome.broke == ""
     assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
-    assert run.rows[-1][0] == 6.0
+    assert run.rows[-1][0] == 20.0
     assert run.rows[-1][1] == pytest.approx(60.0, abs=0.01)
 
 

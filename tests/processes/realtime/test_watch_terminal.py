@@ -19,7 +19,7 @@ pty = pytest.importorskip("pty")
 termios = pytest.importorskip("termios")
 
 
-def read_until(file: int, wanted: bytes, deadline: float = 40.0) -> bytes:
+def read_until(file: int, wanted: bytes, deadline: float = 80.0) -> bytes:
     """Read from a terminal until something has appeared on it."""
     seen, end = b"", monotonic() + deadline
     while wanted not in seen:
@@ -54,7 +54,7 @@ def test_watch_is_a_table_until_a_key_quits(tmp_path: Path) -> None:
                 else:
                     watch.send_signal(signal.SIGINT)
                 read_until(master, b"\x1b[?1049l")  # back from the alternate screen
-                code = watch.wait(20)
+                code = watch.wait(80)
             finally:
                 if watch.poll() is None:
                     watch.kill()
