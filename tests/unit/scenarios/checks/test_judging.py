@@ -103,6 +103,7 @@ def test_a_check_that_yields_without_end_is_asked_for_no_more(monkeypatch: pytes
 
 def test_a_check_that_judges_for_long_is_named_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """While it judges, or yields: this one goes on only when it has been named."""
+    ran()  # its own checks have other patience
     told: list[str] = []
     named = Event()
 
@@ -128,9 +129,10 @@ def test_of_a_check_of_ones_own_the_module_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """On standard error, with what can be done."""
+    case = ran().checked_case
     monkeypatch.setattr(judging, "PATIENCE", 0.0)
     monkeypatch.setattr(judging, "tell", lambda text, real=judging.tell: (real(text), NAMED.set()))
-    judge_case(ran().checked_case, {"slow": Plugin(use=f"{HERE}:waits_to_be_named")})
+    judge_case(case, {"slow": Plugin(use=f"{HERE}:waits_to_be_named")})
 
     assert capsys.readouterr().err == (
         f"check slow of {HERE} has been judging case IV for 0 s; Ctrl-C ends the run, and keeps what is recorded\n"
