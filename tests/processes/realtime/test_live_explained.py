@@ -25,6 +25,7 @@ from tests.toy.toy_configs import toy_configs
 from wire.bounds import LONGEST_MESSAGE
 from wire.codec import decode, encode
 from wire.driver.session import Session
+from wire.journal import RejectedCount
 from wire.keys import Keys
 from wire.messages import Ready, State, Telemetry
 
@@ -136,7 +137,9 @@ def test_each_kind_of_rejected_message_is_told(tmp_path: Path) -> None:
         )
 
     rejected = {each.rejected for each in found.heard("inv2", since=0.0) if each.rejected}
-    assert rejected == set(hostile(1))
+    unread = {entry.kind for entry in found.entries("inv2") if isinstance(entry, RejectedCount)}
+    assert rejected | unread == set(hostile(1))
+    assert "oversized" in unread
     decision = next(each for each in found.decisions("inv2", since=3.6) if uses(each, "inv3"))
     explanation = explained(found, decision, decision.t)
     (told,) = [each.why for each in explanation.neighbours if each.name == "inv1"]
