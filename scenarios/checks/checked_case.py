@@ -39,7 +39,7 @@ connected later than the scenario says, a load that somebody changed."""
 
 @dataclass(frozen=True, kw_only=True)
 class IslandWindow:
-    """One island in the window of one event: its own columns, all rows of the case."""
+    """One island in the window of one event: its own columns of the window's rows, of which there is one at least."""
 
     window: Window
     label: str
@@ -137,11 +137,10 @@ class CheckedCase:
         times = [e.t for e in self.events if e.kind in _RESTARTS and window.start - 1e-9 <= e.t < window.end]
         return max((window.start, *times))
 
-    def rows_from(self, window: Window, after_s: float, since_s: float = 0.0) -> Flags:
-        """Return the rows of a window that come `after_s` or later after its last disturbance, and after `since_s`."""
-        t = self.history.t
-        late: Flags = t >= max(self.disturbed_at(window), since_s) + after_s - 1e-9
-        return window.rows(t) & late
+    def rows_from(self, part: IslandWindow, after_s: float, since_s: float = 0.0) -> Flags:
+        """Return its rows that come `after_s` or later after the window's last disturbance, and after `since_s`."""
+        late: Flags = part.history.t >= max(self.disturbed_at(part.window), since_s) + after_s - 1e-9
+        return late
 
     @cached_property
     def switch_events(self) -> tuple[PlantEvent, ...]:
@@ -158,6 +157,9 @@ class CheckedCase:
         source = self.feeder.source.bus if self.feeder.source else None
         found = []
         for window in self.windows:
+            rows = self.history.rows(window.rows(self.history.t))
+            if not rows.t.size:
+                continue
             until = (event for event in self.switch_events if event.t < window.end - 1e-9)  # then the next one begins
             members = [
                 (buses, tuple(name for name in self.history.inverters if bus_of[name] in buses))
@@ -165,7 +167,7 @@ class CheckedCase:
             ]
             members = [(buses, names) for buses, names in members if names]
             for buses, names in members:
-                history, nameplates = part_of(self.history, self.nameplates, names)
+                history, nameplates = part_of(rows, self.nameplates, names)
                 label = window.label + (f", island of {names[0]}" if len(members) > 1 else "")
                 found.append(
                     IslandWindow(

@@ -29,7 +29,7 @@ class Window:
         Rows at the very moments of events are left out: they belong to both sides.
         """
         tolerance = 1e-9
-        last = self.end >= t[-1] - tolerance
+        last = bool(t.size) and self.end >= t[-1] - tolerance
         rows: Flags = (t > self.start + tolerance) & (t < self.end + (tolerance if last else -tolerance))
         return rows
 

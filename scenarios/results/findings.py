@@ -122,8 +122,9 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
             results[case][window.label] = measure(history, nameplates, window, feeder.f_nom)
             settled[case][window.label] = settling(history, nameplates, window, feeder.f_nom)
             if len(where[window.label]) > 1:
+                inside = history.rows(window.rows(history.t))
                 islands[case][window.label] = {
-                    name: measure(*part_of(history, nameplates, members), window, feeder.f_nom)
+                    name: measure(*part_of(inside, nameplates, members), window, feeder.f_nom)
                     for name, members in where[window.label].items()
                 }
         rating = dict(zip(everybody.names, everybody.s.tolist(), strict=True))

@@ -104,10 +104,12 @@ class History:
 
     def until(self, t: float) -> History:
         """Return its rows up to a time (s), that one included."""
-        rows = self.t <= t + 1e-9
-        return replace(
-            self, **{field.name: getattr(self, field.name)[rows] for field in fields(self) if field.name != "inverters"}
-        )
+        return self.rows(self.t <= t + 1e-9)
+
+    def rows(self, which: Flags) -> History:
+        """Return some of its rows."""
+        columns = {of.name: getattr(self, of.name)[which] for of in fields(self) if of.name != "inverters"}
+        return replace(self, **columns)
 
     def frame(self) -> pd.DataFrame:
         """Return a table with columns (inverter, quantity) and the index t (s); `attrs["units"]` has the units.

@@ -93,9 +93,8 @@ def worst(quantity: RowMeasure, nominal: float, island_intervals: Sequence[Islan
         values = quantity(history, nameplates)
         for interval in island_intervals:
             rows = (history.t > interval.start) & (history.t <= interval.end)
-            each = np.stack(
-                [quantity(*part_of(history, nameplates, names))[rows] for names in interval.islands.values()]
-            )
+            inside = history.rows(rows)
+            each = np.stack([quantity(*part_of(inside, nameplates, names)) for names in interval.islands.values()])
             far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
             values[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
         return values

@@ -119,10 +119,10 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
         Nominal frequency (Hz).
     """
     assert nameplates.names == history.inverters
+    history = history.rows(window.rows(history.t))  # the other ones cost time: a live run of hours has many windows
     f_error = mean_over(np.abs(history.f[:, nameplates.GFM] - f_nom), history.present[:, nameplates.GFM])
     sharing = MPSI(history, nameplates)
-    inside = window.rows(history.t)
-    ends = ends_of(history.t, inside, window.start, window.end)
+    ends = ends_of(history.t, window.start, window.end)
     steady = ends.steady
     restored = f_in_band(history, nameplates, f_nom) & (sharing < MPSI_BAND)
     total = history.P.sum(axis=1)
@@ -133,9 +133,9 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
         MPSI=_mean(sharing[steady]),
         V_error=_mean(voltage[steady]),
         MQSI=_mean(vars_[steady]),
-        t_restore_s=for_good(history.t[inside], restored[inside], window.start),
+        t_restore_s=for_good(history.t, restored, window.start),
         p={name: _mean(history.P[steady, i] / nameplates.s[i]) for i, name in enumerate(nameplates.names)},
-        t_load_s=for_good(history.t[inside], carried[inside], window.start) if total[steady].any() else None,
+        t_load_s=for_good(history.t, carried, window.start) if total[steady].any() else None,
         reasons=_reasons(history, nameplates, ends, sharing, voltage, vars_),
     )
 
@@ -196,13 +196,13 @@ def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
     """Measure the settling after one event of one case; the parameters are those of `measure`."""
-    inside = window.rows(history.t)
-    end = inside & (history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9)
+    history = history.rows(window.rows(history.t))
+    end = history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9
     forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]
-    shared: Flags = np.less(MPSI(history, nameplates)[inside], MPSI_BAND)
+    shared: Flags = np.less(MPSI(history, nameplates), MPSI_BAND)
     return Settling(
-        t_f_s=for_good(history.t[inside], f_in_band(history, nameplates, f_nom)[inside], window.start),
-        t_share_s=for_good(history.t[inside], shared, window.start),
+        t_f_s=for_good(history.t, f_in_band(history, nameplates, f_nom), window.start),
+        t_share_s=for_good(history.t, shared, window.start),
         f_swing_Hz=_swing(np.where(forming, f, np.nan)[end]),
         V_swing_pu=_swing(np.where(history.present, history.V / nameplates.V_nom, np.nan)[end]),
     )

@@ -43,19 +43,17 @@ class Ends(NamedTuple):
     """Rows of the last part."""
     before: Flags
     """Rows of the part before it."""
-    inside: Flags
-    """All rows of the window."""
     steady: Flags
     """Rows over which steady values are means: the last `STEADY`."""
 
 
-def ends_of(t: Floats, inside: Flags, start: float, end: float) -> Ends:
-    """Return the rows at the end of a window that lasts from start to end (s) and has the rows inside."""
+def ends_of(t: Floats, start: float, end: float) -> Ends:
+    """Return the rows at the end of a window that lasts from start to end (s) and has rows at the times t (s) alone."""
     span = min(STEADY, 0.5 * (end - start))
-    last = inside & (t >= end - span - 1e-9)
-    before = inside & ~last & (t >= end - 2.0 * span - 1e-9)
+    last = t >= end - span - 1e-9
+    before = ~last & (t >= end - 2.0 * span - 1e-9)
     apart = float(t[last].mean() - t[before].mean()) if last.any() and before.any() else span
-    return Ends(start, end, apart, last, before, inside, inside & (t >= end - STEADY - 1e-9))
+    return Ends(start, end, apart, last, before, t >= end - STEADY - 1e-9)
 
 
 def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
@@ -84,7 +82,7 @@ def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[s
     if not valid.any(axis=1).all():
         return f"{missing} in a part of the last {STEADY:g} s"
     if min(ends.last.sum(), ends.before.sum()) < FEWEST:
-        return f"not steady: {_rows(int(ends.inside.sum()), ends.end - ends.start)} too few to tell"
+        return f"not steady: {_rows(len(x), ends.end - ends.start)} too few to tell"
     unit, reasons = UNITS[measure], []
     for i, column in enumerate(columns.T):
         recent, earlier = column[ends.last], column[ends.before]

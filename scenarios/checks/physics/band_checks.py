@@ -30,11 +30,7 @@ class Frequency:
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the worst row of each inverter in each window; an island without a grid-forming one is dark."""
         for part in _parts(case, self.within_s, self.since_s):
-            rows, history, plates = (
-                case.rows_from(part.window, self.within_s, self.since_s),
-                part.history,
-                part.nameplates,
-            )
+            rows, history, plates = case.rows_from(part, self.within_s, self.since_s), part.history, part.nameplates
             error = np.abs(history.f - case.f_nom)
             forming = history.present & plates.GFM
             yield from _worst(
@@ -65,7 +61,7 @@ class Voltage:
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
         """Yield the worst row of each inverter in each window."""
         for part in _parts(case, self.within_s, self.since_s):
-            rows, history = case.rows_from(part.window, self.within_s, self.since_s), part.history
+            rows, history = case.rows_from(part, self.within_s, self.since_s), part.history
             V = history.V / part.nameplates.V_nom
             low, high = (self.low_pu > V) & history.present, ~(self.high_pu >= V) & history.present
             yield from _worst(part, rows, V, high, f"V, {part.label}", "pu", self.high_pu)
@@ -76,7 +72,7 @@ def _parts(case: CheckedCase, within_s: float, since_s: float) -> list[IslandWin
     """Return the islands of the windows that last long enough; raise NotJudgedError if there are none."""
     if not case.windows:
         raise NotJudgedError("the run has no event")
-    parts = [part for part in case.parts if case.rows_from(part.window, within_s, since_s).any()]
+    parts = [part for part in case.parts if case.rows_from(part, within_s, since_s).any()]
     if not parts:
         raise NotJudgedError(f"no event has a window of more than {within_s:g} s")
     return parts

@@ -64,8 +64,8 @@ def _unequal(
         raise NotJudgedError("the run has no event")
     judged = 0
     for part in case.parts:
-        end = ends_of(part.history.t, part.window.rows(part.history.t), part.window.start, part.window.end).steady
-        end = end & case.rows_from(part.window, check.after_s, check.since_s)
+        end = ends_of(part.history.t, part.window.start, part.window.end).steady
+        end = end & case.rows_from(part, check.after_s, check.since_s)
         if part.fed or not end.any():
             continue
         sharing = _sharing(case, part, with_killed=check.with_killed)[end]

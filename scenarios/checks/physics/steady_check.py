@@ -39,10 +39,9 @@ class SteadyEnd:
         judged = False
         for part in case.parts:
             history, plates = part.history, part.nameplates
-            ends = ends_of(history.t, part.window.rows(history.t), part.window.start, part.window.end)
-            settled = (ends.last | ends.before).any() and case.rows_from(part.window, self.after_s, self.since_s)[
-                ends.steady
-            ].all()
+            ends = ends_of(history.t, part.window.start, part.window.end)
+            late = case.rows_from(part, self.after_s, self.since_s)
+            settled = (ends.last | ends.before).any() and late[ends.steady].all()
             if not settled or min(ends.last.sum(), ends.before.sum()) < FEWEST:
                 continue
             judged = True

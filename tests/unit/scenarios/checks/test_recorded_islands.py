@@ -35,14 +35,13 @@ def test_a_switch_that_waits_for_ever_leaves_two_islands(waiting: CheckedCase) -
 
 def test_a_switch_that_closes_late_makes_an_island_that_is_judged_from_then_on(waiting: CheckedCase) -> None:
     """The window has the island of its end, and no row of before."""
-    (window,) = (it for it in waiting.windows if it.label == "rejoining")
     text = "switch sw1_2 (832-832s) closed in step"
     late = PlantEvent(t=11.0, kind="switch", subject="832-832s", text=text, closed=True)
     closed = replace(waiting, events=(*waiting.events, late))
-    rows = closed.rows_from(window, 2.0)
+    (part,) = (it for it in closed.parts if it.window.label == "rejoining")
 
     assert len(_islands(closed, "rejoining")) == 1
-    assert closed.history.t[rows][0] == pytest.approx(13.0)
+    assert part.history.t[closed.rows_from(part, 2.0)][0] == pytest.approx(13.0)
     assert verdict(closed, "power_sharing").status == "failed"
 
 
