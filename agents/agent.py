@@ -124,6 +124,8 @@ class Agent:
         """Last state of each neighbour; one that its law did not send (`quiet`) leaves the one before."""
         self.around: Sequence[Neighbour] = ()
         """Neighbours in the sums of the last tick."""
+        self.in_service = True
+        """Whether the own inverter was on the network at the last tick; if not, there were no sums."""
         self.saturated = (0, 0)
         """Saturated sides of P and V at the last tick."""
         self._takes_part = config.control.acts(config.name, config.kind)
@@ -281,14 +283,14 @@ class Agent:
         State
             The set-points (W, V) and the own var (var).
         """
-        self.around = ()
+        self.around, self.in_service = (), measurement.island != OFF
         if self.graph_error:
             news = self.graph_error if self.graph_error != self._reported_graph_error else ""
             self._reported_graph_error = self.graph_error
             return replace(self.idle_state(measurement), fault=news)
         if self.fault:
             return self.idle_state(measurement)
-        if measurement.island == OFF:  # nothing to control; once in service it starts from the plant's set-points
+        if not self.in_service:  # nothing to control; once in service it starts from the plant's set-points
             self.restart()
             return self._state(measurement, measurement.P_set, measurement.V_set)
         config = self.config

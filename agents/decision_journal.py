@@ -146,7 +146,7 @@ class DecisionJournal:
             else "silent"
             if state is None
             else "stale"
-            if self._agent.shares_island(name)
+            if self._agent.in_service and self._agent.shares_island(name)
             else "island"
             for name, state in zip(neighbours, states, strict=True)
         ]

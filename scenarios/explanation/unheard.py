@@ -129,6 +129,8 @@ def reason(decision: RecordedDecision, each: NeighbourInput) -> str:
         return f"stale: older than max_age = {most:g} s"
     if each.unused == "island":
         here = decision.measurement.island
+        if here == OFF:
+            return "the own inverter is out of service"
         if each.state is not None and each.state.island == OFF:
             return "its inverter is out of service"
         if options.islands == "frequency" or each.state is None:
