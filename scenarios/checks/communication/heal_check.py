@@ -41,7 +41,9 @@ class Rejoined:
                         limit=self.within_s,
                     )
         if not judged:
-            raise NotJudgedError(f"no cut ended more than {self.within_s:g} s before both of its agents did")
+            raise NotJudgedError(
+                f"after no cut was its link whole, and both of its agents at work, for {self.within_s:g} s"
+            )
 
     def _took(self, found: CommunicationSummary, heal: Heal) -> float | None:
         """Return after what time (s) a new value was used, infinity if never; None if that cannot be told.
@@ -51,9 +53,11 @@ class Rejoined:
         """
         if heal.took is not None:
             return heal.took
-        if heal.lost_again < inf:
-            return inf if self.within_s < heal.waited < inf else None
+        if heal.waited < inf:
+            return inf if heal.waited > self.within_s else None
         src, dst = (found.sent[name] for name in heal.link)
         until = heal.t + self.within_s
+        if until > heal.lost_again:
+            return None
         lasts = all(any(first <= heal.t and last >= until for first, last in it.epochs.values()) for it in (src, dst))
         return inf if lasts and src.spoke_at >= until and dst.decided_at >= until else None

@@ -39,7 +39,7 @@ class Heal:
     lost_again: float = inf
     """When (s) the link was next cut, or began to lose messages."""
     waited: float = inf
-    """For how long (s) both decided at every tick up to then, if nothing new was used before; else infinite."""
+    """For how long (s) both had been at work without a break then, if nothing new was used before; else infinite."""
 
 
 class Heals:
@@ -63,6 +63,8 @@ class Heals:
         self._waiting: dict[str, list[Heal]] = defaultdict(list)
         """Those that have happened, by receiver, after which nothing new has been used yet."""
         self._healed: dict[Link, list[Heal]] = defaultdict(list)
+        self._whole: dict[Link, list[Heal]] = defaultdict(list)
+        """Those after which no verdict has told of another cut yet."""
         self._known: set[tuple[Link, int]] = set()
         self._was_cut: set[Link] = set()
         self._listens: set[Link] = set()
@@ -77,9 +79,8 @@ class Heals:
         for t, outcome in zip(trace.t, trace.outcome, strict=True):
             if outcome in CUTS:
                 self._was_cut.add(link)
-                for heal in self._healed[link]:
-                    if heal.t < t:
-                        heal.lost_again = min(heal.lost_again, t)
+                if link in self._whole:
+                    self._whole[link] = [heal for heal in self._whole[link] if not self._lost_again(heal, t)]
             elif link in self._was_cut and not isinstance(outcome, str):
                 self._was_cut.discard(link)
                 self._add(Heal(link, t))
@@ -123,6 +124,13 @@ class Heals:
         lives = (min(last, heal.lost_again) - max(first, begins) for first, last in src.epochs.values())
         return max((0.0, *lives))
 
+    @staticmethod
+    def _lost_again(heal: Heal, t: float) -> bool:
+        """Note that a link was cut at a time (s); return whether that was after the heal."""
+        if heal.t < t:
+            heal.lost_again = min(heal.lost_again, t)
+        return heal.t < t
+
     def found(self) -> list[Heal]:
         """Return the heals of links over which an agent listens, in the order of links and time."""
         return [heal for link in sorted(self._listens) for heal in sorted(self._healed[link], key=lambda one: one.t)]
@@ -134,6 +142,7 @@ class Heals:
         self._known.add(key)
         self._receivers.add(heal.link[1])
         self._healed[heal.link].append(heal)
+        self._whole[heal.link].append(heal)
         coming = self._coming[heal.link]
         coming.append(heal)
         if len(coming) > 1 and coming[-2].t > heal.t:

@@ -24,6 +24,7 @@ class Deciding:
         self.heard: dict[str, Any] = {}
         self.around: list[Any] = []
         self.saturated = (0, 0)
+        self.in_service = True
         self.here = set(NEIGHBOURS)
         self.journal = DecisionJournal(cast(Agent, self), JournalBuffer())
 
@@ -99,6 +100,18 @@ def test_in_ticks_each_reason_is_its_own() -> None:
     assert entry.states == [1, None, 4, 4]
     assert entry.unused == ["", "silent", "stale", "island"]
     assert not agent.journal.is_usual
+
+
+def test_out_of_service_no_state_is_stale() -> None:
+    """An agent whose inverter is off the network is in nobody's island, however new or old their states are."""
+    agent = Deciding()
+    agent.in_service = False
+    agent.hear(4, "inv2", "inv3", "inv5")
+    agent.use()
+
+    agent.journal.tick(5, 0, NEIGHBOURS)
+
+    assert [entry.unused for entry in agent.noted()] == [["island", "island", "silent", "island"]]
 
 
 def test_in_real_time_each_decision_is_noted_with_its_reasons() -> None:
