@@ -2,24 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from msgspec.structs import replace
 
 from netem.schema.netem import Netem
 from scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
-from wire.timing.clock import time_of
-
-
-def end_of(t: float, T_c: float) -> float:
-    """Return the end (s) of a scenario that goes on for t (s): a whole number of control periods T_c (s).
-
-    Examples
-    --------
-    >>> end_of(2.01, 0.02), end_of(2.02, 0.02), end_of(0.0, 0.02)
-    (2.02, 2.02, 0.02)
-    """
-    return round(time_of(max(1, math.ceil(t / T_c - 1e-6)), T_c), 9)
+from wire.timing.clock import rounded_up
 
 
 def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:
@@ -35,7 +22,7 @@ def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel
         Run time of the last row (s).
     """
     begun = scenario.time.end_s
-    end = min(end_of(ended, scenario.time.T_c_s), LONGEST_RUN)
+    end = min(rounded_up(ended, scenario.time.T_c_s), LONGEST_RUN)
     reached = tuple(event for event in scenario.events if event.t_s < end)
     missed = [f'"{event.label}" at {event.t_s:g} s' for event in scenario.events[len(reached) :]]
     labels = {event.label for event in reached}

@@ -14,7 +14,6 @@ from netem.schema.change import Change, replayed
 from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
-from scenarios.live.ended_scenario import end_of
 from scenarios.live.live_folders import LIVE
 from scenarios.live.run_address import UsageError
 from scenarios.results.run_files import shown, write_whole
@@ -24,6 +23,7 @@ from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line
 from wire.messages import LinkRequest
+from wire.timing.clock import rounded_up
 
 LINKS_ALONE = (
     "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
@@ -101,7 +101,7 @@ def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change]
     ages = msgspec.structs.replace(ages, max_age=ages.max_age or MAX_AGE)
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
-    end = max(scenario.time.end_s, end_of(needed, T_c))
+    end = max(scenario.time.end_s, rounded_up(needed, T_c))
     return msgspec.structs.replace(
         scenario,
         name="",

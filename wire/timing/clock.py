@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 
 def time_of(tick: int, T_c: float) -> float:
     """Return the run time (s) of a tick.
@@ -31,3 +33,14 @@ def ticks_until(end: float, T_c: float) -> int:
     if ticks < 1 or abs(ticks * T_c - end) > 1e-9 * max(1.0, end):
         raise ValueError(f"end: must be a positive multiple of the control period {T_c:g} s, got {end:g} s")
     return ticks
+
+
+def rounded_up(t: float, T_c: float) -> float:
+    """Return the first end (s) of a run at or after t (s): a whole number of control periods T_c (s), one at least.
+
+    Examples
+    --------
+    >>> rounded_up(2.01, 0.02), rounded_up(2.02, 0.02), rounded_up(0.0, 0.02)
+    (2.02, 2.02, 0.02)
+    """
+    return time_of(max(1, math.ceil(t / T_c - 1e-6)), T_c)

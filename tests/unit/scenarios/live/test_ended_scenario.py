@@ -13,10 +13,11 @@ from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.ended_scenario import end_of, ended_scenario
+from scenarios.live.ended_scenario import ended_scenario
 from scenarios.live.live_folders import folders
 from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.scenario_model import LONGEST_RUN
+from wire.timing.clock import rounded_up
 
 
 def islanding(**case: Any) -> ScenarioModel:
@@ -65,4 +66,4 @@ def test_a_live_run_of_hours_is_cut_to_the_longest_scenario() -> None:
 
 def test_a_scenario_has_at_least_one_control_period() -> None:
     """A run that ended before its first one still gives a scenario."""
-    assert end_of(0.0, 0.02) == 0.02
+    assert rounded_up(0.0, 0.02) == 0.02
