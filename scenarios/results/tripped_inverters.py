@@ -5,31 +5,36 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from plant.feeder.trips import SUBSTATION
 from wire.messages import PlantEvent
 
 _NAMES = r"(?P<names>[^\s,:]+(?:, [^\s,:]+)*)"
-_TRIPS = re.compile(f"{_NAMES} (?P<word>tripped|starts its island)")
+_TRIPS = re.compile(f"{_NAMES} tripped")
 _RETURNS = re.compile(f"(?:black start by )?{_NAMES}(?:$| back in service)")
 
 
 def tripped_by(event: PlantEvent) -> tuple[str, ...]:
-    """Return the inverters that trip by an event; none if it is of another kind, or tells of returns.
+    """Return the inverters that trip by an event, without a substation that trips with them.
+
+    None do by an event of another kind, or by one that tells of returns.
 
     Examples
     --------
     >>> texts = ("inv1, inv2 tripped, as the island", "inv1: tripped 3 times, off until", "inv1 back in service, at no")
     >>> [tripped_by(PlantEvent(t=1.0, kind="trip", subject="inv1", text=text)) for text in texts]
     [('inv1', 'inv2'), (), ()]
+    >>> tripped_by(PlantEvent(t=1.0, kind="trip", subject="inv1", text="inv1, substation tripped, as the island"))
+    ('inv1',)
     """
     found = _TRIPS.match(event.text) if event.kind == "trip" else None
-    return tuple(found["names"].split(", ")) if found and found["word"] == "tripped" else ()
+    return tuple(name for name in found["names"].split(", ") if name != SUBSTATION) if found else ()
 
 
 def tripped_inverters(events: Iterable[PlantEvent]) -> dict[str, PlantEvent]:
     """Return the inverters that are off because they tripped, each with the event of its last trip.
 
-    An inverter whose agent has it leave, or join, is no longer one of them. One that joins a dead island waits for the
-    others there, and counts.
+    An inverter whose agent has it leave, or join, is no longer one of them. One that joins a dead island, and waits
+    there for those that have tripped, has not tripped itself.
 
     Parameters
     ----------
@@ -40,8 +45,8 @@ def tripped_inverters(events: Iterable[PlantEvent]) -> dict[str, PlantEvent]:
     for event in events:
         if event.kind == "inverter":
             off.pop(event.subject, None)
-        elif event.kind == "trip" and (found := _TRIPS.match(event.text)):
-            off |= dict.fromkeys(found["names"].split(", "), event)
+        elif names := tripped_by(event):
+            off |= dict.fromkeys(names, event)
         elif event.kind == "trip" and (found := _RETURNS.match(event.text)):
             for name in found["names"].split(", "):
                 off.pop(name, None)

@@ -14,7 +14,8 @@ class Returned:
     """At the end of the run, every inverter that has tripped is in service again, unless its agent had it leave.
 
     A run must be long enough for that: an inverter returns `protection.enter_service_s` after voltage and frequency at
-    its terminals have become normal. After three trips it stays off.
+    its terminals have become normal. After three trips without a minute in service between
+    it stays off.
     """
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:

@@ -52,16 +52,24 @@ def test_a_black_start_brings_all_back_that_it_names() -> None:
     assert [tripped_by(event) for event in (off, back, remark)] == [("inv1", "inv2"), (), ()]
 
 
-def test_whoever_leaves_no_longer_waits_and_whoever_joins_a_dead_island_does() -> None:
-    """An agent decides for its inverter; in a dead island a grid-forming one waits for the others."""
+def test_whoever_leaves_is_not_off_by_a_trip_and_whoever_waits_in_a_dead_island_has_not_tripped() -> None:
+    """An agent decides for its inverter; in a dead island a grid-forming one waits for those that have tripped."""
     off = _event("inv1 tripped: underfrequency 56.4 Hz for 0.16 s (UF2: 56.5 Hz)")
     left = _event("inv1 disconnected", "inverter")
     waits = _event("inv4 starts its island, together with the inverters that have tripped", subject="inv4")
 
     assert tripped_inverters([off, left]) == {}
-    assert [*tripped_inverters([off, waits])] == ["inv1", "inv4"]
+    assert [*tripped_inverters([off, waits])] == ["inv1"]
     assert tripped_by(waits) == ()
-    assert [*tripped_inverters([off, waits, _event("inv4 connected, at no load", "inverter", "inv4")])] == ["inv1"]
+
+
+def test_a_substation_that_trips_with_inverters_is_none() -> None:
+    """It never returns, and nobody waits for it."""
+    both = _event("inv1, substation tripped, as the island has no solution: voltage collapse")
+
+    assert tripped_by(both) == ("inv1",)
+    assert tripped_inverters([both, _event("inv1 back in service, at no load")]) == {}
+    assert tripped_by(_event("substation tripped, as the island has no solution", subject="substation")) == ()
 
 
 def test_a_run_whose_inverters_are_off_at_its_end_fails(tripping: CheckedCase) -> None:
