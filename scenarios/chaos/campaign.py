@@ -58,6 +58,11 @@ class Failure:
     """The run of the simplest schedule found for it."""
     file: Path
 
+    @property
+    def sentence(self) -> str:
+        """What the simplest run violates; what the found one does if that one no longer does."""
+        return self.simplest.violated.get(self.violated, self.row.violated[self.violated])
+
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
@@ -88,10 +93,10 @@ class Summary:
                 first = f"run {failed[0]}" if failed else ""
                 yield f"{name:18} {passed + len(failed):7} {len(failed):9}  {first}".rstrip()
         collapses = sum(bool(row.collapse) for row in rows)
-        beyond = f"; {collapses} collapsed at a change before any agent could act" if collapses else ""
+        beyond = f"; {collapses} with a collapse that no control prevents, and that lasts" if collapses else ""
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for failure in self.failures:
-            yield f"{failure.violated}, run {failure.row.number}: {failure.row.violated[failure.violated]}"
+            yield f"{failure.violated}, run {failure.row.number}: {failure.sentence}"
             yield from (f"    {it}" for it in sorted(failure.simplest.schedule, key=lambda it: it.begins_s))
             yield f"    {again(failure.file)}"
 

@@ -75,7 +75,7 @@ class ChaosFolder:
         schedule = simplest.schedule
         fewer = len(schedule) < len(row.schedule)
         remarks = [
-            f"Found by chaos: {row.violated[violated]}"[:300],
+            f"Found by chaos: {simplest.violated.get(violated, row.violated[violated])}"[:300],
             f"{self._command}, run {row.number}, seed of the messages {seed}"
             + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
             f"Once more: {again(file)}",
@@ -92,7 +92,7 @@ class ChaosFolder:
     def _cells(self, row: ChaosRow) -> str:
         cells = (
             *(row.number, seed_of(self._seed, row.number), _status(row), " ".join(sorted(row.violated))),
-            "; ".join([*(row.violated[name] for name in sorted(row.violated)), *filter(None, [row.collapse])]),
+            "; ".join(filter(None, [*(row.violated[it] for it in sorted(row.violated)), row.collapse, row.unsettled])),
             *(len(row.schedule), json.dumps(msgspec.to_builtins(row.schedule))),
             *(" ".join(row.passed), row.trips, row.since_s, row.history_sha256, row.links_sha256, row.took_s),
         )
@@ -105,7 +105,7 @@ def again(file: Path) -> str:
 
 
 def _status(row: ChaosRow) -> str:
-    """Return the status of a run in a word."""
+    """Return the status of a run in a word: what it violates comes before what a collapse excuses."""
     return "violated" if row.violated else "collapse" if row.collapse else "passed"
 
 

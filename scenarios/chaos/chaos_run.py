@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import NamedTuple
 import msgspec
 
 from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
+from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase, base_of
 from scenarios.chaos.schedule_search import shrunk
@@ -39,10 +39,8 @@ ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES)
 """All of them."""
 
 LONGER_RUNS = 6
-"""Most times that a run with trips is done, each longer than the one before: after three trips inverters stay off."""
-
-COLLECTED = 10
-"""Runs after which a worker looks for garbage: each leaves some ten MB in cycles."""
+"""Most times that a run with trips is done, each longer than the one before: inverters stay off after three trips
+without a minute in service between."""
 
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
@@ -60,7 +58,9 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     violated: dict[str, str] = {}
     """Those that it violated, with the sentence of each."""
     collapse: str = ""
-    """Why it is not judged by what control restores: a change made inverters trip before any agent could act."""
+    """Why violations of some inverters do not count: a change made them trip before any control could prevent it."""
+    unsettled: str = ""
+    """Why it may be judged too early: inverters tripped and returned in each of its ever longer runs."""
     history_sha256: str = ""
     """Of the bytes of its history.csv; empty if it broke."""
     links_sha256: str = ""
@@ -118,12 +118,14 @@ def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driv
         As for `run_number`.
     """
     base = base_of(text)
+    rows: dict[bytes, ChaosRow] = {}
 
-    def fails(schedule: Schedule) -> bool:
+    def row_of(schedule: Schedule) -> ChaosRow:
         row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=violated == REPEATS)
-        return violated in row.violated
+        return rows.setdefault(msgspec.json.encode(schedule), row)
 
-    return run_schedule(base, shrunk(base, seed, number, fails), seed_of(seed, number), number, driver)
+    simplest = shrunk(base, seed, number, lambda schedule: violated in row_of(schedule).violated)
+    return rows.get(msgspec.json.encode(simplest)) or row_of(simplest)  # that of the run itself is not run to shrink it
 
 
 def run_schedule(
@@ -152,8 +154,6 @@ def run_schedule(
     again : bool, optional
         Whether to run it twice: both must give the same bytes.
     """
-    if number % COLLECTED == 0:
-        gc.collect()
     began = monotonic()
     row = _once_restored(base, schedule, seed, number, driver)
     if driver == "processes":
@@ -184,18 +184,6 @@ def run_scenario(base: ChaosBase, driver: Driver = "inprocess") -> ChaosRow:
     return _judged(base, base.scenario, ChaosRow(number=0, schedule=()), driver).row
 
 
-def collapse_at_change(scenario: ScenarioModel, events: Iterable[PlantEvent]) -> str:
-    """Return event and first trip of a run if this comes within a control period of that, "" if not.
-
-    No agent can act in between: measurements of after the event are not decided on before the next tick.
-    """
-    first = next((event for event in events if tripped_by(event)), None)
-    if first is None:
-        return ""
-    since = (event for event in scenario.events if -1e-9 <= first.t - event.t_s <= scenario.time.T_c_s + 1e-9)
-    return next((f"{event.label}: at t = {first.t:g} s {first.text}" for event in since), "")
-
-
 def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float:
     """Return the run time (s) from which on a run with trips is to be restored; 0 for one without.
 
@@ -215,29 +203,43 @@ def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float
 
 
 def _once_restored(base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver) -> ChaosRow:
+    """Run a scenario with a schedule, and judge it without what a collapse before any control could act excuses."""
+    judged = _settled(base, schedule, seed, number, driver)
+    row = judged.row
+    if not judged.collapses or row.violated.keys().isdisjoint(RESTORED):
+        return row
+    changes, faultless = tuple(it for it in schedule if it.table == "event"), base.without_faults()
+    plain = judged
+    if len(changes) < len(schedule) or faultless is not base:  # a fault of links or agents before may have led to it
+        plain = _settled(faultless, changes, seed, number, "inprocess")
+    # Who is in service again, or would be without faults, is to be restored like all others.
+    lost = {
+        label: names & judged.off & plain.off
+        for label, names in excused_inverters(judged.collapses, plain.collapses).items()
+    }
+    excused = frozenset().union(*lost.values())
+    others = unexcused(judged.verdicts, excused)
+    violated = {name: others.get(name, text) for name, text in row.violated.items()}
+    if violated == row.violated:
+        return row
+    return msgspec.structs.replace(
+        row,
+        violated={name: text for name, text in violated.items() if text},
+        collapse="; ".join(collapse.text for collapse in judged.collapses if lost.get(collapse.label)),
+    )
+
+
+def _settled(base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver) -> JudgedRun:
     """Run a scenario with a schedule; if inverters trip, again and so long that they are judged after their return."""
     since_s = base.changed_s(schedule)
     for _ in range(LONGER_RUNS):
         row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
         judged = _judged(base, base.disturbed(schedule, seed, since_s), row, driver)
         if judged.restored_s <= since_s:
-            break
+            return judged
         since_s = judged.restored_s
-    row, collapse = judged.row, judged.collapse
-    if not collapse or row.violated.keys().isdisjoint(RESTORED):
-        return row
-    changes = tuple(disturbance for disturbance in schedule if disturbance.table == "event")
-    if len(changes) < len(schedule):  # a fault of links or agents before may have led to it
-        plain = ChaosRow(number=number, schedule=changes)
-        collapse = _judged(base, base.disturbed(changes, seed), plain, "inprocess").collapse
-    if collapse.partition(":")[0] != judged.collapse.partition(":")[0]:
-        return row
-    return msgspec.structs.replace(
-        row,
-        passed=tuple(name for name in row.passed if name not in RESTORED),
-        violated={name: text for name, text in row.violated.items() if name not in RESTORED},
-        collapse=judged.collapse,
-    )
+    text = f"after {LONGER_RUNS} runs still judged from {row.since_s:g} s on, {since_s:g} s would be right"
+    return judged._replace(row=msgspec.structs.replace(judged.row, unsettled=f"inverters trip and return: {text}"))
 
 
 class JudgedRun(NamedTuple):
@@ -246,8 +248,12 @@ class JudgedRun(NamedTuple):
     row: ChaosRow
     restored_s: float = 0.0
     """Run time from which on it is to be restored (s)."""
-    collapse: str = ""
-    """See `collapse_at_change`."""
+    collapses: tuple[Collapse, ...] = ()
+    """See `collapses_at_changes`."""
+    off: frozenset[str] = frozenset()
+    """Inverters that are out of service at its end."""
+    verdicts: tuple[CheckVerdict, ...] = ()
+    """Of its checks."""
 
 
 def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver) -> JudgedRun:
@@ -264,8 +270,11 @@ def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Dri
         except Exception as error:
             return JudgedRun(msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}))
         restored_s = restored_from(recorded.events, scenario.protection.enter_service)
-        collapse = collapse_at_change(scenario, recorded.events)
-        return JudgedRun(_with_verdicts(row, recorded, verdicts), restored_s, collapse)
+        collapses = collapses_at_changes(scenario, base.feeder, recorded.events)
+        history = record.history
+        present = zip(history.inverters, history.present[-1].tolist(), strict=True)
+        off = frozenset(name for name, on in present if not on)
+        return JudgedRun(_with_verdicts(row, recorded, verdicts), restored_s, collapses, off, verdicts)
 
 
 def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:

@@ -6,13 +6,13 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from math import ceil
 from pathlib import Path
 from typing import Any
 
-import msgspec
+from msgspec.structs import replace
 
 from netem.schema.fault import Fault
+from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from plant.equipment import Feeder
@@ -29,6 +29,7 @@ from scenarios.schema.scenario_errors import Problems
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.schema.time_checks import check_times
+from wire.timing.clock import rounded_up
 
 _LISTS = ("open", "close", "leave", "join")
 """Keys of an event that are lists of names."""
@@ -61,7 +62,7 @@ class ChaosBase:
     def __post_init__(self) -> None:
         assert len(self.scenario.cases) == 1, "a base has one case"
         name = f"{self.scenario.name[:_LONGEST_NAME]}-chaos"
-        plain = msgspec.structs.replace(self.scenario, name=name, paper="", claims=(), metrics=())
+        plain = replace(self.scenario, name=name, paper="", claims=(), metrics=())
         object.__setattr__(self, "tree", tomllib.loads(to_toml(plain, {}, terse=True)))
         everybody = [row.name for row in (*self.feeder.inverters, *self.feeder.spares)]
         object.__setattr__(self, "supply", FeasibleSupply(self.feeder, everybody))
@@ -83,6 +84,12 @@ class ChaosBase:
         faults: list[Fault | Partition | NodeFault] = [*netem.links, *netem.partitions, *netem.nodes]
         ends = [fault.from_s if fault.to_s is None else fault.to_s for fault in faults]
         return max([*ends, *(event.t_s for event in self.scenario.events)], default=0.0)
+
+    def without_faults(self) -> ChaosBase:
+        """Return the base without its own faults of links and agents; itself if it has none."""
+        cases = {name: replace(case, netem=_faultless(case.netem)) for name, case in self.scenario.cases.items()}
+        scenario = replace(self.scenario, netem=_faultless(self.scenario.netem), cases=cases)
+        return self if scenario == self.scenario else ChaosBase(scenario, self.feeder)
 
     def changed_s(self, schedule: Schedule) -> float:
         """Return the run time (s) of the last change with a schedule."""
@@ -137,7 +144,7 @@ class ChaosBase:
         """Return the tables of the scenario with a schedule."""
         changed, T_c = self.changed_s(schedule), self.scenario.time.T_c_s
         since = max(changed, since_s)
-        end = round(ceil((since + WITHIN_S + JUDGED_S) / T_c - 1e-6) * T_c, 9)
+        end = rounded_up(since + WITHIN_S + JUDGED_S, T_c)
         tree: dict[str, Any] = {**self.tree, "seed": seed}
         tree["time"] = self.tree["time"] | {"end_s": end}
         tree["checks"] = chaos_checks(self.scenario.checks, changed, since)
@@ -178,6 +185,11 @@ def merged_events(own: Iterable[Mapping[str, Any]], schedule: Schedule) -> list[
             elif key != "t_s":
                 event[key] = value
     return [found[t_s] for t_s in sorted(found)]
+
+
+def _faultless(netem: Netem) -> Netem:
+    """Return the tables of faults without any entry."""
+    return replace(netem, links=(), partitions=(), nodes=())
 
 
 _read_feeder = lru_cache(maxsize=8)(read_feeder)

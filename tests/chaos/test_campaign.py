@@ -87,6 +87,7 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
 
     assert failure.violated == "frequency"
     assert 1 <= len(failure.simplest.schedule) <= 3 < len(failure.row.schedule)
+    assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*summary.lines()]
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
 

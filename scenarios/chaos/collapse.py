@@ -1,0 +1,102 @@
+"""Collapses that come so soon after a change of the network that no control prevents them, and what they excuse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import msgspec
+
+from plant.equipment import Feeder
+from plant.equipment.bus_islands import bus_islands
+from scenarios.chaos.chaos_checks import RESTORED
+from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
+from scenarios.results.switch_positions import closed_switches
+from scenarios.results.tripped_inverters import tripped_by
+from scenarios.schema.scenario_model import ScenarioModel
+from wire.messages import PlantEvent
+
+PERIODS = 2
+"""Control periods after a change within which trips are a collapse. The first measurement that shows the change is
+taken at the end of the first period. What an agent decides on it acts during the second one, before any agent has heard
+of the change from another, or has measured what a decision did."""
+
+
+class Collapse(NamedTuple):
+    """Trips at one change of the network."""
+
+    label: str
+    """Label of the scenario's event that is the change."""
+    text: str
+    """Event and first trip, for a person."""
+    inverters: frozenset[str]
+    """Inverters of the islands in which inverters tripped, as the switches were then."""
+
+
+def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> tuple[Collapse, ...]:
+    """Return the collapses of a run, one for each change that makes inverters trip within `PERIODS`.
+
+    The first trip of an inverter counts alone: who has tripped before may trip again for the reason of that time.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        The scenario: its events are the changes.
+    feeder : Feeder
+        Its feeder.
+    events : Iterable[PlantEvent]
+        Events of the plant, in the order of time.
+    """
+    rows = (*feeder.inverters, *feeder.spares)
+    bus_of = {row.name: row.bus for row in rows}
+    longest = PERIODS * scenario.time.T_c_s + 1e-9
+    switched: list[PlantEvent] = []
+    tripped: set[str] = set()
+    found: dict[str, Collapse] = {}
+    for event in events:
+        if event.kind == "switch":
+            switched.append(event)
+        first = set(tripped_by(event)) - tripped
+        tripped |= first
+        since = [change.label for change in scenario.events if -1e-9 <= event.t - change.t_s <= longest]
+        if not first or not since:
+            continue
+        label, buses = since[-1], {bus_of[name] for name in first}
+        islands = [each for each in bus_islands(feeder, closed_switches(feeder, switched)) if each & buses]
+        members = frozenset(row.name for row in rows if any(row.bus in island for island in islands))
+        before = found.get(label, Collapse(label, f"{label}: at t = {event.t:g} s {event.text}", frozenset()))
+        found[label] = before._replace(inverters=before.inverters | members)
+    return tuple(found.values())
+
+
+def excused_inverters(collapses: Iterable[Collapse], plain: Iterable[Collapse]) -> dict[str, frozenset[str]]:
+    """Return the inverters of each collapse, by its label, that collapse at the same change without any fault, too."""
+    without = {collapse.label: collapse.inverters for collapse in plain}
+    both = {each.label: each.inverters & without.get(each.label, frozenset()) for each in collapses}
+    return {label: inverters for label, inverters in both.items() if inverters}
+
+
+def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict[str, str]:
+    """Return the failed checks of what control restores, with the sentence of what other inverters violate.
+
+    Parameters
+    ----------
+    verdicts : Iterable[CheckVerdict]
+        Of one run.
+    excused : frozenset[str]
+        Inverters whose violations do not count. A violation that names none counts.
+
+    Returns
+    -------
+    dict[str, str]
+        Empty sentences are of checks that only excused inverters violate.
+    """
+    found = {}
+    for verdict in verdicts:
+        if verdict.status == "failed" and verdict.check in RESTORED:
+            rest = tuple(violation for violation in verdict.violations if violation.agent not in excused)
+            count = verdict.count - len(verdict.violations) + len(rest)
+            reason = verdict.reason or f"{count} violations, beyond the {SHOWN_VIOLATIONS} that a verdict keeps"
+            of_others = msgspec.structs.replace(verdict, violations=rest, count=count, reason=reason)
+            found[verdict.check] = of_others.sentence if count or verdict.reason else ""
+    return found
