@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+SUBSTATION = "substation"
+"""Name of a substation that trips, in the text of the event, beside those of inverters."""
+
 F_BASE = 60.0
 """Nominal frequency (Hz) of the standard's settings; at another one the defaults are in proportion."""
 

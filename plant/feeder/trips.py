@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from plant.dynamics import PlantError, Trip
 from plant.network import Network
+from plant.trip_settings import SUBSTATION
 from wire.messages import PlantEvent
 
 RECENT = 1.0
@@ -14,9 +15,6 @@ RECENT = 1.0
 
 BEYOND = 10.0
 """Voltage (pu) that no network has: where there is no solution, it says nothing."""
-
-SUBSTATION = "substation"
-"""Subject of the event of a substation's trip."""
 
 
 class Closing(NamedTuple):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from plant.feeder.trips import SUBSTATION
+from plant.trip_settings import SUBSTATION
 from wire.messages import PlantEvent
 
 _NAMES = r"(?P<names>[^\s,:]+(?:, [^\s,:]+)*)"
