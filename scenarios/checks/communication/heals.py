@@ -70,8 +70,13 @@ class Heals:
         self._listens: set[Link] = set()
         self._receivers: set[str] = set()
         """Receivers of links with a heal."""
-        for heal in sorted(_planned(info, t_end), key=lambda heal: heal.t):
-            self._add(heal)
+        self._losses: dict[Link, list[Span]] = {}
+        """Planned cuts and losses of each link."""
+        for link, spans in _planned(info):
+            self._losses[link] = [span for span in spans if span.kind in LOSSES]
+            for t, again in _ends(self._losses[link]):
+                if t < t_end:
+                    self._add(Heal(link, t, lost_again=again))
 
     def trace(self, trace: LinkTrace) -> None:
         """Take verdicts of a link: the first message that gets through again is the end of a cut."""
@@ -81,7 +86,7 @@ class Heals:
                 self._was_cut.add(link)
                 if link in self._whole:
                     self._whole[link] = [heal for heal in self._whole[link] if not self._lost_again(heal, t)]
-            elif link in self._was_cut and not isinstance(outcome, str):
+            elif link in self._was_cut and not isinstance(outcome, str) and not self._is_lossy(link, t):
                 self._was_cut.discard(link)
                 self._add(Heal(link, t))
 
@@ -124,6 +129,10 @@ class Heals:
         lives = (min(last, heal.lost_again) - max(first, begins) for first, last in src.epochs.values())
         return max((0.0, *lives))
 
+    def _is_lossy(self, link: Link, t: float) -> bool:
+        """Return whether a link is planned to lose messages at a time (s): a cut may hold one and give it later."""
+        return any(span.from_s - 1e-9 <= t < span.to_s - 1e-9 for span in self._losses.get(link, ()))
+
     @staticmethod
     def _lost_again(heal: Heal, t: float) -> bool:
         """Note that a link was cut at a time (s); return whether that was after the heal."""
@@ -159,7 +168,7 @@ def _at_work_since(window: StateWindow, number: int, t: float) -> float:
 def _ends(spans: Iterable[Span]) -> Iterator[tuple[float, float]]:
     """Yield when (s) a link is whole again, and until when: cuts may overlap, and losses may go on after one."""
     until, was_cut = -inf, False
-    for span in sorted((it for it in spans if it.kind in LOSSES), key=lambda it: it.from_s):
+    for span in sorted(spans, key=lambda it: it.from_s):
         if span.from_s > until:
             if was_cut:
                 yield until, span.from_s
@@ -169,8 +178,8 @@ def _ends(spans: Iterable[Span]) -> Iterator[tuple[float, float]]:
         yield until, inf
 
 
-def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
-    """Yield the ends of the cuts that the scenario plans."""
+def _planned(info: RecordInfo) -> Iterator[tuple[Link, Iterable[Span]]]:
+    """Yield the faults that the scenario plans for each link."""
     names = info.agent_names
     for tree in (config.links for config in info.agents if config.links):
         try:
@@ -178,6 +187,5 @@ def _planned(info: RecordInfo, t_end: float) -> Iterator[Heal]:
         except msgspec.ValidationError:
             continue
         for link in ((src, dst) for src in names for dst in names if src != dst):
-            ends = _ends(setup.netem.spans(LinkEnds(*link), setup.microgrids))
-            yield from (Heal(link, t, lost_again=again) for t, again in ends if t < t_end)
+            yield link, setup.netem.spans(LinkEnds(*link), setup.microgrids)
         return
