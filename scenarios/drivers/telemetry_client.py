@@ -67,7 +67,7 @@ class TelemetryClient:
         """The messages that were dropped."""
         self.inbox = Inbox(holds=clock == "simulated")
         """Takes the words of other threads."""
-        self.inbox.is_known = self._core.is_known
+        self.inbox.is_known, self.inbox.is_noted = self._core.is_known, self._core.is_noted
         self._session = self._open()
 
     @property
@@ -100,6 +100,8 @@ class TelemetryClient:
                 words.append(key)
             elif kind == "appeared":
                 self._core.appeared(key)
+            elif kind == "vanished":
+                self._core.vanished(key)
             elif kind == "message":
                 self._core.received(key, payload, monotonic())
                 for message in self._core.take():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.codec import RejectedError, encode
+from wire.keys import epoch_of
 from wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
 from wire.node import Route
 from wire.plant_follower import PlantFollower
@@ -44,10 +45,19 @@ class TelemetryEndpoint(PlantFollower):
         return tuple(self.routes)
 
     def appeared(self, key: str) -> None:
-        """Note a token. That it goes is not noted: a link that breaks takes it away from a plant that goes on."""
+        """Note a token."""
         match self.keys.parts(key):
             case ("alive", "plant", part):
                 self._plant_appeared(part)
+
+    def vanished(self, key: str) -> None:
+        """Note that a token is gone, but for that of the plant that it follows.
+
+        A link that breaks takes the token away from a plant that goes on. All others make room for new ones.
+        """
+        match self.keys.parts(key):
+            case ("alive", "plant", part) if epoch_of(part) != self.admission.epoch(PLANT):
+                self._plant_vanished(part)
 
     def is_known(self, key: str, payload: bytes) -> bool:
         """Whether a message looks like one of the plant; in simulated time whatever comes for recorders counts as such.

@@ -129,10 +129,12 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
     """Start a core, declare its keys and serve it until it has finished; parameters and errors are those of `serve`.
 
-    The start comes first, because a restarted core needs fewer keys than at the end of its last session. The token is
-    declared last: whoever sees it may rely on the rest.
+    The start comes first, because a restarted core needs fewer keys than at the end of its last session. The inbox
+    learns of the core before any key is declared: a newcomer gets its history of tokens at once, strangers' included.
+    The token is declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
+    _connect(core, session)
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
@@ -158,7 +160,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     StoppedError
         If another thread asks the process to stop.
     """
-    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
+    _connect(core, session)
     take = session.take
     limit = limit_log(log)
     now = monotonic()
@@ -193,3 +195,8 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
         if core.rejects.has_lines:
             for line in core.rejects.take_lines():
                 log.warning("%s", line)
+
+
+def _connect(core: Core, session: Session) -> None:
+    """Let the inbox ask the core which messages and tokens must not be lost."""
+    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted

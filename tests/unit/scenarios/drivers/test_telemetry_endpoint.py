@@ -7,6 +7,7 @@ from scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
 from wire.codec import encode
 from wire.keys import Keys
 from wire.messages import Answer, LinkReport, LinkRequest, Telemetry
+from wire.plant_follower import MOST_PLANTS
 
 KEYS = Keys("demo")
 
@@ -78,3 +79,33 @@ def test_only_the_answer_to_the_last_question_counts() -> None:
     assert asked is not None
     assert it.taken == [telemetry(0), telemetry(1)]
     assert it.core.rejects.counts == {"stale": 1}
+
+
+def test_plants_that_have_gone_keep_no_place() -> None:
+    """Somebody who holds the tokens of many plants for a moment keeps no recorder from the plant that comes then."""
+    it = recorder()
+    for epoch in range(100, 100 + MOST_PLANTS):
+        it.core.appeared(KEYS.alive_plant(epoch))
+    it.core.appeared(KEYS.alive_plant(7))
+    for epoch in range(100, 100 + MOST_PLANTS):
+        it.core.vanished(KEYS.alive_plant(epoch))
+    noted = [it.core.is_noted(KEYS.alive_plant(epoch)) for epoch in range(100, 100 + MOST_PLANTS)]
+    it.core.appeared(KEYS.alive_plant(7))
+    it.hear(telemetry(0))
+
+    assert it.core.rejects.counts == {"excess": 1}
+    assert not any(noted)
+    assert it.taken == [telemetry(0)]
+
+
+def test_the_plant_that_it_follows_is_followed_while_a_link_is_broken() -> None:
+    """The link takes the token away, and the messages that come on the next one are of the same plant."""
+    it = recorder()
+    it.core.appeared(KEYS.alive_plant(7))
+    it.hear(telemetry(0))
+    it.core.vanished(KEYS.alive_plant(7))
+    it.core.appeared(KEYS.alive_plant(8))
+    it.hear(telemetry(0, epoch=8))
+    it.hear(telemetry(1))
+
+    assert it.taken == [telemetry(0), telemetry(1)]

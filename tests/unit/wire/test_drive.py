@@ -1,0 +1,61 @@
+"""What the loops of nodes and recorders do before they serve."""
+
+from __future__ import annotations
+
+import logging
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+import scenarios.drivers.telemetry_client as telemetry_client
+from scenarios.drivers.telemetry_client import TelemetryClient
+from wire.driver.drive import Core, drive
+from wire.driver.inbox import Inbox
+from wire.driver.session import Session
+from wire.token_queue import AT_ONCE, MOST_WAITING
+
+EXCESS = 5
+"""Strangers' tokens for which there is no room."""
+
+
+class Crowded:
+    """A session into whose run strangers have put tokens before it began."""
+
+    def __init__(self, *words: Any, inbox: Inbox | None = None, **options: Any) -> None:
+        self.inbox = inbox or Inbox()
+
+    def __getattr__(self, name: str) -> Any:
+        """Do nothing else."""
+        return lambda *words: ()
+
+    def watch(self, key: str) -> None:
+        """Bring the tokens that are there already, as Zenoh does before it returns."""
+        for i in range(AT_ONCE + MOST_WAITING + EXCESS):
+            self.inbox.put(("appeared", key.replace("**", f"agent/stranger{i}/x").replace("*", f"x{i}"), b""))
+
+
+def test_a_node_is_asked_about_strangers_whose_tokens_were_there_before_it() -> None:
+    """Of the tokens that come with its first look a bounded number waits, too."""
+    session = Crowded()
+    core = SimpleNamespace(
+        start=lambda now: None,
+        subscriptions=(),
+        watched="gridpeers/toy/alive/**",
+        tokens=(),
+        take_actions=lambda: [],
+        finished=True,
+        is_known=lambda key, payload: False,
+        is_noted=lambda key: False,
+    )
+    drive(cast(Core, core), cast(Session, session), logging.getLogger("test"))
+
+    assert [loss.number for loss in session.inbox.take_losses()] == [EXCESS]
+
+
+def test_a_recorder_is_asked_about_strangers_whose_tokens_were_there_before_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It follows one plant, and anybody may hold tokens of a plant."""
+    monkeypatch.setattr(telemetry_client, "Session", Crowded)
+    client = TelemetryClient("history", "toy", "tcp/127.0.0.1:1", "wall", lambda message: None)
+
+    assert [loss.number for loss in client.inbox.take_losses()] == [EXCESS]
