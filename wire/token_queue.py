@@ -4,8 +4,7 @@ Anybody may hold tokens, as many as he likes, and each costs the process that no
 
 - of the tokens that appear, `AT_ONCE` come in at once and as many after each `PAUSE`; the others wait, in their order;
 - up to `MOST_WAITING` of strangers wait; one more is dropped and counted. One of a noted holder always waits;
-- a token that vanishes while it waits leaves nothing: its process never knew of it;
-- a token that vanishes otherwise comes in at once if its holder is noted, and is of no use if not.
+- a token that vanishes comes in at once if its holder is noted, and is of no use if not; a waiting one is forgotten.
 
 So a noted holder is always seen to go, and to come back: the end and the return of its token are never lost and never
 change places. Noted holders are those that the process itself knows (`wire.node.Node.is_noted`). What has come in
@@ -83,7 +82,8 @@ class TokenQueue:
         """
         there = self._came.get(key, self._handled.get(key))
         if event == "vanished":
-            if self._waiting.pop(key, None) is not None or not (is_noted(key) if there is None else there):
+            self._waiting.pop(key, None)  # one that is announced again waits although its holder is noted
+            if not (is_noted(key) if there is None else there):
                 return False
             self._came[key] = False
             return True

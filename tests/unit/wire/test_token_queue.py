@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from itertools import pairwise
+from typing import Any
 from unittest.mock import patch
 
 from hypothesis import given
@@ -11,10 +13,13 @@ from hypothesis import strategies as st
 from wire.driver.inbox import Inbox
 from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TokenEvent, TokenQueue
 
-ROOM = 5
-"""Strangers' tokens that may wait in the drawn sequences."""
+ROOM, RATE = 5, 3
+"""Strangers' tokens that may wait in the drawn sequences, and those that come in at once."""
 
 MEMBERS, WELCOME, REFUSED = ("m0", "m1"), ("w0", "w1", "w2"), tuple(f"s{i}" for i in range(40))
+
+Seen = tuple[TokenEvent, int]
+"""An event that came in, and which token of its key it is about: each that is held after another has a new number."""
 
 
 class Process:
@@ -29,27 +34,44 @@ class Process:
         self.noted: set[str] = set()
         self.there: set[str] = set()
         """Tokens that are held."""
-        self.seen: dict[str, list[TokenEvent]] = {}
-        """Events of each token in the order in which they came in."""
-        self.appeared = self.annihilated = self.lost = 0
+        self.unseen: set[str] = set()
+        """Those of them that were dropped."""
+        self.number: Counter[str] = Counter()
+        self.seen: dict[str, list[Seen]] = {}
+        """Events of each key in the order in which they came in."""
+        self.announced = self.annihilated = self.lost = 0
 
     def flip(self, key: str) -> None:
         """Hold a token, or give it up."""
-        self.queue_bound()
-        waiting = self.queue.waiting
-        if key in self.there:
-            self.there.discard(key)
-            view = self.seen.get(key, [])
-            comes = self.queue.put("vanished", key, self.now, self.noted.__contains__)
-            self.annihilated += self.queue.waiting < waiting
-            owed = bool(view) and view[-1] == "appeared" and self.queue.waiting == waiting
-            if key in MEMBERS:  # its end is never lost, and never told of a token that never came
-                assert comes == owed
-            self._come("vanished", key, comes)
-        else:
+        if key not in self.there:
             self.there.add(key)
-            self.appeared += 1
-            self._come("appeared", key, self.queue.put("appeared", key, self.now, self.noted.__contains__))
+            self.number[key] += 1
+            self.announce(key)
+            return
+        waiting, last = self.queue.waiting, self.seen.get(key, [])[-1:]
+        self.there.discard(key)
+        self.unseen.discard(key)
+        comes = self.queue.put("vanished", key, self.now, self.noted.__contains__)
+        self.annihilated += waiting - self.queue.waiting
+        if key in MEMBERS:  # its end is never lost, and never told of a token that never came
+            assert comes == (last == [("appeared", self.number[key])])
+        self._come("vanished", key, comes)
+
+    def announce(self, key: str) -> None:
+        """Have a token that is held announced, perhaps once more, as by a second link."""
+        if key not in self.there:
+            return
+        waiting, owed = self.queue.waiting, key in self.noted or key in {each for _, each in self.taken + self.pending}
+        comes = self.queue.put("appeared", key, self.now, self.noted.__contains__)
+        lost = sum(loss.number for loss in self.queue.take_loss())
+        self.lost += lost
+        self.announced += comes + lost + self.queue.waiting - waiting  # or it waits already, and that is all
+        self._come("appeared", key, comes)
+        if lost:
+            assert key not in MEMBERS or not owed or self.seen[key][-1] == ("appeared", self.number[key])
+            self.unseen.add(key)
+        beyond = len(MEMBERS + WELCOME) + 2 * RATE  # those that are noted, or about to be
+        assert self.queue.waiting <= ROOM + beyond
 
     def take(self, after: float) -> None:
         """Handle what was taken before, and take what is there."""
@@ -64,43 +86,72 @@ class Process:
             assert at <= self.now
             self._come("appeared", key, True)
         self.taken, self.pending = self.taken + self.pending, []
-        self.lost += sum(loss.number for loss in self.queue.take_loss())
-        assert sum(kind == "appeared" for kind, _ in self.taken) <= 2 * AT_ONCE
-
-    def queue_bound(self) -> None:
-        """What waits is bounded by the room, and by those that the process has noted."""
-        assert self.queue.waiting <= ROOM + len(MEMBERS + WELCOME) + 2 * AT_ONCE
+        assert sum(kind == "appeared" for kind, _ in self.taken) <= 2 * RATE
 
     def _come(self, kind: TokenEvent, key: str, comes: bool) -> None:
         if comes:
             self.pending.append((kind, key))
-            self.seen.setdefault(key, []).append(kind)
+            self.seen.setdefault(key, []).append((kind, self.number[key]))
+            self.unseen.discard(key)
 
 
-@given(st.lists(st.one_of(st.sampled_from(MEMBERS + WELCOME + REFUSED), st.sampled_from((0.0, PAUSE))), max_size=150))
-def test_nobody_who_is_noted_goes_or_comes_unseen_whatever_strangers_do(steps: list[str | float]) -> None:
+KEY = st.sampled_from(MEMBERS + WELCOME + REFUSED)
+
+STEP = st.one_of(
+    st.tuples(st.just("flip"), st.sampled_from(MEMBERS + WELCOME)),
+    st.tuples(st.just("announce"), st.sampled_from(MEMBERS + WELCOME)),
+    st.tuples(st.just("strangers"), st.integers(0, 30)),
+    st.tuples(st.just("flip"), KEY),
+    st.tuples(st.just("take"), st.sampled_from((0.0, PAUSE))),
+)
+
+
+@given(st.lists(STEP, max_size=100))
+def test_nobody_who_is_noted_goes_or_comes_unseen_whatever_strangers_do(steps: list[tuple[str, Any]]) -> None:
     """In any order of tokens and takes: no end is lost, no two change places, what waits is bounded, all is counted."""
-    with patch("wire.token_queue.MOST_WAITING", ROOM):
+    with patch("wire.token_queue.MOST_WAITING", ROOM), patch("wire.token_queue.AT_ONCE", RATE):
         process = Process()
         for key in MEMBERS:
             process.flip(key)
         process.take(0.0)
         process.take(PAUSE)
-        for step in steps:
-            process.flip(step) if isinstance(step, str) else process.take(step)
+        for step, what in steps:
+            if step == "flip":
+                process.flip(what)
+            elif step == "announce":
+                process.announce(what)
+            elif step == "take":
+                process.take(what)
+            else:
+                for key in REFUSED[what : what + 10]:
+                    process.flip(key)
         for _ in range(20):
             process.take(PAUSE)
 
     for key, events in process.seen.items():
-        assert events[0] == "appeared"
+        assert events[0][0] == "appeared"
         if key not in REFUSED:  # the end of who is not noted is of no use
-            assert all(a != b for a, b in pairwise(events)), (key, events)
-    assert process.noted & {*MEMBERS} == process.there & {*MEMBERS}
+            for (kind, number), (following, its) in pairwise(events):
+                assert kind != following or (following == "appeared" and number == its), (key, events)
+    there = process.there - process.unseen
+    assert process.noted & {*MEMBERS} >= there & {*MEMBERS}
     assert process.noted <= process.there  # nobody is believed to be there who has gone
-    arrived = sum(events.count("appeared") for events in process.seen.values())
-    assert process.appeared == arrived + process.annihilated + process.lost
+    arrived = sum(kind == "appeared" for events in process.seen.values() for kind, _ in events)
+    assert process.announced == arrived + process.annihilated + process.lost
     assert process.queue.waiting == 0
     assert process.queue.is_idle
+
+
+def test_who_is_noted_and_announced_again_is_seen_to_go_while_that_waits() -> None:
+    """A second link announces a token once more; behind strangers that waits, and the end comes in all the same."""
+    queue = TokenQueue()
+    for i in range(AT_ONCE + 1):
+        queue.put("appeared", f"who{i}", 0.0, lambda key: False)
+    queue.put("appeared", "inv2", 0.0, lambda key: key == "inv2")
+
+    assert queue.put("vanished", "inv2", 0.0, lambda key: key == "inv2")
+    assert queue.waiting == 1
+    assert not queue.put("vanished", "inv2", 0.0, lambda key: key == "inv2")
 
 
 def test_of_a_flood_of_strangers_a_bounded_number_waits_and_the_rest_is_counted() -> None:
