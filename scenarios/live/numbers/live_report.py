@@ -150,8 +150,8 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> 
         folders.broken(outcome.broke or "no whole record")
         return outcome
     try:
+        folders.write_end(metrics.scenario, outcome.recorded.ended)  # first: a signal may end what follows
         show(write_report(metrics, outcome.recorded, outcome.pacing), Console())
-        folders.write_end(metrics.scenario, outcome.recorded.ended)
         folders.complete(outcome.recorded.record_failure)
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")

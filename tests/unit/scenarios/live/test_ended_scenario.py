@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import msgspec
 import pytest
@@ -15,6 +16,10 @@ from netem.schema.partition import Partition
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.live.ended_scenario import ended_scenario
 from scenarios.live.live_folders import folders
+from scenarios.live.live_processes import ProcessOutcome
+from scenarios.live.numbers import live_report
+from scenarios.results.metrics_file import RunMetrics
+from scenarios.results.record import Recorded
 from scenarios.schema import ScenarioModel, load_scenario
 from scenarios.schema.scenario_model import LONGEST_RUN
 from wire.timing.clock import rounded_up
@@ -67,3 +72,22 @@ def test_a_live_run_of_hours_is_cut_to_the_longest_scenario() -> None:
 def test_a_scenario_has_at_least_one_control_period() -> None:
     """A run that ended before its first one still gives a scenario."""
     assert rounded_up(0.0, 0.02) == 0.02
+
+
+def test_a_run_that_is_interrupted_while_it_is_judged_has_its_length_in_its_scenario(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its numbers may be missing, and its file can be run again for as long all the same."""
+
+    def interrupted(*words: Any) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(live_report, "write_report", interrupted)
+    outcome = ProcessOutcome(recorded=cast(Recorded, SimpleNamespace(ended=2.01)))
+    with folders(tmp_path / "live", islanding()) as kept:
+        metrics = cast(RunMetrics, SimpleNamespace(scenario=islanding()))
+        ended = live_report.conclude(outcome, metrics, kept)
+
+    again, _ = load_scenario(tmp_path / "live" / "scenario.toml")
+    assert again.time.end_s == 2.02
+    assert ended.interrupted == "SIGINT"
