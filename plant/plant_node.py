@@ -66,7 +66,7 @@ class PlantNode(Node):
         self._end_tick = None if config.end is None else ticks_until(config.end, config.T_c)
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
-        """Present tokens of agents and recorders that take part."""
+        """Present tokens of agents and recorders that take part; while it closes, also of agents told to stop."""
         self._schedule = AgentSchedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
@@ -122,7 +122,7 @@ class PlantNode(Node):
         self._close_if_alone()
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token takes part."""
+        """Whether the holder of a token takes part, or is to be seen to go before the plant closes."""
         return key in self._tokens or super().is_noted(key)
 
     def _has_room(self, recorder: str) -> bool:

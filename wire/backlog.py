@@ -39,7 +39,7 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 class Loss(NamedTuple):
-    """Messages that were dropped unread."""
+    """Messages on one key, or tokens, that were dropped unread."""
 
     key: str
     kind: str

@@ -96,7 +96,7 @@ class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
 
 
 class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
-    """Messages on one key of which nothing else is noted: dropped unread, or more rejected ones than are noted."""
+    """Messages or tokens on one key of which nothing else is noted: dropped unread, or more rejected than are noted."""
 
     at: float | None
     """Time on the own clock by which they had come (s, monotonic); None in simulated time."""

@@ -50,7 +50,7 @@ class Traffic(Protocol):
         ...
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
+        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
         ...
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
@@ -114,7 +114,7 @@ class TickTraffic:
             self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
+        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
         self._journal.count(RejectedCount(None, key[self._cut :], kind, count))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
@@ -211,7 +211,7 @@ class TimedTraffic:
         return limit.admit(rejected, self.now) is not None
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Note how many messages were dropped unread since the last call, and the kind of their rejection."""
+        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
         since, self.now = self.now, at
         if self._arrivals or self._whole:
             self._journal.count(RejectedCount(at, key[self._cut :], kind, count, since))
