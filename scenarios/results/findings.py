@@ -119,10 +119,10 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
         within = record.history.until(scenario.time.end_s)
         for window in record.windows:
             history = within if window.end <= scenario.time.end_s else record.history
-            results[case][window.label] = measure(history, nameplates, window, feeder.f_nom)
-            settled[case][window.label] = settling(history, nameplates, window, feeder.f_nom)
+            inside = history.rows(window.rows(history.t))
+            results[case][window.label] = measure(inside, nameplates, window, feeder.f_nom)
+            settled[case][window.label] = settling(inside, nameplates, window, feeder.f_nom)
             if len(where[window.label]) > 1:
-                inside = history.rows(window.rows(history.t))
                 islands[case][window.label] = {
                     name: measure(*part_of(inside, nameplates, members), window, feeder.f_nom)
                     for name, members in where[window.label].items()
