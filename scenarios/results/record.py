@@ -20,6 +20,7 @@ import msgspec
 
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_record import LinkRecord
+from scenarios.results.packed_events import PackedEvents
 from scenarios.results.run_files import write_whole
 from wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
@@ -178,7 +179,7 @@ class Recorder:
         """Time of the last row (s)."""
         self.missing: list[tuple[float, float]] = []
         """See `Recorded.missing`."""
-        self.events: list[PlantEvent] = []
+        self._events = PackedEvents()
         self.quiet: list[tuple[float, int]] = []
         """See `Recorded.quiet`."""
         self.reproducible = True
@@ -205,6 +206,11 @@ class Recorder:
             self._recording.message(message)
 
     @property
+    def events(self) -> tuple[PlantEvent, ...]:
+        """Events so far, in the order in which they came."""
+        return tuple(self._events)
+
+    @property
     def record_failure(self) -> str:
         """Sentence on why run.mcap ends early, or is not there; empty if it is whole."""
         return self._not_recorded if self._recording is None else self._recording.failure
@@ -224,7 +230,7 @@ class Recorder:
             self._write(lines[-1])
         if self._recording is not None:
             self._recording.telemetry(telemetry, lines)
-        self.events.extend(telemetry.events)
+        self._events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible
         if self._file is not None:
@@ -270,7 +276,7 @@ class Recorder:
             file=file,
             ended=self.ended,
             missing=tuple(self.missing),
-            events=tuple(self.events),
+            events=self.events,
             quiet=tuple(self.quiet),
             links=self.links,
             link_lines=tuple(link_lines),
@@ -311,5 +317,5 @@ class Recorder:
         text = StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(("t_s", "kind", "subject", "text"))
-        writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self.events)
+        writer.writerows((repr(event.t), event.kind, event.subject, event.text) for event in self._events)
         write_whole(folder / "events.csv", text.getvalue())
