@@ -24,7 +24,7 @@ from scenarios.checks.communication.link_accounts import (
     VerdictAccounts,
 )
 from scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from scenarios.checks.communication.record_pass import Link, SentState, opened, read_into
+from scenarios.checks.communication.record_pass import Link, SentState, end_of, opened, read_into
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
@@ -105,10 +105,10 @@ def summarise(path: Path) -> CommunicationSummary:
         If it is none.
     """
     file = opened(path)
-    sums = SummaryPass(file.info, file.t_end)
+    sums = SummaryPass(file.info, end_of(file))
     end = read_into(file, sums)
     if any(end.lost.values()):  # it is damaged: what is lost is known now, and left out the second time
-        sums = SummaryPass(file.info, file.t_end, end.lost)
+        sums = SummaryPass(file.info, end_of(file), end.lost)
         read_into(opened(path), sums)
     return sums.finish(end.unreadable)
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.checks.communication.record_pass import Link, SentState, opened, read_into
+from scenarios.checks.communication.record_pass import Link, SentState, end_of, opened, read_into
 from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
 from wire.journal import Decision
@@ -86,7 +86,7 @@ def read_content(path: Path) -> RecordContent:
     simulated = file.info.simulated
     return RecordContent(
         info=file.info,
-        t_end=file.t_end,
+        t_end=end_of(file),
         states=all_of_it.states,
         decisions={agent: _in_order(of, simulated=simulated) for agent, of in all_of_it.decisions.items()},
         holes=end.holes,

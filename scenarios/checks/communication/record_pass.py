@@ -108,6 +108,15 @@ def opened(path: Path) -> RecordFile:
     return file
 
 
+def end_of(file: RecordFile) -> float:
+    """Return the run time (s) at which a record ends: its latest one, unless the run was to end before.
+
+    Nothing in the file is trusted, and one entry of a time that cannot be would put the end off.
+    """
+    end = file.info.plant.end
+    return file.t_end if end is None else min(file.t_end, end)
+
+
 def read_into(file: RecordFile, sink: RecordSink) -> PassEnd:
     """Give a sink all that a record has."""
     return _Pass(file, sink).read()
@@ -120,8 +129,7 @@ class _Pass:
         self._file, self._sink = file, sink
         self._unreadable = 0
         self._simulated = file.info.simulated
-        end = file.info.plant.end
-        self._t_end = file.t_end if end is None else min(file.t_end, end)
+        self._t_end = end_of(file)
         self._T_c, self._ahead = file.info.T_c, _AHEAD * max(1.0, file.info.plant.speed)
         self._most = int((self._t_end + self._ahead) / self._T_c) if self._simulated else MOST_COUNT
         """Largest number of a state: in simulated time that of its tick."""
