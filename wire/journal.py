@@ -106,8 +106,6 @@ class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
     """Kind of their rejection (`wire.codec.KINDS`)."""
     count: Count
     """Number of them."""
-    since: float | None = None
-    """Time from which on they came, on the same clock (s)."""
 
 
 class Token(Entry, frozen=True, array_like=True, tag="token"):
@@ -231,26 +229,29 @@ class JournalBuffer:
         if len(self._bytes) > ROOM:
             self._lost += 1
             return
+        self._append(entry)
+
+    def _append(self, entry: Entry) -> None:
         _encode_into(entry, self._bytes, -1)
         if len(self._bytes) - (self._ends[-1] if self._ends else 0) >= LOT:
             self._ends.append(len(self._bytes))
 
     def count(self, rejected: RejectedCount) -> None:
-        """Add to the entry about messages of one key and kind; it is the last of its part, whatever room there is."""
+        """Add to the entry about one key and kind; these come after all others, whatever room there is."""
         if len(self._rejected) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._rejected:
             rejected = replace(rejected, key="")
         before = self._rejected.get((rejected.key, rejected.kind))
         if before is not None:
-            rejected = replace(rejected, count=before.count + rejected.count, since=before.since)
+            rejected = replace(rejected, count=before.count + rejected.count)
         self._rejected[rejected.key, rejected.kind] = rejected
 
     def take_parts(self) -> list[bytes]:
         """Take out all entries, in parts of about `LOT` bytes."""
         for rejected in self._rejected.values():
-            _encode_into(rejected, self._bytes, -1)
+            self._append(rejected)
         self._rejected.clear()
         if self._lost:
-            _encode_into(ProcessEvent(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"), self._bytes, -1)
+            self._append(ProcessEvent(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"))
             self._lost = 0
         parts, begin = [], 0
         for end in (*self._ends, len(self._bytes)):

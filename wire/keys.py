@@ -199,6 +199,10 @@ def _parts(root: str, key: str) -> tuple[str, ...]:
     return parts if all(map(is_name, parts)) else ()
 
 
+MOST_PARTS = 6
+"""Parts of the longest token: that of an agent."""
+
+
 def epoch_of(part: str) -> int | None:
     """Return the epoch in the last part of a plant's token; None if no message could have it.
 
@@ -208,6 +212,18 @@ def epoch_of(part: str) -> int | None:
     (1763778000000, None, None)
     """
     return int(part) if re.fullmatch("[0-9]{1,16}", part) and int(part) <= MOST_COUNT else None
+
+
+def is_token(key: str) -> bool:
+    """Whether a key can be that of a process's token, as long as those are.
+
+    Examples
+    --------
+    >>> is_token("gridpeers/demo/alive/agent/inv3/a1"), is_token("gridpeers/demo/alive/agent/PV 2")
+    (True, False)
+    """
+    parts = key.split("/", MOST_PARTS)
+    return len(parts) <= MOST_PARTS and all(map(is_name, parts))
 
 
 def run_of_plant(key: str) -> str:

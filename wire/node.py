@@ -33,6 +33,7 @@ from wire.keys import Keys
 from wire.links import Links
 from wire.membership import Membership
 from wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
+from wire.token_queue import TOKENS
 from wire.traffic import Traffic
 
 Handler = Callable[[Any, bytes, float], None]
@@ -162,9 +163,10 @@ class Node:
 
     def lost(self, loss: Loss, now: float) -> None:
         """Count messages and tokens that the driver has dropped unread; the journal has their number."""
-        self.rejects.add(loss.kind, loss.key, loss.text, count=loss.number)
+        key = self.keys.any_alive if loss.key == TOKENS else loss.key
+        self.rejects.add(loss.kind, key, loss.text, count=loss.number)
         if self.traffic is not None:
-            self.traffic.lost(loss.key, loss.kind, loss.number, now)
+            self.traffic.lost(key, loss.kind, loss.number, now)
 
     @property
     def watched(self) -> str:

@@ -31,6 +31,10 @@ MOST_WAITING = MOST_PROCESSES * MOST_INVERTERS
 """Strangers' tokens that may wait: as many as a process would note of all names together."""
 
 
+TOKENS = "alive/**"
+"""Key under which all tokens that are dropped are counted: their own are texts of anybody's making."""
+
+
 class Arrival(NamedTuple):
     """A token that has waited and comes in now."""
 
@@ -97,7 +101,7 @@ class TokenQueue:
         if len(self._waiting) < MOST_WAITING or there is False or (there is None and is_noted(key)):
             self._waiting[key] = at
         else:
-            self._lose(key)
+            self._lose()
         return False
 
     def taken(self, now: float) -> list[Arrival]:
@@ -134,7 +138,7 @@ class TokenQueue:
         return self._loss is not None
 
     def take_loss(self) -> tuple[Loss, ...]:
-        """Take out the tokens that were dropped since the last call, as one loss under the key of the first."""
+        """Take out the tokens that were dropped since the last call, as one loss."""
         loss, self._loss = self._loss, None
         return () if loss is None else (loss,)
 
@@ -142,9 +146,9 @@ class TokenQueue:
         if now >= self._renewal:
             self._room, self._renewal = AT_ONCE, now + PAUSE
 
-    def _lose(self, key: str) -> None:
+    def _lose(self) -> None:
         if self._loss is None:
-            self._loss = Loss(key, "excess", f"{len(self._waiting)} tokens were waiting, of others", 0)
+            self._loss = Loss(TOKENS, "excess", f"{len(self._waiting)} tokens were waiting, of others", 0)
         self._loss = self._loss._replace(number=self._loss.number + 1)
 
     def _come(self, key: str) -> None:

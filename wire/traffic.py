@@ -193,7 +193,7 @@ class TimedTraffic:
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
         if rejected and not self._is_noted(rejected):
-            self._journal.count(RejectedCount(at, name, rejected, 1, at))
+            self._journal.count(RejectedCount(at, name, rejected, 1))
             return
         if (
             kind in EACH_TICK
@@ -212,9 +212,9 @@ class TimedTraffic:
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
         """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
-        since, self.now = self.now, at
+        self.now = at
         if self._arrivals or self._whole:
-            self._journal.count(RejectedCount(at, key[self._cut :], kind, count, since))
+            self._journal.count(RejectedCount(at, key[self._cut :], kind, count))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
-from wire.driver.inbox import Inbox, Kind, Stamped
+from wire.driver.inbox import Inbox, Stamped
 from wire.driver.lingering import do_not_linger
-from wire.keys import LATEST_ONLY
+from wire.keys import LATEST_ONLY, is_token
 from wire.messages import PLANT
 from wire.trust.credentials import Credentials
 
@@ -294,12 +294,16 @@ class Session:
         self._session.get(key, handler, target=target, consolidation=consolidation, timeout=_QUERY_TIMEOUT)
 
     def watch(self, key: str) -> None:
-        """Put appearing and vanishing tokens into the inbox, those already present included."""
+        """Put appearing and vanishing tokens into the inbox, those already present included.
+
+        A token of any other form than a run's is left out: its text may be as long as its holder likes.
+        """
         enqueue, gone = self.inbox.put, self._zenoh.SampleKind.DELETE
 
         def on_token(sample: zenoh.Sample) -> None:
-            kind: Kind = "vanished" if sample.kind == gone else "appeared"
-            enqueue((kind, str(sample.key_expr), b""))
+            token = str(sample.key_expr)
+            if is_token(token):
+                enqueue(("vanished" if sample.kind == gone else "appeared", token, b""))
 
         handler = self._direct(on_token)
         self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))

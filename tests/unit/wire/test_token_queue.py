@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wire.driver.inbox import Inbox
-from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TokenEvent, TokenQueue
+from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TOKENS, TokenEvent, TokenQueue
 
 ROOM, RATE = 5, 3
 """Strangers' tokens that may wait in the drawn sequences, and those that come in at once."""
@@ -162,7 +162,7 @@ def test_of_a_flood_of_strangers_a_bounded_number_waits_and_the_rest_is_counted(
 
     assert (came, queue.waiting) == (AT_ONCE, MOST_WAITING)
     assert (loss.kind, loss.number) == ("excess", count - AT_ONCE - MOST_WAITING)
-    assert loss.key == f"who{AT_ONCE + MOST_WAITING}"
+    assert loss.key == TOKENS
     assert queue.take_loss() == ()
 
 

@@ -105,8 +105,8 @@ def test_what_was_rejected_is_known_by_its_sender() -> None:
         MessageReference(None, "state/inv2", 1, 6),
         ReceivedMessage(None, "state/inv3", b"noise", "corrupt"),
         ReceivedMessage(None, "command", b"noise", "corrupt"),
-        RejectedCount(1.0, "state/inv3", "excess", 12, 0.8),
-        RejectedCount(1.0, "command", "excess", 12, 0.8),
+        RejectedCount(1.0, "state/inv3", "excess", 12),
+        RejectedCount(1.0, "command", "excess", 12),
     ]
     record = record_of(entries=lambda agent, *, since, until: iter(entries))
 
