@@ -30,9 +30,8 @@ some 0.1 ms. The agents of the largest run are known within half a second, and n
 MOST_WAITING = MOST_PROCESSES * MOST_INVERTERS
 """Strangers' tokens that may wait: as many as a process would note of all names together."""
 
-
 TOKENS = "alive/**"
-"""Key under which all tokens that are dropped are counted: their own are texts of anybody's making."""
+"""Key under which all tokens that are dropped are counted, as there are as many of their own as anybody likes."""
 
 
 class Arrival(NamedTuple):

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.keys import Keys, check_name, describe
+from wire.keys import Keys, check_name, describe, is_token
 from wire.messages import MESSAGES
 
 zenoh = pytest.importorskip("zenoh")
@@ -34,6 +34,15 @@ def test_wildcards_cover_their_keys() -> None:
     assert all(pattern.intersects(zenoh.KeyExpr(token)) for token in tokens)
     assert not pattern.intersects(zenoh.KeyExpr(keys.state("inv1")))
     assert not pattern.intersects(zenoh.KeyExpr(Keys("other").alive_plant(1)))
+
+
+def test_tokens_are_told_from_texts_that_somebody_has_made_up() -> None:
+    """The longest names make tokens; what no process of a run holds is none."""
+    keys = Keys("d" * 64)
+    tokens = keys.alive_plant(1), keys.alive_agent("n" * 64, "a" * 64), keys.alive_recorder("r" * 64)
+    made_up = f"{tokens[0]}/{'x' * 65}", f"{tokens[1]}/more", f"{tokens[2]}/", "x/" * 1_000
+
+    assert [*map(is_token, tokens), *map(is_token, made_up)] == [True] * 3 + [False] * 4
 
 
 def test_parts_are_those_of_the_own_run_only() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from scenarios.record.journal_reader import entries_of
+from wire.backlog import Loss
 from wire.bounds import LONGEST_MESSAGE
 from wire.codec import encode
 from wire.journal import (
@@ -26,6 +27,8 @@ from wire.journal import (
 )
 from wire.keys import Keys
 from wire.messages import Leave, Measurement, State
+from wire.node import Node
+from wire.token_queue import TOKENS
 from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN_PAYLOAD, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
@@ -232,14 +235,25 @@ def test_messages_that_were_dropped_unread_are_noted_by_their_number() -> None:
     traffic.woken(9.0)
     traffic.lost(KEYS.state("inv2"), "excess", 500, 9.5)
     traffic.lost(KEYS.state("inv2"), "excess", 20, 9.7)
-    traffic.lost(KEYS.command, "oversized", 1)
+    traffic.lost(KEYS.command, "oversized", 1, 9.7)
 
     assert noted(journal) == [
         WakeUp(9.0),
         RejectedCount(9.7, "state/inv2", "excess", 520),
-        RejectedCount(9.7, "command", "oversized", 1, 9.7),
+        RejectedCount(9.7, "command", "oversized", 1),
     ]
     assert noted(journal) == []
+
+
+def test_tokens_that_were_dropped_are_counted_under_one_key() -> None:
+    """Whatever texts they were: the journal has the key of all tokens of the run."""
+    node, (traffic, journal) = Node("inv1", "toy"), timed()
+    node.traffic = traffic
+    for at in (9.5, 9.7):
+        node.lost(Loss(TOKENS, "excess", "288000 tokens were waiting, of others", 7), at)
+
+    assert noted(journal) == [RejectedCount(9.7, "alive/**", "excess", 14)]
+    assert any("gridpeers/toy/alive/**" in line for line in node.rejects.take_lines())
 
 
 def test_a_journal_that_is_full_still_counts() -> None:

@@ -19,6 +19,7 @@ from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.communication.record_pass import SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.checks.communication.state_window import StateWindow
+from scenarios.record.record_file import RecordFile
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
 from wire.journal import Decision
 
@@ -345,6 +346,14 @@ def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.
     assert verdict(large, "message_account").status == "passed"
     with pytest.raises(NotJudgedError, match="more than the 0 MB that are taken into memory"):
         _ = large.content
+
+
+def test_one_time_that_cannot_be_puts_no_account_off(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing in the file is trusted: its record ends when the run was to end, for every check."""
+    monkeypatch.setattr(RecordFile, "t_end", 1e9)
+    case = replace(sound)
+
+    assert case.communication.t_end == case.content.t_end == case.content.info.plant.end == 7.0
 
 
 @pytest.mark.parametrize("clock", ["simulated", "wall"])
