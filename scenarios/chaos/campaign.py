@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Generator, Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
@@ -20,19 +19,20 @@ from scenarios.chaos.chaos_run import (
     seed_of,
     shrink_number,
 )
-from scenarios.chaos.disturbance import Disturbance, Schedule
+from scenarios.chaos.disturbance import Schedule, counted_kinds
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.schedule_search import BATCH, drawn
 from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete
 from scenarios.run import Driver
 from scenarios.sweep.workers import on_this_machine
+from wire.counted import counted
 
 REPEATED = 20
 """Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""
 
 Tell = Callable[[str, float, float], None]
-"""Takes a piece of work, how much of it is done, and how much there is."""
+"""Takes the present work, with its stage before the first comma, how much of the stage is done, and how much it has."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,8 +81,7 @@ class Summary:
         """Yield the report."""
         base, rows = self.campaign.base, self.rows.values()
         how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
-        kinds = Counter(kind_of(it) for row in rows for it in row.schedule)
-        drawn = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())) or "none"
+        drawn = counted_kinds(row.schedule for row in rows)
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
         yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
@@ -99,16 +98,6 @@ class Summary:
             yield f"{failure.violated}, run {failure.row.number}: {failure.sentence}"
             yield from (f"    {it}" for it in sorted(failure.simplest.schedule, key=lambda it: it.begins_s))
             yield f"    {again(failure.file)}"
-
-
-def kind_of(disturbance: Disturbance) -> str:
-    """Return the kind of a disturbance in a word."""
-    table, entry = disturbance.table, disturbance.entry
-    if table == "partition":
-        return table
-    words: tuple[str, ...] = ("cut", "delay", "loss", "duplicate", "corrupt", "pause", "slow_s", "kill", "lies")
-    words += ("leave", "join", "open", "close", "load", "P_max_kW")
-    return next((word.removesuffix("_s") for word in words if word in entry), table)
 
 
 def undisturbed(campaign: Campaign) -> ChaosRow:
@@ -130,20 +119,22 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
     """
     failures: dict[str, Failure] = {}
     try:
+        _tell_runs(campaign, folder, tell)
         with closing(_results(campaign)) as results:
             for row in results:
                 first = folder.rows.get(row.number)
                 folder.add(row if first is None else compared(first, row, REPEATS))
-                bad = sum(bool(it.violated) for it in folder.rows.values())
-                text = f"{campaign.base.scenario.name}, {len(folder.rows)} of {campaign.runs} runs, {bad} violated"
-                tell(text, len(folder.rows), campaign.runs)
+                _tell_runs(campaign, folder, tell)
         _add_failures(failures, folder)
+        kinds = counted(len(failures), "kind of failure", "kinds of failure")
+        if failures:
+            tell(f"shrinking, 0 of {kinds}", 0, len(failures))
         with closing(_shrunk(campaign, tuple(failures.values()))) as simpler:
             for i, (violated, simplest) in enumerate(simpler):
                 row = failures[violated].row
                 file = folder.write_failure(violated, row, simplest)
                 failures[violated] = Failure(violated=violated, row=row, simplest=simplest, file=file)
-                tell(f"shrinking, {i + 1} of {len(failures)} kinds of failure", i + 1, len(failures))
+                tell(f"shrinking, {i + 1} of {kinds}", i + 1, len(failures))
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
     except BaseException as error:
@@ -155,6 +146,12 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
             _concluded(campaign, folder, failures)
         raise
     return summary
+
+
+def _tell_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> None:
+    """Tell how many of the runs are done, and how many of them violated anything."""
+    done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
+    tell(f"{campaign.base.scenario.name}, {done} of {campaign.runs} runs, {bad} violated", done, campaign.runs)
 
 
 def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:

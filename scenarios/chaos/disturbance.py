@@ -2,14 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterable, Mapping
 from math import inf
 from typing import Any, Literal
 
 import msgspec
 
+from wire.counted import counted
+
 Table = Literal["event", "link", "partition", "node"]
 """Lists of entries in a scenario file."""
+
+KINDS: Mapping[str, tuple[str, str]] = {
+    "cut": ("cut", "cuts"),
+    "delay": ("delay", "delays"),
+    "loss": ("loss", "losses"),
+    "duplicate": ("duplication", "duplications"),
+    "corrupt": ("corruption", "corruptions"),
+    "partition": ("partition", "partitions"),
+    "pause": ("pause", "pauses"),
+    "slow_s": ("slow agent", "slow agents"),
+    "kill": ("kill", "kills"),
+    "lies": ("lie", "lies"),
+    "leave": ("leave", "leaves"),
+    "join": ("join", "joins"),
+    "open": ("switch opened", "switches opened"),
+    "close": ("switch closed", "switches closed"),
+    "load": ("change of loads", "changes of loads"),
+}
+"""Kinds of disturbances by the key that makes them, or by their table: the noun for one, and for several."""
 
 
 class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -50,6 +72,11 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
             return float(self.back.get("t_s", inf))
         return float(self.entry.get("to_s", inf))
 
+    @property
+    def kind(self) -> str:
+        """Key of its kind in `KINDS`."""
+        return next(key for key in KINDS if key == self.table or key in self.entry)
+
     def __str__(self) -> str:
         times = ("t_s", "from_s", "to_s")
         until = "" if self.ends_s == inf else f" to {self.ends_s:g}"
@@ -59,6 +86,20 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 Schedule = tuple[Disturbance, ...]
 """Disturbances of one run, as they were drawn: not in the order of time."""
+
+
+def counted_kinds(schedules: Iterable[Schedule]) -> str:
+    """Return how many disturbances of each kind schedules have, in words.
+
+    Examples
+    --------
+    >>> kill = Disturbance(table="node", entry={"name": "inv1", "from_s": 1.0, "kill": True})
+    >>> lie = Disturbance(table="node", entry={"name": "inv2", "from_s": 1.0, "lies": {"model": "extreme"}})
+    >>> counted_kinds([(kill, lie), (lie,)]), counted_kinds([()])
+    ('1 kill, 2 lies', 'none')
+    """
+    numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
+    return ", ".join(counted(numbers[key], *nouns) for key, nouns in KINDS.items() if numbers[key]) or "none"
 
 
 def _word(value: Any) -> str:

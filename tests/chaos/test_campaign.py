@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import errno
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,10 @@ from scenarios.chaos import schedule_search
 from scenarios.chaos.campaign import Campaign, run_campaign
 from scenarios.chaos.chaos_folder import ChaosFolder
 from scenarios.chaos.chaos_run import run_scenario
+from scenarios.chaos.disturbance import counted_kinds
 from scenarios.checks.check_registry import ALWAYS
 from scenarios.schema import load_scenario
-from tests.chaos.bases import base_in
+from tests.chaos.bases import base_in, base_named
 from tests.command_line import invoke
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -102,10 +104,13 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
     _small(elsewhere)
     words = ("chaos", "small.toml", "--runs", "2", "--seed", "3", "--jobs", "1")
 
-    codes = {invoke(*words, "--out", name)[0] for name in ("one", "two")}
+    ended = {name: invoke(*words, "--out", name) for name in ("one", "two")}
     one, two = ([{**row, "took_s": ""} for row in _rows(elsewhere / name)] for name in ("one", "two"))
 
-    assert codes <= {0, 1}
+    assert {code for code, _ in ended.values()} <= {0, 1}
+    assert ended["one"][1].startswith("small, case IV: first a run without disturbances ...\n")
+    assert "violates nothing; next 2 runs with disturbances, one after another ...\nsmall, 0 of 2" in ended["one"][1]
+    assert ended["one"][1].endswith("\n\nResults: one/\n")
     assert [row["seed"] for row in one] == [str(3_000_000 + i) for i in range(2)]
     assert [len(json.loads(row["schedule"])) for row in one] == [int(row["disturbances"]) for row in one]
     assert "repeats" in one[0]["passed"]
@@ -151,6 +156,16 @@ def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeyp
     status = (elsewhere / "out" / "status.txt").read_text(encoding="utf-8")
     assert status.startswith("broken: ")
     assert "No space left on device after 1 of 2 runs" in status
+
+
+def test_every_disturbance_is_counted_by_a_noun_of_its_kind() -> None:
+    """Whatever is drawn has its kind in `KINDS`, so that a report reads well whatever comes."""
+    base = base_named("plug-n-play")
+    schedules = [schedule for batch in range(2) for schedule in schedule_search.drawn(base, 3, batch)]
+    kinds = {disturbance.kind for schedule in schedules for disturbance in schedule}
+
+    assert len(kinds) >= 10
+    assert re.fullmatch(r"(\d+ [a-z ]+(, |$))+", counted_kinds(schedules))
 
 
 @pytest.mark.parametrize(

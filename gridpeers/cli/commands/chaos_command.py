@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -12,7 +14,7 @@ from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, Scenari
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from scenarios.chaos.campaign import Campaign, Summary
+    from scenarios.chaos.campaign import Campaign, Summary, Tell
     from scenarios.chaos.chaos_folder import ChaosFolder
     from scenarios.schema import ScenarioModel
 
@@ -58,7 +60,7 @@ def chaos(
     from scenarios.chaos.campaign import Campaign
     from scenarios.chaos.chaos_folder import ChaosFolder
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import FolderError, new_folder
+    from scenarios.results.run_files import FolderError, new_folder, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
@@ -75,6 +77,7 @@ def chaos(
     summary = _carry_out(console, campaign, folder)
     for line in summary.lines():
         typer.echo(line)
+    typer.echo(f"\nResults: {shown(path)}/")
     raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
 
 
@@ -90,32 +93,63 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
-    """End with a line for each check that the scenario violates by itself."""
+    """Say what begins; end with a line for each check that the scenario violates by itself."""
     from gridpeers.cli.progress import TRYING, explained_work
     from scenarios.chaos.campaign import undisturbed
 
+    name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
+    typer.echo(f"{name}: first a run without disturbances ...")
     with explained_work(lambda: console.print(TRYING, highlight=False, soft_wrap=True)):
         row = undisturbed(campaign)
     if row.violated:
-        name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
         advice = "choose another case, or switch these checks off in the scenario (docs/checks.md)"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail([*lines, advice], BAD_INPUT)
+    typer.echo(f"{name}: it violates nothing; next {_work(campaign)} ...")
+
+
+def _work(campaign: Campaign) -> str:
+    """Return what the runs with disturbances need before the first of them ends, in words."""
+    from wire.counted import counted
+
+    runs = f"{counted(campaign.runs, 'run')} with disturbances"
+    if campaign.driver == "processes":
+        return f"{runs}, each with processes and again in one"
+    if campaign.jobs == 1:
+        return f"{runs}, one after another"
+    return f"{runs}, {campaign.jobs} at a time, once {counted(campaign.jobs, 'worker')} have started"
 
 
 def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder) -> Summary:
     """Do the campaign, showing how far it is; whatever ends it early ends the command."""
     from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.remaining import remaining
     from scenarios.chaos.campaign import run_campaign
     from scenarios.results.run_files import refusal, shown
     from scenarios.sweep.workers import WorkersError
 
     try:
-        with interruptible(), remaining(console, 1.0) as tell:
-            return run_campaign(campaign, folder, lambda what, done, of: tell(what, done / of))
+        with interruptible(), _stages(console) as tell:
+            return run_campaign(campaign, folder, tell)
     except (KeyboardInterrupt, OSError, WorkersError) as error:
         kept = f"{len(folder.rows)} of {campaign.runs} runs are kept in {shown(folder.path)}/"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {kept}"], exit_code(error))
         fail([refusal(folder.path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
+
+
+@contextmanager
+def _stages(console: Console) -> Iterator[Tell]:
+    """Yield the function that takes a campaign's progress: each stage is estimated by itself."""
+    from gridpeers.cli.remaining import BASIS_RUNS, remaining
+
+    with ExitStack() as shown:
+        stages: dict[str, Callable[[str, float], None]] = {}
+
+        def tell(what: str, done: float, of: float) -> None:
+            stage = what.partition(",")[0]
+            if stage not in stages:
+                shown.close()  # the bar of the stage before
+                stages[stage] = shown.enter_context(remaining(console, of, BASIS_RUNS))
+            stages[stage](what, done)
+
+        yield tell

@@ -82,7 +82,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     from rich.console import Console
 
     from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.remaining import remaining
+    from gridpeers.cli.remaining import BASIS_RUNS, remaining
     from scenarios.results.run_files import FolderError, refusal, shown
     from scenarios.sweep.study import study
     from scenarios.sweep.sweep_folder import SweepFolder
@@ -94,7 +94,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         with interruptible(), SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
             try:
-                with remaining(console, size := len(plan.runs)) as tell:
+                with remaining(console, size := len(plan.runs), BASIS_RUNS) as tell:
 
                     def note(done: int) -> None:
                         tell(f"{plan.name}, {done} of {size} runs", done)

@@ -2,9 +2,11 @@
 
 import io
 import threading
+from typing import Any
 
 import pytest
 from rich.console import Console
+from rich.progress import Progress, ProgressColumn, TimeRemainingColumn
 
 from gridpeers.cli import progress, remaining
 
@@ -35,23 +37,38 @@ def test_on_a_terminal_bars_come_and_go() -> None:
     assert "\x1b[2K" in out.getvalue()
 
 
-def test_many_runs_are_a_line_for_every_part_and_every_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The time left is reckoned from what was done since the start, not from what a resumed sweep finds done."""
-    clock = iter([100.0, 100.0, 110.0, 240.0, 300.0])
-    monkeypatch.setattr(remaining, "monotonic", lambda: next(clock))
+def _lines_of(monkeypatch: pytest.MonkeyPatch, basis: float, at: dict[float, tuple[str, int]]) -> list[str]:
+    """Lines of 40 pieces of work: by the time (s), the present part, and how many are done."""
     out = io.StringIO()
-
-    with remaining.remaining(Console(file=out), 40) as tell:
-        for part, done in (("a", 20), ("a", 22), ("a", 25), ("b", 25), ("b", 27), ("b", 39), ("b", 40)):
+    with remaining.remaining(Console(file=out), 40, basis) as tell:
+        for now, (part, done) in at.items():
+            monkeypatch.setattr(remaining, "monotonic", lambda now=now: now)
             tell(f"{part}, {done} of 40", done)
+    return out.getvalue().splitlines()
 
-    assert out.getvalue().splitlines() == [
+
+def test_many_runs_are_a_line_for_every_part_and_every_tenth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time left is reckoned from the first result on, not from what a resumed sweep finds done."""
+    at = {100.0: ("a", 20), 190.0: ("a", 22), 205.0: ("a", 25), 206.0: ("b", 25), 210.0: ("b", 27), 220.0: ("b", 39)}
+
+    assert _lines_of(monkeypatch, 0.0, at | {230.0: ("b", 40)}) == [
         "a, 20 of 40: 50 % done",
-        "a, 25 of 40: 62 % done, about 0 s left",
-        "b, 25 of 40: 62 % done, about 30 s left",
-        "b, 39 of 40: 98 % done, about 7 s left",
+        "a, 25 of 40: 62 % done, about 75 s left",
+        "b, 25 of 40: 62 % done, about 80 s left",
+        "b, 39 of 40: 98 % done, about 2 s left",
         "b, 40 of 40: 100 % done",
     ]
+
+
+def test_the_time_left_is_estimated_once_there_is_a_basis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first results of workers come in bunches after a long start; half of what there is to do suffices."""
+    at = {0.0: 0, 30.0: 1, 30.5: 2, 31.0: 8, 50.0: 20, 51.0: 22, 60.0: 32}
+
+    lines = _lines_of(monkeypatch, 20.0, {now: ("a", done) for now, done in at.items()})
+    of_few = _lines_of(monkeypatch, 20.0, {now: ("a", done) for now, done in {0.0: 30, 1.0: 32, 2.0: 36}.items()})
+
+    assert [line.partition("done")[2] for line in lines] == ["", "", ", about 21 s left", ", about 8 s left"]
+    assert of_few[-1] == "a, 36 of 40: 90 % done, about 1 s left"
 
 
 def test_the_bar_of_many_runs_comes_and_goes() -> None:
@@ -65,6 +82,31 @@ def test_the_bar_of_many_runs_comes_and_goes() -> None:
     assert "topology, 2 of 4 runs" in out.getvalue()
     assert "50%" in out.getvalue()
     assert "\x1b[2K" in out.getvalue()
+
+
+def test_the_bar_estimates_nothing_before_there_is_a_basis(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time left is dashes until there are twenty results."""
+    clock = 0.0
+    times_left: dict[int, str] = {}
+
+    class Bars(Progress):
+        def __init__(self, *columns: ProgressColumn, **options: Any) -> None:
+            super().__init__(*columns, get_time=lambda: clock, auto_refresh=False, **options)
+
+        def update(self, *args: Any, **options: Any) -> None:
+            super().update(*args, **options)
+            (task,) = self.tasks
+            (column,) = (it for it in self.columns if isinstance(it, TimeRemainingColumn))
+            times_left[round(task.completed)] = column.render(task).plain
+
+    monkeypatch.setattr(remaining, "Progress", Bars)
+    with remaining.remaining(Console(file=io.StringIO(), force_terminal=True), 100, 20) as tell:
+        for done in range(101):
+            clock += 2.0
+            tell(f"chaos, {done} of 100 runs", done)
+
+    assert times_left[2] == times_left[19] == "-:--:--"
+    assert times_left[20] == "0:02:40"
 
 
 def test_a_start_that_takes_long_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
