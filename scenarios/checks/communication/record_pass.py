@@ -19,7 +19,7 @@ from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.emulation.link_reports import data_of
 from scenarios.record.decision_entries import is_periodic
 from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage
-from scenarios.record.journal_reader import entry_of, raw_entries, values_of
+from scenarios.record.journal_reader import entry_of, raw_entries, values_of, whole_entries
 from scenarios.record.record_file import RecordFile
 from wire.bounds import MOST_COUNT
 from wire.codec import sound
@@ -169,6 +169,9 @@ class _Pass:
 
     def _entries(self, journal: Journal) -> Iterator[Entry]:
         """Yield the entries that are ours; count each other one, and the end of what can be read."""
+        if (entries := whole_entries(journal.data)) is not None:
+            yield from entries
+            return
         values = raw_entries(journal.data)
         while True:
             try:
