@@ -18,10 +18,11 @@ from scenarios.live.run_address import (
     loopback_of,
     next_port,
 )
+from scenarios.live.run_tokens import RunTokens
 from wire.codec import RejectedError, decode
 from wire.driver.command_line import command_line
 from wire.driver.session import Session
-from wire.keys import ANY_ALIVE_PLANT, Keys, epoch_of, run_of_plant
+from wire.keys import ANY_ALIVE_PLANT, Keys
 from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
 from wire.trust.credentials import Credentials
 
@@ -59,15 +60,10 @@ class RunClient:
         self._meet_agents, self._listen = meet_agents, listen
         self._heard: list[str] = []
         """Keys that are listened to."""
-        self._runs: set[str] = set()
         self._open()
 
     def _open(self) -> None:
-        self.epochs: set[int] = set()
-        """Epochs of the plants of this run whose tokens are there."""
-        self.agents: dict[str, set[str]] = {}
-        """Tokens of agents: inverter -> its instances."""
-        self._runs.clear()
+        self._tokens = RunTokens(self.where.run)
         self._session = Session(
             VISITOR,
             listen=self._listen,
@@ -76,6 +72,7 @@ class RunClient:
             meets_all=self._meet_agents,
             credentials=self.where.credentials,
         )
+        self._session.inbox.is_noted = self._tokens.is_noted
         for key in (self.keys.answer(self._session.id), *self._heard):
             self._session.subscribe(key)
         self._session.watch(self.keys.any_alive)
@@ -101,17 +98,17 @@ class RunClient:
     @property
     def plant(self) -> bool:
         """Whether the plant's token is there."""
-        return bool(self.epochs)
+        return bool(self._tokens.epochs)
 
     @property
     def present(self) -> list[str]:
         """Inverters whose agents have a token."""
-        return [name for name, instances in self.agents.items() if instances]
+        return list(self._tokens.agents)
 
     @property
     def runs(self) -> set[str]:
         """Names of the runs whose plants are there."""
-        return self._runs
+        return self._tokens.runs
 
     def read(self, key: str, payload: bytes) -> AnyMessage | None:
         """Return the message that came on a key; None if it is none, or not of the sender that the key names.
@@ -122,7 +119,7 @@ class RunClient:
             message = decode(payload)
         except RejectedError:  # nothing depends on a visitor
             return None
-        of_plant = message.sender == PLANT and message.epoch in self.epochs
+        of_plant = message.sender == PLANT and message.epoch in self._tokens.epochs
         match self.keys.parts(key), message:
             case ("status", name), AgentStatus():
                 believed = message.sender == name
@@ -159,20 +156,10 @@ class RunClient:
         for kind, key, payload, at in self._session.take(1, max(0.0, seconds)):
             if kind == "message":
                 yield key, payload, at
-            elif kind != "word":
-                self._note(key, there=kind == "appeared")
-
-    def _note(self, key: str, *, there: bool) -> None:
-        run = run_of_plant(key)
-        if run:
-            (self._runs.add if there else self._runs.discard)(run)
-        match self.keys.parts(key):
-            case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None:
-                (self.epochs.add if there else self.epochs.discard)(epoch)
-            case ("alive", "agent", name, instance) if there:
-                self.agents.setdefault(name, set()).add(instance)
-            case ("alive", "agent", name, instance):
-                self.agents.get(name, set()).discard(instance)
+            elif kind == "appeared":
+                self._tokens.appeared(key)
+            elif kind == "vanished":
+                self._tokens.vanished(key)
 
     def until(self, done: Callable[[], bool], seconds: float) -> bool:
         """Wait (s) until a condition holds; return whether it does. Messages that come meanwhile are dropped."""
@@ -227,7 +214,7 @@ class RunClient:
     @property
     def _others(self) -> set[str]:
         """Other runs whose plants are there."""
-        return self._runs - {self.where.run}
+        return self.runs - {self.where.run}
 
     def _nobody(self, wait: float) -> str:
         if not self._session.peers():

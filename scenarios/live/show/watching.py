@@ -19,6 +19,7 @@ from scenarios.live.run_requests import plant_status, read_config
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import Snapshot
+from wire.bounds import MOST_INVERTERS
 from wire.messages import PLANT, AgentStatus, Telemetry
 from wire.timing.session_deadline import SessionDeadline
 
@@ -112,11 +113,18 @@ class RunSubscriber:
         if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
             self._client.fetch(self._client.keys.config("*"))
         self._plant = self._client.plant
-        for name in {*self._monitor.inverters, *self._client.agents} - self._subscribed:
-            self._subscribed.add(name)
-            self._client.listen(self._client.keys.status(name))
+        for name in self._monitor.inverters:
+            self._listen_to(name)
+        for name in self._client.present:  # anybody may hold tokens of any names
+            if len(self._subscribed) < MOST_INVERTERS:
+                self._listen_to(name)
         self._renew(monotonic())
         return heard
+
+    def _listen_to(self, name: str) -> None:
+        if name not in self._subscribed:
+            self._subscribed.add(name)
+            self._client.listen(self._client.keys.status(name))
 
     def take_until(self, end: float) -> None:
         """Feed the messages that come until a time (s, monotonic)."""

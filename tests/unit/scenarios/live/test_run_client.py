@@ -9,6 +9,7 @@ import pytest
 from scenarios.live import run_client as client
 from scenarios.live.run_address import address_of
 from scenarios.live.run_client import NobodyError, RunClient
+from wire.driver.inbox import Inbox
 from wire.keys import Keys
 
 
@@ -36,7 +37,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
         class Session:
             """Stands for Zenoh."""
 
-            id, misplaced = "1", False
+            id, misplaced, inbox = "1", False, Inbox()
             subscribe = watch = close = staticmethod(lambda *_: None)
             peers = staticmethod(lambda: ["a plant"])
             take = staticmethod(clock.take)

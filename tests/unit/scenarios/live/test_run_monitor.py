@@ -22,6 +22,7 @@ from scenarios.results.link_record import LinkRecord
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
 from wire.codec import RejectedError, decode, encode
+from wire.driver.inbox import Inbox
 from wire.keys import Keys
 from wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 
@@ -38,6 +39,7 @@ class Line:
 
     def __init__(self) -> None:
         self.events: list[Event] = []
+        self.inbox = Inbox()
 
     def take(self, count: int, seconds: float) -> list[Event]:
         """All that is there."""
