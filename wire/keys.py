@@ -206,12 +206,14 @@ MOST_PARTS = 6
 def epoch_of(part: str) -> int | None:
     """Return the epoch in the last part of a plant's token; None if no message could have it.
 
+    An epoch has one text: else the end of another one's token, with a zero before, would be that of the plant.
+
     Examples
     --------
-    >>> epoch_of("1763778000000"), epoch_of("late"), epoch_of("9" * 30)
-    (1763778000000, None, None)
+    >>> epoch_of("1763778000000"), epoch_of("late"), epoch_of("9" * 30), epoch_of("01763778000000")
+    (1763778000000, None, None, None)
     """
-    return int(part) if re.fullmatch("[0-9]{1,16}", part) and int(part) <= MOST_COUNT else None
+    return int(part) if re.fullmatch("0|[1-9][0-9]{0,15}", part) and int(part) <= MOST_COUNT else None
 
 
 def is_token(key: str) -> bool:

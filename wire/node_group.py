@@ -203,7 +203,10 @@ class NodeGroup:
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
     def is_noted(self, key: str) -> bool:
-        """Whether any of the nodes has noted the holder of a token."""
+        """Whether any of the nodes has noted the holder of a token.
+
+        All are asked: an agent notes no process of its own name, and each has the last roster that it was on.
+        """
         return any(node.is_noted(key) for node in tuple(self._active))
 
     def lost(self, loss: Loss, now: float) -> None:
