@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import accumulate
 from math import inf
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple
@@ -31,6 +32,9 @@ LONGEST = 20
 GAP = 0.06
 """Least distance between two texts (inches)."""
 
+MOST = 12.0
+"""Lines in an inch of a frame that leave its curves to be seen."""
+
 FRAME = 0.78
 """Part of a column of panels that is the frame of one; the rest are its axis and margins."""
 
@@ -48,6 +52,8 @@ def mark_events(
 ) -> None:
     """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room.
 
+    Of so many events that lines would hide the curves, only those have one for whose words there is room.
+
     Parameters
     ----------
     axes, drawing : Axes, Drawing
@@ -57,11 +63,15 @@ def mark_events(
     colours : Mapping[Mark, str], optional
         Colours of marks that are not black.
     """
-    for mark in drawing.events:
+    width = _width(axes)
+    end = max(float(history.t[-1]) for history in drawing.histories.values())
+    texts = placed(drawing.events, width / max(end, 1e-9))
+    crowded = len(drawing.events) > MOST * width
+    for mark in (one.mark for one in texts) if crowded else drawing.events:
         axes.axvline(mark.t, color=colours.get(mark, BLACK), linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
     lines = 0
     if labelled:
-        for text, mark, side in placed(drawing.events, _inches_per_s(axes, drawing)):
+        for text, mark, side in texts:
             colour = colours.get(mark, BLACK)
             note_above(axes, text, mark.t, "data", side, colour=GREY if colour == BLACK else colour)
             lines = max(lines, text.count("\n") + 1)
@@ -87,23 +97,66 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
     >>> [(text, side) for text, _, side in found]
     [('event1\n13-152 opens', 'right'), ('leave', 'left')]
     """
-    best: dict[float, tuple[float, list[Placed]]] = {-inf: (0.0, [])}
-    """By the right edge of the last text (inches): the least cost of all texts so far, and where they stand."""
-    for mark in sorted(marks, key=lambda mark: mark.t):
-        found: dict[float, tuple[float, list[Placed]]] = {}
-        for edge, (cost, texts) in best.items():
-            for price, text, side in _choices(mark):
-                end = edge
-                if text:
-                    width = LETTER * max(map(len, text.split("\n")))
-                    start = mark.t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
-                    if start < edge + GAP:
-                        continue
-                    end = start + width
-                if cost + price < found.get(end, (inf, []))[0]:
-                    found[end] = cost + price, [*texts, *([Placed(text, mark, side)] if text else [])]
-        best = found
-    return min(best.values(), key=lambda one: one[0])[1]
+    ordered = sorted(marks, key=lambda mark: mark.t)
+    options = [_options(mark, inches_per_s) for mark in ordered]
+    first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
+    best: list[_Standing] = [_Standing(-inf, 0.0, None)]
+    """What may still become the best, by the right edge of the last text: further right is cheaper."""
+    for each, leftmost in zip(options, first, strict=True):
+        found: dict[float, _Standing] = {}
+        for standing in best:
+            edge = max(standing.edge, leftmost - GAP)  # nothing stands further left any more, so these are alike
+            for option in each:
+                if option.placed is not None and option.start < edge + GAP:
+                    continue
+                end, cost = max(edge, option.end), standing.cost + option.price
+                if end not in found or cost < found[end].cost:
+                    texts = standing.texts if option.placed is None else (standing.texts, option.placed)
+                    found[end] = _Standing(end, cost, texts)
+        best, least = [], inf
+        for _, standing in sorted(found.items()):
+            if standing.cost < least:
+                best.append(standing)
+                least = standing.cost
+    chosen, texts = list[Placed](), best[-1].texts
+    while texts is not None:
+        texts, last = texts
+        chosen.append(last)
+    return chosen[::-1]
+
+
+class _Standing(NamedTuple):
+    """Texts that stand so far."""
+
+    edge: float
+    """Right edge of the last of them (inches)."""
+    cost: float
+    texts: tuple[Any, Placed] | None
+    """Those before the last, in the same form, and the last; None if there is none."""
+
+
+class _Option(NamedTuple):
+    """One way to write at a mark, or to leave it out."""
+
+    price: float
+    placed: Placed | None
+    start: float
+    """Left edge (inches); infinite if nothing is written."""
+    end: float
+    """Right edge (inches); -infinite if nothing is written."""
+
+
+def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
+    """Return what can be written at a mark, where, and how much it costs."""
+    found = []
+    for price, text, side in _choices(mark):
+        if not text:
+            found.append(_Option(price, None, inf, -inf))
+            continue
+        width = LETTER * max(map(len, text.split("\n")))
+        start = mark.t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
+        found.append(_Option(price, Placed(text, mark, side), start, start + width))
+    return found
 
 
 def _choices(mark: Mark) -> list[tuple[float, str, TextSide]]:
@@ -141,10 +194,9 @@ def note_above(axes: Axes, text: str, x: float, of: str, side: TextSide, *, colo
     )
 
 
-def _inches_per_s(axes: Axes, drawing: Drawing) -> float:
-    """Return roughly how wide a second of a panel will be: the layout is made when the figure is drawn."""
+def _width(axes: Axes) -> float:
+    """Return roughly how wide (inches) a panel will be: the layout is made when the figure is drawn."""
     place, figure = axes.get_subplotspec(), axes.get_figure(root=True)
     assert figure is not None
     columns = 1 if place is None else place.get_gridspec().ncols
-    end = max(float(history.t[-1]) for history in drawing.histories.values())
-    return float(figure.get_size_inches()[0]) / columns * FRAME / max(end, 1e-9)
+    return float(figure.get_size_inches()[0]) / columns * FRAME

@@ -160,6 +160,23 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
     assert inches_per_s < 2.0 or len(found) == 4
 
 
+def test_a_thousand_events_leave_the_curves_to_be_seen() -> None:
+    """An hour in which people change something all the time: only events with words have a line, and all are placed."""
+    it = drawing("IV")
+    end = float(it.histories["IV"].t[-1])
+    few = replace(it, events=[Mark("leave", end / 3, "inv2 leaves"), Mark("", end / 2)])
+    many = replace(it, events=[Mark("live", end * i / 1000, f"inv{i % 10} leaves") for i in range(1000)])
+
+    def lines_and_words(of: Drawing) -> tuple[int, int]:
+        panel = draw(of, "overview").axes[0]
+        return sum(len(line.get_xdata()) == 2 for line in panel.get_lines()), len(panel.texts)
+
+    nominal = 1
+    assert lines_and_words(few) == (2 + nominal, 1)
+    lines, words = lines_and_words(many)
+    assert 3 <= words == lines - nominal < 40
+
+
 def test_values_that_are_no_numbers_do_not_stop_a_figure(tmp_path: Path) -> None:
     """A microgrid without any power has no sharing index, and still its figures."""
     empty = drawing("I")
