@@ -8,6 +8,7 @@ from types import TracebackType
 
 from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.live.access import Access
+from scenarios.live.plant_search import PlantSearch
 from scenarios.live.run_address import (
     ENDPOINT,
     RUN,
@@ -33,6 +34,9 @@ REMINDER = 2.0
 
 RENEWAL = 2.0
 """Time (s) between two checks of the session."""
+
+FIRST_LOOK = 1.0
+"""Time (s) after which it is checked first: a link takes some 50 ms, on a busy machine more."""
 
 LOOKING = 1.5
 """Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
@@ -180,67 +184,49 @@ class RunClient:
         wait : float
             Longest wait (s).
         tell : Callable[[str], None], optional
-            Told for what one waits: now and then, ever more rarely, and at once if plants of other runs are there.
+            Told for what one waits: now and then, ever more rarely, and at once if plants of other runs are there, or
+            if the plant takes the link and lets nothing pass on it.
 
         Raises
         ------
         NobodyError
-            If there is none in time.
+            If there is none in time; at once if nobody there accepts the other's certificate.
         """
-        began = looked = monotonic()
-        reminder = REMINDER
+        began = monotonic()
+        look, reminder = began + FIRST_LOOK, REMINDER
         strangers: set[str] = set()
+        search = PlantSearch(self.where, self._session)
         while True:
-            pause = min(looked + RENEWAL, began + reminder, began + wait) - monotonic()
+            pause = min(look, began + reminder, began + wait) - monotonic()
             self.until(lambda: self.plant or not self._others <= strangers, pause)
             now = monotonic()
             if self.plant:
                 return
+            lines = []
             if not self._others <= strangers:
                 strangers.update(self._others)
-                if tell is not None:
-                    tell(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
+                lines.append(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
             if now - began >= wait:
-                raise NobodyError(self._nobody(wait))
-            if now - looked >= RENEWAL:
-                looked = now
+                raise NobodyError(search.in_vain(wait, self.runs, self._others))
+            if now >= look:
+                look = now + RENEWAL
+                if refused := search.refused():
+                    raise NobodyError(refused)
                 if self._session.misplaced:
                     self.renew()
+                    search = PlantSearch(self.where, self._session)
             if now - began >= reminder:
                 reminder *= 2.0
-                if tell is not None:
-                    tell(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+                lines.append(f"no plant yet of {self.where}; {now - began:.0f} of {wait:g} s waited")
+                lines += search.news(self.runs)
+            if tell is not None:
+                for line in lines:
+                    tell(line)
 
     @property
     def _others(self) -> set[str]:
         """Other runs whose plants are there."""
         return self.runs - {self.where.run}
-
-    def _nobody(self, wait: float) -> str:
-        if not self._session.peers():
-            mute = accepting(self.where.connect)
-            if mute and self.where.credentials is not None:
-                return (
-                    f"something listens at {', '.join(mute)} and has made no link within {wait:g} s: it has keys of "
-                    f"another site, or none, or it is no plant; or it refuses {self.where.credentials.own.name}"
-                )
-            if mute:
-                return (
-                    f"something listens at {', '.join(mute)} but has said nothing within {wait:g} s; if it is a frozen "
-                    "plant, kill -CONT lets it go on, else end it by its process id; if it is something else, say by "
-                    "--connect where the plant is; a plant with certificates asks for --keys DIR and tls/..."
-                )
-            return (
-                f"nothing answers at {', '.join(self.where.connect)} within {wait:g} s; start a plant there "
-                f"({command_line('plant', 'SCENARIO', *self.where.access.words)}), or say by --connect where it is"
-            )
-        others = sorted(self._others)
-        start = command_line("plant", "SCENARIO", "--run", self.where.run, *self.where.access.words)
-        there = f"runs there: {', '.join(others)}" if others else "no other run is there either"
-        return (
-            f"no plant of run {self.where.run} at {', '.join(self.where.connect)} within {wait:g} s ({there}); "
-            f"start one ({start}), or give another name by --run"
-        )
 
 
 def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:

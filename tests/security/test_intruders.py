@@ -11,11 +11,13 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from scenarios.drivers.free_endpoint import parse_endpoint
 from tests.processes.terminals import wait_for
-from tests.security.intruder import Intruder, answered, credentials, forged, handshake
+from tests.security.intruder import PATIENCE, Intruder, answered, credentials, forged, handshake
 from tests.security.recording import Recording
 from tests.toy.town import Town
 from wire.messages import Command, Measurement, Message, State
+from wire.trust.tls_refusal import tls_refusal
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
@@ -57,6 +59,25 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
         "TLSV1_ALERT_UNKNOWN_CA", "TLSV1_ALERT_DECRYPT_ERROR", "SSLV3_ALERT_BAD_CERTIFICATE",
     )  # fmt: skip
     wait_for(town.folder / "plant.log", "invalid peer certificate: ")
+
+
+def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: Path) -> None:
+    """Who refuses whom, from one handshake with the plant; a member of its site has nothing to learn."""
+    from wire.trust.site_authority import issue, make_site
+
+    make_site(other := tmp_path / "lab")
+    issue(other, "inv3")
+    endpoint, member, foreign = parse_endpoint(town.endpoint), credentials(lab, "inv3"), credentials(other, "inv3")
+    assert endpoint is not None
+    mixed = replace(foreign, ca=member.ca)
+    told = [tls_refusal(endpoint.host, endpoint.port, shown, PATIENCE) for shown in (member, foreign, mixed, None)]
+
+    assert told == [
+        "",
+        f"shows a certificate that {foreign.ca} has not signed: it is of another site",
+        "does not accept the certificate of inv3: by the ca.pem there it is of another site",
+        "asks for a certificate",
+    ]
 
 
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:

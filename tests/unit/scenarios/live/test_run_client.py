@@ -1,16 +1,20 @@
-"""Waiting for a plant: what is told meanwhile."""
+"""Waiting for a plant: what is told meanwhile, and what ends it."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
+from scenarios.live import plant_search
 from scenarios.live import run_client as client
 from scenarios.live.run_address import address_of
 from scenarios.live.run_client import NobodyError, RunClient
 from wire.driver.inbox import Inbox
 from wire.keys import Keys
+from wire.trust.credentials import Credentials
+from wire.trust.member import Member
 
 
 class Clock:
@@ -27,11 +31,19 @@ class Clock:
         return [("appeared", Keys(self._comes.pop(self.now)).alive_plant(1), b"", self.now)] if due else []
 
 
+Waiting = Callable[..., list[str]]
+
+INV1 = Member(name="inv1", role="agent")
+SHOWN = Credentials(own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1,))
+
+
 @pytest.fixture
-def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], float], list[str]]:
+def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
     """Waits for the plant of run lab and gives what was told, each with its time, the last without if all ended ill."""
 
-    def wait(comes: dict[float, str], longest: float) -> list[str]:
+    def wait(
+        comes: dict[float, str], longest: float, credentials: Credentials | None = None, links: int = 1
+    ) -> list[str]:
         clock, told = Clock(comes), list[str]()
 
         class Session:
@@ -39,13 +51,16 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
 
             id, misplaced, inbox = "1", False, Inbox()
             subscribe = watch = close = staticmethod(lambda *_: None)
-            peers = staticmethod(lambda: ["a plant"])
+            peers = staticmethod(lambda: links)
             take = staticmethod(clock.take)
+            take_lines = staticmethod(lambda: ())
+            vouches = staticmethod(lambda name: bool(links))
 
         monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
         monkeypatch.setattr(client, "monotonic", lambda: clock.now)
         try:
-            RunClient(address_of("lab", None)).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
+            where = replace(address_of("lab", None), credentials=credentials)
+            RunClient(where).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
         except NobodyError as error:
             told.append(str(error))
         return told
@@ -53,9 +68,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Callable[[dict[float, str], floa
     return wait
 
 
-def test_a_plant_of_another_run_is_told_at_once_and_once(
-    waiting: Callable[[dict[float, str], float], list[str]],
-) -> None:
+def test_a_plant_of_another_run_is_told_at_once_and_once(waiting: Waiting) -> None:
     """A --run that no run has is reported during the wait, which goes on, as the run may yet start."""
     told = waiting({0.5: "lab2", 3.0: "lab"}, 60.0)
 
@@ -65,9 +78,45 @@ def test_a_plant_of_another_run_is_told_at_once_and_once(
     ]
 
 
-def test_a_wait_is_told_ever_more_rarely(waiting: Callable[[dict[float, str], float], list[str]]) -> None:
+def test_a_wait_is_told_ever_more_rarely(waiting: Waiting) -> None:
     """A minute of waiting is five lines, and the sixth says that it was in vain."""
     *reminders, last = waiting({}, 60.0)
 
     assert [line.partition(":")[0] for line in reminders] == ["2", "4", "8", "16", "32"]
     assert last.startswith("no plant of run lab at tcp/127.0.0.1:7447 within 60 s")
+
+
+def test_a_link_on_which_nothing_passes_is_told_once_and_at_the_end(waiting: Waiting) -> None:
+    """A revoked certificate, which TLS accepts: the plant can say nothing to its holder, who says why it waits."""
+    *reminders, last = waiting({}, 10.0, SHOWN)
+
+    told = [line for line in reminders if "takes the link, but nothing passes on it" in line]
+    assert [line.partition(":")[0] for line in reminders] == ["2", "2", "4", "8"]
+    assert told == reminders[1:2]
+    assert "revokes or lacks the certificate of inv1" in told[0]
+    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s: {told[0].removeprefix('2: ')}"
+
+
+def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be refused for ever; open links are told to show one."""
+    monkeypatch.setattr(plant_search, "tls_refusal", lambda *_: "asks for a certificate")
+
+    assert waiting({}, 60.0, None, 0) == [
+        "what listens at tcp/127.0.0.1:7447 asks for a certificate; say --keys DIR and tls/127.0.0.1:7447 "
+        "(docs/security.md)"
+    ]
+    assert waiting({}, 60.0, SHOWN, 0)[0].endswith(
+        "asks for a certificate; say by --keys the folder of its site, or by --connect where the plant of this site is "
+        "(docs/security.md)"
+    )
+
+
+def test_who_has_a_link_asks_for_no_other(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The handshake that tells why there is none would be a stranger's connection to a plant that is there."""
+
+    def never(*_: object) -> str:
+        raise AssertionError
+
+    monkeypatch.setattr(plant_search, "tls_refusal", never)
+
+    assert len(waiting({}, 60.0)) == 6
