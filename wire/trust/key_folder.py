@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"
 
+COMMANDING: tuple[Role, ...] = ("operator",)
+"""Roles that may command a run."""
+
 SOON = timedelta(days=30)
 """Time before its end at which a certificate is said to end soon."""
 
@@ -89,10 +92,14 @@ def open_credentials(
                 f'{folder}: no certificate was issued to "{printable(name)}"; those of role {_or(roles)}: {have}; '
                 f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
             )
+        if tuple(roles) == COMMANDING and (viewer := _present(folder, known, ("viewer",))) is not None:
+            raise KeysError(_only_looks(folder, known, viewer))
         raise KeysError(
             f"{folder}: has no key of a member with role {_or(roles)}; copy NAME.pem and NAME.key of one, or issue one "
             "with gridpeers keys issue"
         )
+    if member.role == "viewer" and tuple(roles) == COMMANDING:
+        raise KeysError(_only_looks(folder, known, member))
     if member.role not in roles:
         raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {_or(roles)}")
     if member.revoked:
@@ -146,6 +153,17 @@ def require_private(path: Path) -> None:
         raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
 
 
+def exposed_keys(folder: Path) -> list[str]:
+    """Return a sentence for each private key in a folder that others than its owner may read or change."""
+    sentences = []
+    for path in sorted(folder.glob("*.key")):
+        try:
+            require_private(path)
+        except KeysError as error:
+            sentences.append(str(error))
+    return sentences
+
+
 def _require_folder(folder: Path) -> None:
     try:
         there = stat.S_ISDIR(folder.stat().st_mode)
@@ -161,6 +179,22 @@ def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member |
     """Return the first member of these roles whose key is in the folder."""
     there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
     return next((member for role in roles for member in there if member.role == role), None)
+
+
+def _only_looks(folder: Path, known: MemberList, viewer: Member) -> str:
+    """Return why a viewer cannot give a command, and who can."""
+    who = [each for each in known.members if each.role in COMMANDING and not each.revoked]
+    here = next((each.name for each in who if (folder / f"{each.name}.key").is_file()), "")
+    if here:
+        way = f"--as {here} takes the certificate of one"
+    elif who:
+        way = f"{', '.join(each.name for each in who)} can give it, or copy the files of one to {folder}"
+    else:
+        way = f"gridpeers keys issue NAME --role {COMMANDING[0]} makes one, where the site was made"
+    return (
+        f"{folder}: {viewer.name} has the role viewer, which may look at a run (status, watch, view) and not command "
+        f"it; an {COMMANDING[0]} may: {way}"
+    )
 
 
 def _check_certificate(

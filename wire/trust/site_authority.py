@@ -62,7 +62,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
     try:
         if folder.exists() or folder.is_symlink():
-            raise KeysError(f"{folder}: is there already; gridpeers keys show {folder} shows it")
+            raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
         folder.parent.mkdir(parents=True, exist_ok=True)
         new = Path(tempfile.mkdtemp(prefix=f".{site}-", dir=folder.absolute().parent))  # mode 0700
     except OSError as error:

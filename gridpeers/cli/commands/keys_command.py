@@ -92,26 +92,27 @@ def revoke(name: _Name, keys: _Keys = Path()) -> None:
 
 
 @app.command()
-def show(
-    site: Annotated[
-        Path, typer.Argument(metavar="[SITE]", help="Folder of the site; the present one if left out.")
-    ] = Path(),
-) -> None:
+def show(keys: _Keys = Path()) -> None:
     """Show the members of a site: role, end of the certificate, whether its key is here.
 
-    Example:  gridpeers keys show lab
+    A private key that others may read is warned of.
+
+    Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from wire.trust.key_folder import read_list
+        from wire.trust.key_folder import CA_KEY, exposed_keys, read_list
 
-        known = read_list(site)
-        typer.echo(f"site {known.site}, list {known.version}")
+        known = read_list(keys)
+        authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
+        typer.echo(f"site {known.site}, list {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
             ended = member.expires < f"{datetime.now(UTC):%Y-%m-%d}"
             state = "revoked" if member.revoked else f"{'expired' if ended else 'until'} {member.expires}"
-            here = "" if member.revoked or not (site / f"{member.name}.key").is_file() else ", key here"
+            here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
+        for exposed in exposed_keys(keys):
+            typer.echo(f"WARNING  {exposed}")
 
 
 @contextmanager

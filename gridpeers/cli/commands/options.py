@@ -66,11 +66,11 @@ def run_client(
     with usage_errors():
         from scenarios.live.run_address import check_wait
         from scenarios.live.run_client import RunClient
+        from wire.trust.key_folder import COMMANDING
 
         check_wait(wait)
-        with RunClient(
-            address(run, connect, access, PEOPLE[:1] if acts else PEOPLE), meet_agents=meet_agents
-        ) as client:
+        where = address(run, connect, access, COMMANDING if acts else PEOPLE)
+        with RunClient(where, meet_agents=meet_agents) as client:
             client.find_plant(wait)
             yield client
 

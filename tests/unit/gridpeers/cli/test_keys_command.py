@@ -37,10 +37,10 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
     assert code == 0, revoked
     assert "inv2: revoked. Copy lab/members.json to every host, and start anew what runs" in revoked
 
-    code, shown = invoke("keys", "show", "lab")
+    code, shown = invoke("keys", "show", "--keys", "lab")
     assert code == 0, shown
     rows = shown.splitlines()
-    assert rows[0] == "site lab, list 6"
+    assert rows[0] == "site lab, list 6; ca.key is here: certificates are issued in this folder"
     assert [row.split()[:3] for row in rows[1:3]] == [["agent", "inv1", "until"], ["agent", "inv2", "revoked"]]
     assert rows[1].endswith(", key here")
 
@@ -48,9 +48,9 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
 def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
     """A folder that is there, one that is none, a life of no days."""
     assert invoke("keys", "init", "lab")[0] == 0
-    assert "lab: is there already; gridpeers keys show lab shows it" in refused("keys", "init", "lab")
+    assert "lab: is there already; gridpeers keys show --keys lab shows it" in refused("keys", "init", "lab")
     assert "other: there is no such folder of keys; gridpeers keys init other makes one" in refused(
-        "keys", "show", "other"
+        "keys", "show", "--keys", "other"
     )
     assert "--days: must be more than 0 and at most 3650 days, got 0" in refused("keys", "init", "x", "--days", "0")
     assert 'no certificate was issued to "inv7"' in refused("keys", "revoke", "inv7", "--keys", "lab")
@@ -72,9 +72,37 @@ def test_show_says_which_certificates_have_expired(elsewhere: Path) -> None:
 
     assert invoke("keys", "init", "lab")[0] == 0
     issue(Path("lab"), "inv1", days=1.0, now=datetime.now(UTC) - timedelta(days=3))
-    rows = {row.split()[1]: row.split()[2] for row in invoke("keys", "show", "lab")[1].splitlines()[1:]}
+    rows = {row.split()[1]: row.split()[2] for row in invoke("keys", "show", "--keys", "lab")[1].splitlines()[1:]}
 
     assert rows == {"inv1": "expired", "operator": "until", "plant": "until", "viewer": "until"}
+
+
+def test_show_warns_of_every_key_that_others_may_read(elsewhere: Path) -> None:
+    """That of the authority above all: with it anybody can be anybody. Files as they were made give no warning."""
+    assert invoke("keys", "init", "lab")[0] == 0
+    sound = invoke("keys", "show", "--keys", "lab")[1]
+    (elsewhere / "lab" / "ca.key").chmod(0o644)
+    (elsewhere / "lab" / "viewer.key").chmod(0o620)
+    code, exposed = invoke("keys", "show", "--keys", "lab")
+
+    assert code == 0
+    assert exposed.removeprefix(sound).splitlines() == [
+        "WARNING  lab/ca.key: others may read or change it (mode 0644); chmod 600 lab/ca.key",
+        "WARNING  lab/viewer.key: others may read or change it (mode 0620); chmod 600 lab/viewer.key",
+    ]
+
+
+def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
+    """With the files of a viewer alone, by name or not: the role that may, and how to get it."""
+    assert invoke("keys", "init", "lab")[0] == 0
+    (elsewhere / "lab" / "operator.key").unlink()
+    said = "lab: viewer has the role viewer, which may look at a run (status, watch, view) and not command it; an "
+
+    unnamed = refused("down", "--keys", "lab")
+    assert f"{said}operator may: operator can give it, or copy the files of one to lab" in unnamed
+    assert invoke("keys", "revoke", "operator", "--keys", "lab")[0] == 0
+    named = refused("down", "--keys", "lab", "--as", "viewer")
+    assert f"{said}operator may: gridpeers keys issue NAME --role operator makes one, where the site was made" in named
 
 
 FAR, NEAR = "tcp/192.0.2.1:7447", "tcp/127.0.0.1:1"
@@ -115,7 +143,8 @@ OPEN = (
         (["agent", "inv1", "inv2", "--keys", "lab"], "--keys: agents of one process have one certificate"),
         (
             ["stop", "inv1", "--keys", "lab", "--as", "viewer"],
-            "viewer has the role viewer; this needs one with",
+            "viewer has the role viewer, which may look at a run (status, watch, view) and not command it; an operator "
+            "may: --as operator takes the certificate of one",
         ),
         (["run", "islanding", "--keys", "nowhere"], "nowhere: there is no such folder of keys"),
         (["run", "islanding", "--keys", "lab"], 'lab: no certificate was issued to "inv9"'),
