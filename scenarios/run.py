@@ -39,7 +39,7 @@ from scenarios.schema.plugin_keys import checks_of, claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.open_files import too_few_files
 from wire.driver.output import OutputLostError
-from wire.messages import Pacing, PlantEvent, Telemetry
+from wire.messages import Pacing, Telemetry
 
 if TYPE_CHECKING:
     from plant.plant_interface import PlantLike
@@ -184,7 +184,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
-    checks = {case: verdicts_on(request, case, record, recorded[case].events, stop) for case, record in cases.items()}
+    checks = {case: verdicts_on(request, case, record, stop) for case, record in cases.items()}
     write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
         if request.lasting and stop.raised is None:
@@ -192,7 +192,9 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
 
             last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
             histories = {case: record.history for case, record in cases.items()}
-            drawing = drawing_of(scenario, request.feeder, histories, as_they_came(scenario, last.events))
+            events = {case: record.events for case, record in cases.items()}
+            came = as_they_came(scenario, last.events)
+            drawing = drawing_of(scenario, request.feeder, histories, events, came)
             beside.enter_context(drawn_on_all_cores(drawing, folder / "plots"))
         benchmark = NO_BENCHMARK if disturbed else benchmark_of(scenario.paper)
         own = () if disturbed else judged(findings, claims_of(scenario))
@@ -214,14 +216,14 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
 
 
 def verdicts_on(
-    request: Request, case: str, record: CaseRecord, events: tuple[PlantEvent, ...], stop: JudgingStop | None = None
+    request: Request, case: str, record: CaseRecord, stop: JudgingStop | None = None
 ) -> tuple[CheckVerdict, ...]:
     """Return the verdicts of the checks on a case; see `judge_case`."""
     from scenarios.checks.checked_case import CheckedCase
     from scenarios.checks.judging import judge_case
 
     scenario, folder = request.scenario, request.folder / case
-    checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, events, folder)
+    checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, record.events, folder)
     return judge_case(checked, checks_of(scenario), stop)
 
 

@@ -171,13 +171,14 @@ class Results(_FromFolder, Mapping[str, "Result"]):
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
         cases = {}
         for case, result in self.items():
-            came = windows(as_they_came(self._spec, _plant_events(result)), self._spec.time.end_s)
+            events = _plant_events(result)
+            came = windows(as_they_came(self._spec, events), self._spec.time.end_s)
             saved = {
                 label: of["messages_saved"]
                 for label, of in frames.windows_of(self._cases[case]).items()
                 if of.get("messages_saved")
             }
-            cases[case] = CaseRecord(history=result.record, windows=came, messages_saved=saved)
+            cases[case] = CaseRecord(history=result.record, windows=came, events=events, messages_saved=saved)
         return find(self._spec, self._feeder, cases)
 
     @property
@@ -191,13 +192,14 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
         """Return the data of the figures of some cases (`scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
-        *_, last = cases.values()  # in wall-clock time each case has its own events
-        events = _plant_events(last)
+        recorded = {case: _plant_events(result) for case, result in cases.items()}
+        *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
+        events = recorded[case]
         if self.driver == "live":
             departures = compare(spec, self._feeder, events, float(last.record.t[-1]))
             return live_drawing(departures, spec, self._feeder, last.record, events)
         histories = {case: result.record for case, result in cases.items()}
-        return drawing_of(spec, self._feeder, histories, as_they_came(spec, events))
+        return drawing_of(spec, self._feeder, histories, recorded, as_they_came(spec, events))
 
     def __repr__(self) -> str:
         return f"<Results {self._spec.name}: cases {', '.join(self)}; {self.driver}>"

@@ -264,7 +264,7 @@ def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Dri
         try:
             recorded, _ = run_case(request, base.case, "", _ignore, at_start)
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
-            verdicts = verdicts_on(request, base.case, record, recorded.events)
+            verdicts = verdicts_on(request, base.case, record)
         except BrokenRunError as error:
             return JudgedRun(msgspec.structs.replace(row, violated={ENDS: str(error)}))
         except Exception as error:

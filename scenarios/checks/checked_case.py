@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from plant.equipment import Feeder
-from plant.equipment.bus_islands import bus_islands
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, History, Nameplates, read_only
-from scenarios.results.island_membership import part_of
-from scenarios.results.switch_positions import closed_switches, switch_events
+from scenarios.results.island_membership import island_intervals, islands_at_end, part_of
+from scenarios.results.switch_positions import switch_events
 from scenarios.schema.configs import limits_of
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import without_agent
@@ -55,7 +54,7 @@ class CheckedCase:
     """One recorded case; checks only read it."""
 
     scenario: ScenarioModel
-    """As it happened: in a live run with the switches that people operated."""
+    """As run."""
     feeder: Feeder
     """Its feeder."""
     case: str
@@ -149,30 +148,22 @@ class CheckedCase:
 
     @cached_property
     def parts(self) -> tuple[IslandWindow, ...]:
-        """Each island with inverters at the end of each window, as the switches were then, whatever the scenario plans.
+        """Each island with inverters at the end of each window, see `islands_at_end`.
 
         An island that came about within a window is judged from then on (`rows_from`).
         """
-        bus_of = {row.name: row.bus for row in (*self.feeder.inverters, *self.feeder.spares)}
-        source = self.feeder.source.bus if self.feeder.source else None
+        intervals = island_intervals(self.scenario, self.feeder, self.history.inverters, self.events)
         found = []
         for window in self.windows:
             rows = self.history.rows(window.rows(self.history.t))
             if not rows.t.size:
                 continue
-            until = (event for event in self.switch_events if event.t < window.end - 1e-9)  # then the next one begins
-            members = [
-                (buses, tuple(name for name in self.history.inverters if bus_of[name] in buses))
-                for buses in bus_islands(self.feeder, closed_switches(self.feeder, until))
-            ]
-            members = [(buses, names) for buses, names in members if names]
-            for buses, names in members:
-                history, nameplates = part_of(rows, self.nameplates, names)
-                label = window.label + (f", island of {names[0]}" if len(members) > 1 else "")
+            at_end = islands_at_end(intervals, window)
+            for name, island in at_end.items():
+                history, nameplates = part_of(rows, self.nameplates, island.inverters)
+                label = window.label + (f", island of {name}" if len(at_end) > 1 else "")
                 found.append(
-                    IslandWindow(
-                        window=window, label=label, fed=source in buses, history=history, nameplates=nameplates
-                    )
+                    IslandWindow(window=window, label=label, fed=island.fed, history=history, nameplates=nameplates)
                 )
         return tuple(found)
 

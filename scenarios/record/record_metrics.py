@@ -30,8 +30,6 @@ from scenarios.schema.scenario_errors import Problems
 class _Measured:
     """What of a record is measured."""
 
-    scenario: ScenarioModel
-    """As it happened."""
     history: History
     windows: tuple[Window, ...]
     notes: tuple[str, ...]
@@ -51,11 +49,12 @@ def report_of(record: RunRecord) -> RunReport:
     case, of = record.info.case, (_live if record.info.clock == "wall" else _simulated)(record, scenario, feeder)
     quiet = [each for message in record.telemetry() for each in message.quiet]
     saved = messages_saved(quiet, of.windows, len(with_agent(scenario, feeder, case)), scenario.time.T_c_s)
-    measured = CaseRecord(history=of.history, windows=of.windows, messages_saved=saved)
+    events = record.events()
+    measured = CaseRecord(history=of.history, windows=of.windows, events=events, messages_saved=saved)
     return RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},
-        findings=find(of.scenario, feeder, {case: measured}),
+        findings=find(scenario, feeder, {case: measured}),
         verdicts=(),
         notes=[f"case {case}: {note}" for note in (*of.notes, *_about(record))],
         folder="",
@@ -92,7 +91,7 @@ def _simulated(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _M
         notes.append(f"the record ends at {end:.2f} s of {scenario.time.end_s:g} s; what is measured ends there")
     if len(kept) < len(came):
         notes.append(f"not measured: {', '.join(_left_out(came, kept))}")
-    return _Measured(scenario=scenario, history=history, windows=kept, notes=tuple(notes))
+    return _Measured(history=history, windows=kept, notes=tuple(notes))
 
 
 def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measured:
@@ -106,7 +105,6 @@ def _live(record: RunRecord, scenario: ScenarioModel, feeder: Feeder) -> _Measur
     notes += [f"not measured: {', '.join(window.label for window in left_out)}"] if left_out else []
     notes += [departures.note] if departures.note else []
     return _Measured(
-        scenario=departures.happened,
         history=taken_part(scenario, feeder, history),
         windows=of.measured,
         notes=tuple(notes),

@@ -1,4 +1,4 @@
-"""Windows of measurement: the time from each event to the next, and a recorded case with its windows."""
+"""Windows of measurement: the time from each event to the next, and a recorded case with its windows and events."""
 
 from __future__ import annotations
 
@@ -119,6 +119,8 @@ class CaseRecord:
 
     history: History
     windows: Sequence[Window]
+    events: Sequence[PlantEvent]
+    """Recorded events, in the order of time: their switches make the islands."""
     messages_saved: Mapping[str, float] = field(default_factory=dict)
     """Share of states that the laws did not send, by window; empty if they sent all."""
 
@@ -138,5 +140,6 @@ class CaseRecord:
         return cls(
             history=history_of(recorded),
             windows=opened,
+            events=recorded.events,
             messages_saved=messages_saved(recorded.quiet, opened, agents, scenario.time.T_c_s),
         )

@@ -12,7 +12,7 @@ from scenarios.results.evaluation.quantities import label
 from scenarios.results.evaluation.window_metrics import own_measures
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.history import Nameplates
-from scenarios.results.island_membership import islands_of, part_of
+from scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from scenarios.results.metrics import Settling, Steady, measure, settling
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import limits_of
@@ -41,7 +41,10 @@ class Findings:
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
     """Settling after each event, by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
-    """Steady values of each island, by case, event and the island's first inverter; only where there are several."""
+    """Steady values of each island, by case, event and the island's first inverter; only where there are several.
+
+    Islands are those at the end of the event's window, as its switches were recorded (`islands_at_end`).
+    """
     available: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     """Available power at the end, by case and inverter (pu of rating); only where it was changed."""
     without_agent: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -52,7 +55,7 @@ class Findings:
     """The scenario's own metrics, by case and event."""
 
     def apart(self, case: str, event: str) -> bool:
-        """Return whether an event left several islands: each shares for itself, and sharing over all means nothing."""
+        """Return whether a window ends with several islands: each shares for itself, and that of all means nothing."""
         return bool(self.islands.get(case, {}).get(event))
 
     def value(self, cell: Published) -> float:
@@ -103,29 +106,30 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
     Parameters
     ----------
     scenario, feeder : ScenarioModel, Feeder
-        As run; each window has the label of an event of the scenario.
+        As run.
     cases : Mapping[str, CaseRecord]
-        Recorded cases with their windows.
+        Recorded cases with their windows and events.
     """
     results: dict[str, dict[str, Steady]] = {}
     settled: dict[str, dict[str, Settling]] = {}
     islands: dict[str, dict[str, dict[str, Steady]]] = {}
     available: dict[str, dict[str, float]] = {}
-    where = islands_of(scenario, feeder)
     for case, record in cases.items():
         everybody = Nameplates.of_columns(record.history.inverters, feeder)
         nameplates = everybody.without(without_agent(scenario, case))
         results[case], settled[case], islands[case] = {}, {}, {}
+        intervals = island_intervals(scenario, feeder, record.history.inverters, record.events)
         within = record.history.until(scenario.time.end_s)
         for window in record.windows:
             history = within if window.end <= scenario.time.end_s else record.history
             inside = history.rows(window.rows(history.t))
             results[case][window.label] = measure(inside, nameplates, window, feeder.f_nom)
             settled[case][window.label] = settling(inside, nameplates, window, feeder.f_nom)
-            if len(where[window.label]) > 1:
+            at_end = islands_at_end(intervals, window)
+            if len(at_end) > 1:
                 islands[case][window.label] = {
-                    name: measure(*part_of(inside, nameplates, members), window, feeder.f_nom)
-                    for name, members in where[window.label].items()
+                    name: measure(*part_of(inside, nameplates, island.inverters), window, feeder.f_nom)
+                    for name, island in at_end.items()
                 }
         rating = dict(zip(everybody.names, everybody.s.tolist(), strict=True))
         available[case] = {limit.inverter: limit.P_max / rating[limit.inverter] for limit in limits_of(scenario, case)}

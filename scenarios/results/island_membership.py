@@ -1,57 +1,106 @@
-"""The inverters of each island after each event of a scenario, and the part of a history that is one island's."""
+"""The islands of a run over time, as it was recorded, and the part of a history that is one island's."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
+from itertools import groupby
 from math import inf
 from typing import NamedTuple
 
 import numpy as np
 
 from plant.equipment import Feeder
-from plant.equipment.bus_islands import islands_after
+from plant.equipment.bus_islands import bus_islands
+from scenarios.results.event_windows import Window
 from scenarios.results.history import Floats, History, Nameplates
+from scenarios.results.switch_positions import closed_switches, switch_events
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import inverters_of
+from wire.messages import PlantEvent
 
-IslandMembers = dict[str, tuple[str, ...]]
-"""Inverters of each island; an island is known by its first inverter."""
+
+class Island(NamedTuple):
+    """An island with inverters in it."""
+
+    inverters: tuple[str, ...]
+    """Inverters at its buses, in the order of the history's columns; one that has left is still counted."""
+    fed: bool
+    """Whether the substation is part of it."""
+
+
+Islands = Mapping[str, Island]
+"""Islands by name: that of the first inverter."""
 
 
 class IslandInterval(NamedTuple):
-    """A time during which there are several islands."""
+    """A time during which no switch operates."""
 
     start: float
-    """From the event that made them (s)."""
+    """Time of the operations of switches that begin it (s); minus infinity for the start of the run."""
     end: float
-    """To the next event, or for good (s)."""
-    islands: IslandMembers
+    """Time of the next operation (s); infinity if there is none."""
+    islands: Islands
 
 
 RowMeasure = Callable[[History, Nameplates], Floats]
 """A measure of each row."""
 
 
-def islands_of(scenario: ScenarioModel, feeder: Feeder) -> dict[str, IslandMembers]:
-    """Return the islands with inverters in them after each event, by its label.
+def island_intervals(
+    scenario: ScenarioModel, feeder: Feeder, inverters: Sequence[str], recorded: Iterable[PlantEvent]
+) -> tuple[IslandInterval, ...]:
+    """Return the islands of a run over time, in the order of time and without gaps.
 
-    Switches alone decide: an inverter that has left is still counted where it stands.
+    Checks, metrics and figures all take the islands from here. Switches alone decide, as they were recorded: one that
+    waits for synchronism has not closed yet. See `switch_events` for a plant that records no switch.
+
+    Parameters
+    ----------
+    scenario, feeder : ScenarioModel, Feeder
+        As run.
+    inverters : Sequence[str]
+        Inverters of the history's columns.
+    recorded : Iterable[PlantEvent]
+        Events of the plant, in the order of time.
 
     Examples
     --------
     >>> from scenarios.schema import load_scenario
-    >>> islands_of(*load_scenario("microgrid-switching"))["event2"]["inv4"]
-    ('inv4', 'inv5', 'inv6')
+    >>> scenario, feeder = load_scenario("islanding")
+    >>> opened = PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened", closed=False)
+    >>> [(it.start, list(it.islands)) for it in island_intervals(scenario, feeder, ["inv1", "inv4"], [opened])]
+    [(-inf, ['inv1']), (2.5, ['inv1', 'inv4'])]
     """
-    rows = inverters_of(scenario, feeder)
-    islands = {}
-    after = islands_after(feeder, ((event.open, event.close) for event in scenario.events))
-    for event, parts in zip(scenario.events, after, strict=True):
-        members = [tuple(row.name for row in rows if row.bus in buses) for buses in parts]
-        known = {names[0]: names for names in members if names}
-        islands[event.label] = {row.name: known[row.name] for row in rows if row.name in known}
-    return islands
+    closed = closed_switches(feeder, ())
+    states = [(-inf, closed)]
+    for t, operations in groupby(switch_events(scenario, feeder, recorded), key=lambda event: event.t):
+        closed = closed_switches(feeder, operations, closed)
+        states.append((t, closed))
+    ends = [*(t for t, _ in states), inf][1:]
+    return tuple(
+        IslandInterval(start, end, _islands(feeder, inverters, closed))
+        for (start, closed), end in zip(states, ends, strict=True)
+    )
+
+
+def _islands(feeder: Feeder, inverters: Sequence[str], closed: frozenset[str]) -> Islands:
+    bus_of = {row.name: row.bus for row in (*feeder.inverters, *feeder.spares)}
+    source = feeder.source.bus if feeder.source else None
+    around = {bus: buses for buses in bus_islands(feeder, closed) for bus in buses}
+    members: dict[frozenset[str], list[str]] = {}
+    for name in inverters:
+        members.setdefault(around[bus_of[name]], []).append(name)
+    return {names[0]: Island(tuple(names), source in buses) for buses, names in members.items()}
+
+
+def islands_at_end(intervals: Sequence[IslandInterval], window: Window) -> Islands:
+    """Return the islands at the end of a window: those that a table has, and that checks judge.
+
+    Steady values are means over the end of a window, so islands that a switch made or joined before count no more. An
+    operation at the very end belongs to the next window.
+    """
+    return next(it.islands for it in reversed(intervals) if it.start < window.end - 1e-9)
 
 
 def part_of(history: History, nameplates: Nameplates, names: tuple[str, ...]) -> tuple[History, Nameplates]:
@@ -76,27 +125,25 @@ def taken_part(scenario: ScenarioModel, feeder: Feeder, history: History) -> His
     return part_of(history, Nameplates.of_columns(history.inverters, feeder), names)[0]
 
 
-def island_intervals(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandInterval, ...]:
-    """Return the times with several islands, and these islands."""
-    starts = [event.t_s for event in scenario.events]
-    times = zip(starts, [*starts, inf][1:], islands_of(scenario, feeder).values(), strict=True)
-    return tuple(IslandInterval(start, end, islands) for start, end, islands in times if len(islands) > 1)
-
-
-def worst(quantity: RowMeasure, nominal: float, island_intervals: Sequence[IslandInterval]) -> RowMeasure:
+def worst(
+    quantity: RowMeasure,
+    nominal: float,
+    island_intervals: Iterable[IslandInterval],
+    history: History,
+    nameplates: Nameplates,
+) -> Floats:
     """Return the measure of the island in which it is farthest from its nominal value, while there are several.
 
-    A mean over islands hides their errors: one is too fast, another too slow.
+    A mean over islands hides their errors: one is too fast, another too slow. Each row has the islands of its time; a
+    row at the very moment of an operation those of before.
     """
-
-    def measure(history: History, nameplates: Nameplates) -> Floats:
-        values = quantity(history, nameplates)
-        for interval in island_intervals:
+    values = quantity(history, nameplates)
+    for interval in island_intervals:
+        if len(interval.islands) > 1:
             rows = (history.t > interval.start) & (history.t <= interval.end)
             inside = history.rows(rows)
-            each = np.stack([quantity(*part_of(inside, nameplates, names)) for names in interval.islands.values()])
+            parts = (part_of(inside, nameplates, island.inverters) for island in interval.islands.values())
+            each = np.stack([quantity(*part) for part in parts])
             far = np.nan_to_num(np.abs(each - nominal), nan=-1.0).argmax(axis=0)
             values[rows] = np.take_along_axis(each, far[None, :], axis=0)[0]
-        return values
-
-    return measure
+    return values

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from plant.equipment import Feeder
 from plant.equipment.bus_islands import switch_name
@@ -11,9 +11,10 @@ from wire.messages import PlantEvent
 
 
 def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[PlantEvent]) -> tuple[PlantEvent, ...]:
-    """Return the operations of switches that a plant recorded.
+    """Return the operations of switches that a plant recorded, in the order of time.
 
-    A federation's plant need not tell of any: then they are those that the scenario asks of it.
+    A federation's plant need not record any: then they are those that the scenario plans. Of every other plant, no
+    event means no operation; a run folder without its events.csv cannot be read.
     """
     told = tuple(event for event in recorded if event.kind == "switch")
     if told or scenario.plant.simulator != "helics":
@@ -26,8 +27,10 @@ def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[Pl
     )
 
 
-def closed_switches(feeder: Feeder, events: Iterable[PlantEvent]) -> frozenset[str]:
-    """Return the names of the switches that are closed after some events, from those that are closed at the start.
+def closed_switches(
+    feeder: Feeder, events: Iterable[PlantEvent], before: Collection[str] | None = None
+) -> frozenset[str]:
+    """Return the names of the switches that are closed after some events.
 
     A switch that waits for synchronism has no event of kind "switch" until it closes.
 
@@ -37,9 +40,11 @@ def closed_switches(feeder: Feeder, events: Iterable[PlantEvent]) -> frozenset[s
         Its tables.
     events : Iterable[PlantEvent]
         `switch_events` up to some time, in the order of time.
+    before : Collection[str], optional
+        Names of the switches that are closed before; when left out, those that are closed at the start of a run.
     """
     names = {each: switch.name for switch in feeder.switches for each in (*switch.names, switch.event_name)}
-    closed = {switch.name for switch in feeder.switches if switch.closed}
+    closed = {switch.name for switch in feeder.switches if switch.closed} if before is None else set(before)
     for event in events:
         if event.subject not in names:
             continue  # an outside plant may have others

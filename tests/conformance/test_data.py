@@ -8,39 +8,34 @@ import pytest
 from agents.agent_config import Control
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.event_windows import CaseRecord, windows
+from scenarios.results.event_windows import CaseRecord
 from scenarios.results.findings import find
-from scenarios.results.history import History, Nameplates
+from scenarios.results.history import Nameplates, history_of
 from scenarios.results.metrics_file import RunMetrics, metrics_json
+from scenarios.results.record import Recorded, Recorder
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun, first_difference
-from wire.messages import Telemetry
 
-EVENTS = (("event1", 1.0), ("event2", 4.0))
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8").replace('paper = "islanding"', "")
 
 
-def history_of(path: Path, case: str) -> History:
+def recorded(path: Path, case: str) -> Recorded:
     """Run one case of a file in one process."""
-    rows: list[tuple[float, ...]] = []
-
-    def take(telemetry: Telemetry) -> None:
-        rows.extend(telemetry.rows)
-
     scenario, feeder = load_scenario(path)
-    outcome = run_inprocess(*configs(scenario, feeder, case), take)
+    recorder = Recorder()
+    outcome = run_inprocess(*configs(scenario, feeder, case), recorder)
     assert not outcome.broke
-    return History.of(Nameplates.of(feeder.inverters).names, rows)
+    return recorder.finish(scenario.time.end_s, scenario.time.record_s)
 
 
 def test_islanding_at_50_hz_settles_at_50_hz(tmp_path: Path) -> None:
     """The same feeder as 50 Hz equipment: on the grid at 50 Hz, restored to 50 Hz, with equal power, and no trip."""
     text = ISLANDING.replace("V_set0_pu = 1.0", "V_set0_pu = 1.0\nf_nom_Hz = 50.0").replace("7.0", "4.2")
-    history = history_of(written(tmp_path, text), "IV")
+    history = history_of(recorded(written(tmp_path, text), "IV"))
     _, feeder = load_scenario("islanding")
     before, after = history.t < 1.0, (history.t > 3.8) & (history.t < 4.0)
     share = history.P[after] / Nameplates.of(feeder.inverters).s
@@ -75,8 +70,8 @@ def test_an_inverter_without_agent_keeps_its_set_points_and_is_left_out_of_the_s
     text = ISLANDING.replace('secondary = "all"', 'secondary = "all"\nwithout_agent = ["inv2"]').replace("7.0", "4.2")
     path = written(tmp_path, text)
     scenario, feeder = load_scenario(path)
-    history = history_of(path, "IV")
-    found = find(scenario, feeder, {"IV": CaseRecord(history=history, windows=windows(EVENTS, scenario.time.end_s))})
+    record = CaseRecord.of(scenario, feeder, "IV", recorded(path, "IV"))
+    found, history = find(scenario, feeder, {"IV": record}), record.history
     steady = found.results["IV"]["event1"]
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
-import msgspec
-
 from plant.equipment import Feeder
 from plant.equipment.bus_islands import switch_name
 from plant.equipment.named_loads import load_name, named_loads
@@ -40,10 +38,8 @@ class Departures:
     disturbed: tuple[Window, ...]
     """Measured windows of the scenario, as it means them, that end after the first departure or miss rows: the plant
     remembers whatever happened to it."""
-    happened: ScenarioModel
-    """The scenario with the events that came, among them those that people made on switches and loads."""
     windows: LiveWindows
-    """The windows of these events."""
+    """The windows of the scenario's events, and of those that people made on switches and loads."""
     live: Mapping[str, str]
     """By label, the operations of each event that people made."""
 
@@ -104,8 +100,6 @@ def compare(
     live = live_events(switched)
     opened = live_windows(scenario, events, live, ended, missing)
     measured = {window.label for window in opened.measured}
-    # at the same moment a live event comes first: the scenario's event names the state that is left behind
-    came = sorted((*live, *(event for event in scenario.events if event.t_s < ended)), key=lambda event: event.t_s)
     return Departures(
         events=tuple(departures),
         disturbed=tuple(
@@ -114,9 +108,8 @@ def compare(
             if window.label in measured
             and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
         ),
-        happened=msgspec.structs.replace(scenario, events=tuple(came)),
         windows=opened,
-        live={event.label: "; ".join(one.text for one in switched if one.t == event.t_s) for event in live},
+        live={label: "; ".join(one.text for one in switched if one.t == t) for label, t in live},
     )
 
 

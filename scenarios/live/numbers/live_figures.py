@@ -40,7 +40,7 @@ def live_drawing(
     (case,) = scenario.cases
     reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
-    drawing = drawing_of(departures.happened, feeder, {case: taken_part(scenario, feeder, history)}, came)
+    drawing = drawing_of(scenario, feeder, {case: taken_part(scenario, feeder, history)}, {case: events}, came)
     marks = [*drawing.events, *_marks(departures.events)]
     return replace(drawing, events=marks, moves=any(event.kind == "inverter" for event in events))
 

@@ -51,11 +51,11 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)
-    record = CaseRecord.of(departures.happened, feeder, case, recorded, departures.windows.measured)
+    record = CaseRecord.of(scenario, feeder, case, recorded, departures.windows.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
-    findings = find(departures.happened, feeder, {case: record})
+    findings = find(scenario, feeder, {case: record})
     checked = CheckedCase.of(
-        departures.happened, feeder, case, record.history, record.windows, recorded.events, metrics.folder / case
+        scenario, feeder, case, record.history, record.windows, record.events, metrics.folder / case
     )
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
     checks = {case: judge_case(checked, checks_of(scenario), stop)}

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 
 from scenarios.results.event_windows import Window, as_they_came, windows
 from scenarios.results.steadiness import STEADY
 from scenarios.schema import ScenarioModel
-from scenarios.schema.scenario_model import Event
 from wire.messages import PlantEvent
 
 NEAR = 1e-9
@@ -30,36 +28,21 @@ class LiveWindows:
     """Windows without numbers, as rows are missing at their end, where they are measured."""
 
 
-def live_events(done: Iterable[PlantEvent]) -> tuple[Event, ...]:
-    """Return the switches that people operated and the loads that they set as events, in the order of time.
-
-    Those of one step are one event.
+def live_events(done: Iterable[PlantEvent]) -> tuple[tuple[str, float], ...]:
+    """Return label and time (s) of each event that people made on switches and loads; those of one step are one event.
 
     Examples
     --------
-    >>> opened = PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened")
-    >>> [(event.label, event.open, event.close) for event in live_events([opened])]
-    [('live at 2.5 s', ('67s-67',), ())]
+    >>> live_events([PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened")])
+    (('live at 2.5 s', 2.5),)
     """
-    events = []
-    for t, group in groupby(done, key=lambda event: event.t):
-        # of several operations of a switch in one step, the last one counts
-        last = {event.subject: event.text.endswith(" opened") for event in group if event.kind == "switch"}
-        events.append(
-            Event(
-                label=f"live at {round(t, 3):.12g} s",
-                t_s=t,
-                open=tuple(name for name, opened in last.items() if opened),
-                close=tuple(name for name, opened in last.items() if not opened),
-            )
-        )
-    return tuple(events)
+    return tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in done))
 
 
 def live_windows(
     scenario: ScenarioModel,
     events: Iterable[PlantEvent],
-    live: Sequence[Event],
+    live: Sequence[tuple[str, float]],
     ended: float,
     missing: Sequence[tuple[float, float]] = (),
 ) -> LiveWindows:
@@ -75,8 +58,8 @@ def live_windows(
         As run.
     events : Iterable[PlantEvent]
         The plant's events.
-    live : Sequence[Event]
-        The live events, in the order of time.
+    live : Sequence[tuple[str, float]]
+        Label and time (s) of the live events, in the order of time.
     ended : float
         Time (s) of the last row.
     missing : Sequence[tuple[float, float]], optional
@@ -85,18 +68,18 @@ def live_windows(
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
     starts = [window.start for window in scripted]
-    live = [event for event in live if all(abs(event.t_s - t) > NEAR for t in starts)]
+    live = [(label, t) for label, t in live if all(abs(t - start) > NEAR for start in starts)]
     reached, not_reached = [], []
     for plan, window in zip(meant, scripted, strict=True):
-        cut = [event.t_s for event in live if window.start < event.t_s < window.end - NEAR]
+        cut = [t for _, t in live if window.start < t < window.end - NEAR]
         if cut or plan.end <= ended + NEAR:
             reached.append(replace(window, end=cut[0]) if cut else window)
         else:
             not_reached.append(plan)
-    starts += [event.t_s for event in live]
-    for event in live:
-        end = min((t for t in starts if t > event.t_s), default=ended)
-        reached.append(Window(label=event.label, start=event.t_s, end=min(end, ended)))
+    starts += [t for _, t in live]
+    for label, t in live:
+        end = min((start for start in starts if start > t), default=ended)
+        reached.append(Window(label=label, start=t, end=min(end, ended)))
     reached.sort(key=lambda window: window.start)
     shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
     too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -97,22 +98,30 @@ def single(drawing: Drawing, name: str) -> Figure:
 def draw_measure(axes: Axes, drawing: Drawing, name: str) -> None:
     """Draw one of `MEASURES` over time, a curve for each case."""
     measure = MEASURES[name]
-    nominal = drawing.f_nom if measure.nominal is None else measure.nominal
-    drawn = curves(axes, drawing, worst(measure.of_row, nominal, drawing.island_intervals))
+    drawn = {case: measured(drawing, case, name) for case in drawing.histories}
+    curves(axes, drawing, drawn)
     label = f"{measure.island_label}, worst island" if drawing.island_intervals else measure.label
     name_panel(axes, measure.title, label)
     if measure.bounds is not None:
-        from_zero(axes, drawn, measure.bounds)
+        from_zero(axes, [*drawn.values()], measure.bounds)
     else:
-        nominal_line(axes, nominal)
+        nominal_line(axes, _nominal(drawing, measure))
 
 
-def curves(axes: Axes, drawing: Drawing, measure: RowMeasure) -> list[Floats]:
-    """Draw one curve per case; the later ones lie on top."""
-    drawn = []
+def measured(drawing: Drawing, case: str, name: str) -> Floats:
+    """Return one of `MEASURES` of a case, row by row; of the worst island while there are several."""
+    measure, intervals = MEASURES[name], drawing.island_intervals.get(case, ())
+    history, nameplates = drawing.histories[case], drawing.nameplates_in(case)
+    return worst(measure.of_row, _nominal(drawing, measure), intervals, history, nameplates)
+
+
+def _nominal(drawing: Drawing, measure: PlotMeasure) -> float:
+    return drawing.f_nom if measure.nominal is None else measure.nominal
+
+
+def curves(axes: Axes, drawing: Drawing, values: Mapping[str, Floats]) -> None:
+    """Draw one curve per case, from its values by row; the later ones lie on top."""
     for (case, history), style in zip(drawing.histories.items(), case_styles(drawing.histories).values(), strict=True):
         colour, dashes, width = style
-        drawn.append(measure(history, drawing.nameplates_in(case)))
         label = words(drawing, case)
-        axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=label)
-    return drawn
+        axes.plot(history.t, values[case], color=colour, linestyle=dashes, linewidth=width, label=label)

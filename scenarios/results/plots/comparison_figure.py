@@ -9,8 +9,7 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results.island_membership import worst
-from scenarios.results.plots.case_figures import MEASURES, PlotMeasure
+from scenarios.results.plots.case_figures import MEASURES, measured
 from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import BLACK, mark_events
 from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, name_panel, time_axis
@@ -45,22 +44,21 @@ def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
                 title = MEASURES[name].title
                 name_panel(panel, f"{words}: {title}" if words else title, label)
                 panel.ticklabel_format(axis="y", useOffset=False)
-                _draw(panel, drawings, MEASURES[name], labelled=place < COLUMNS)
+                _draw(panel, drawings, name, labelled=place < COLUMNS)
         legend_below(figure, grid[0, 0])
     return figure
 
 
-def _draw(axes: Axes, drawings: Mapping[str, Drawing], measure: PlotMeasure, *, labelled: bool) -> None:
-    """Draw a measure of both runs, and the events of both: those that one alone has in its colour."""
+def _draw(axes: Axes, drawings: Mapping[str, Drawing], measure: str, *, labelled: bool) -> None:
+    """Draw one of `MEASURES` of both runs, and the events of both: those that one alone has in its colour."""
     drawn, colours = [], dict.fromkeys((mark for drawing in drawings.values() for mark in drawing.events), "")
     for (name, drawing), (colour, dashes, width) in zip(drawings.items(), _STYLES, strict=True):
         ((case, history),) = drawing.histories.items()
-        measured = worst(measure.of_row, drawing.f_nom if measure.bounds is None else 0.0, drawing.island_intervals)
-        drawn.append(measured(history, drawing.nameplates_in(case)))
+        drawn.append(measured(drawing, case, measure))
         axes.plot(history.t, drawn[-1], color=colour, linestyle=dashes, linewidth=width, label=name)
         colours |= {mark: BLACK if colours[mark] else colour for mark in dict.fromkeys(drawing.events)}
-    if measure.bounds is not None:
-        from_zero(axes, drawn, measure.bounds)
+    if (bounds := MEASURES[measure].bounds) is not None:
+        from_zero(axes, drawn, bounds)
     longer = max(drawings.values(), key=lambda drawing: max(history.t[-1] for history in drawing.histories.values()))
     time_axis(axes, longer)
     mark_events(axes, replace(longer, events=list(colours)), labelled=labelled, colours=colours)

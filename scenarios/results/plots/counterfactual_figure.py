@@ -9,8 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from scenarios.results.history import Floats
-from scenarios.results.island_membership import worst
-from scenarios.results.plots.case_figures import MEASURES
+from scenarios.results.plots.case_figures import MEASURES, measured
 from scenarios.results.plots.drawing import Drawing
 from scenarios.results.plots.marks import mark_events
 from scenarios.results.plots.style import (
@@ -54,13 +53,11 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
         top, middle, bottom = figure.subplots(3, 1, sharex=True)
         both = ((was, FAINT, "what was"), (would_be, STRONG, f"what would have been: {words}"))
         for drawing, line, label in both:
-            top.plot(*_measured(drawing, "frequency"), color=_shade(BLUE, line), label=label, **line)
+            _plot(top, drawing, "frequency", line, label=label)
             _powers(middle, drawing, line)
         indices = []
         for drawing, line, _ in both:
-            t, index = _measured(drawing, "MPSI")
-            bottom.plot(t, index, color=_shade(BLUE, line), **line)
-            indices.append(index)
+            indices.append(_plot(bottom, drawing, "MPSI", line))
         from_zero(bottom, indices, MEASURES["MPSI"].bounds)  # type: ignore[arg-type]  # this one has bounds
         nominal_line(top, was.f_nom)
         name_panel(top, "Frequency", "mean of the GFM, f (Hz)")
@@ -91,13 +88,12 @@ def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: fl
     return figure
 
 
-def _measured(drawing: Drawing, name: str) -> tuple[Floats, Floats]:
-    """Return the time and one of `MEASURES` of the drawing's history."""
+def _plot(axes: Axes, drawing: Drawing, name: str, line: dict[str, Any], label: str | None = None) -> Floats:
+    """Draw one of `MEASURES` of the drawing's history, and return it."""
     ((case, history),) = drawing.histories.items()
-    measure = MEASURES[name]
-    nominal = drawing.f_nom if measure.nominal is None else measure.nominal
-    of_row = worst(measure.of_row, nominal, drawing.island_intervals)
-    return history.t, of_row(history, drawing.nameplates_in(case))
+    values = measured(drawing, case, name)
+    axes.plot(history.t, values, color=_shade(BLUE, line), label=label, **line)
+    return values
 
 
 def _powers(axes: Axes, drawing: Drawing, line: dict[str, Any]) -> None:

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from plant.equipment import Feeder
 from scenarios.results.history import History, Nameplates
-from scenarios.results.island_membership import IslandInterval, island_intervals, islands_of
+from scenarios.results.island_membership import Island, IslandInterval, Islands, island_intervals
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import limits_of
-from scenarios.schema.participants import inverters_of, without_agent
+from scenarios.schema.participants import without_agent
 from scenarios.schema.scenario_model import Event, LoadChange
 from scenarios.short_names import in_order, short
+from wire.messages import PlantEvent
 
 
 class Mark(NamedTuple):
@@ -47,30 +48,54 @@ class Drawing:
     """Whether inverters leave or join, which has a figure of its own."""
     limited: Sequence[str] = ()
     """Inverters whose available power changes, which has one too."""
-    islands: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    """Inverters of each island where there come to be several, by the first of them; they have a figure as well."""
-    island_titles: Mapping[str, str] = field(default_factory=dict)
-    """A few words on each island."""
-    island_intervals: Sequence[IslandInterval] = ()
-    """Times with several islands; figures of all cases show the worst of them then."""
+    island_intervals: Mapping[str, Sequence[IslandInterval]] = field(default_factory=dict)
+    """Times with several islands, by case; only of cases that have any. Measures are those of the worst island then."""
+    microgrid_of: Mapping[str, str] = field(default_factory=dict)
+    """Microgrid of each inverter."""
 
     def nameplates_in(self, case: str) -> Nameplates:
         """Return the nameplates as they count in a case."""
         return self.nameplates.without(self.without_agent.get(case, frozenset()))
+
+    def most_islands(self, case: str) -> Islands:
+        """Return the islands of a case when there are most of them; they have a figure of their own."""
+        return max((interval.islands for interval in self.island_intervals[case]), key=len)
+
+    def island_title(self, island: Island) -> str:
+        """Return a few words on an island: its microgrid if it lies in one, or its first inverter."""
+        microgrids = {self.microgrid_of.get(name, "") for name in island.inverters}
+        if len(microgrids) == 1 and (microgrid := microgrids.pop()):
+            return f"microgrid {microgrid.removeprefix('MG')}"
+        return f"island of {island.inverters[0]}"
 
 
 def drawing_of(
     scenario: ScenarioModel,
     feeder: Feeder,
     histories: Mapping[str, History],
+    recorded: Mapping[str, Iterable[PlantEvent]],
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
-    """Return the data for the figures of a run: those of all experiments, and those of the events in this one."""
+    """Return the data for the figures of a run: those of all experiments, and those of the events in this one.
+
+    Parameters
+    ----------
+    scenario, feeder : ScenarioModel, Feeder
+        As run.
+    histories : Mapping[str, History]
+        Recorded rows by case.
+    recorded : Mapping[str, Iterable[PlantEvent]]
+        Recorded events by case, in the order of time.
+    events : Sequence[tuple[str, float]]
+        Label and time (s) of each event that is marked.
+    """
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
-    most = max(islands_of(scenario, feeder).values(), key=len, default={})
-    microgrid = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
-    whole = {name: {microgrid[member] for member in members} for name, members in most.items()}
+    islands = {
+        case: island_intervals(scenario, feeder, history.inverters, recorded[case])
+        for case, history in histories.items()
+    }
+    several = {case: [it for it in of if len(it.islands) > 1] for case, of in islands.items()}
     return Drawing(
         histories=histories,
         titles={case: rule.title for case, rule in scenario.cases.items()},
@@ -80,9 +105,8 @@ def drawing_of(
         without_agent={case: without_agent(scenario, case) for case in scenario.cases},
         moves=any(event.leave or event.join for event in scenario.events),
         limited=tuple(limited),
-        islands=most if len(most) > 1 else {},
-        island_titles={name: f"microgrid {of.pop().removeprefix('MG')}" for name, of in whole.items() if len(of) == 1},
-        island_intervals=island_intervals(scenario, feeder),
+        island_intervals={case: of for case, of in several.items() if of},
+        microgrid_of={row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)},
     )
 
 

@@ -42,9 +42,10 @@ def plug_and_play(drawing: Drawing) -> Figure:
             colour, dashes, width = MOVER if absent[:, i].any() else STAYERS[nameplates.GFM[i]]
             top.plot(history.t, history.P[:, i] / nameplates.s[i], dashes, color=colour, lw=width, label=name)
         top.set_title(case_title(drawing, case), loc="left")
-        curves(middle, alone, metrics.mean_frequency)
+        counted = drawing.nameplates_in(case)
+        curves(middle, alone, {case: metrics.mean_frequency(history, counted)})
         nominal_line(middle, drawing.f_nom)
-        curves(bottom, alone, metrics.mean_voltage)
+        curves(bottom, alone, {case: metrics.mean_voltage(history, counted)})
     for panel, label in zip(grid[:, 0], ("P (pu of rating)", "f, mean of the GFM (Hz)", "mean V (pu)"), strict=True):
         panel.set_ylabel(label)
     lines = {line.get_color(): line for line in grid[0, 0].get_lines()}
@@ -136,12 +137,13 @@ def _keep_in_view(axes: Axes, drawing: Drawing) -> None:
 
 
 def microgrids(drawing: Drawing, case: str) -> Figure:
-    """Draw P and Q in total, f and mean V of each part that becomes an island, over time."""
+    """Draw P and Q in total, f and mean V over time of each part that is an island when there are most."""
     figure = Figure(figsize=(7.4, 4.6), layout="constrained")
     grid = figure.subplots(2, 2, sharex=True)
-    width = widths(len(drawing.islands))
-    for number, (name, members) in enumerate(drawing.islands.items()):
-        history, nameplates = part_of(drawing.histories[case], drawing.nameplates, members)
+    islands = drawing.most_islands(case)
+    width = widths(len(islands))
+    for number, island in enumerate(islands.values()):
+        history, nameplates = part_of(drawing.histories[case], drawing.nameplates, island.inverters)
         colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
         values = (
             history.P.sum(axis=1) / 1e3,
@@ -149,8 +151,8 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
             metrics.mean_frequency(history, nameplates),
             metrics.mean_voltage(history, nameplates),
         )
-        label = drawing.island_titles.get(name, f"island of {name}")
         for panel, y in zip(grid.flat, values, strict=True):
+            label = drawing.island_title(island)
             panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
     name_panel(grid[0, 0], "Real power", "P in total (kW)")
     name_panel(grid[0, 1], "Reactive power", "Q in total (kvar)")

@@ -28,8 +28,7 @@ def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
         figures["plug-n-play"] = lambda: plug_and_play(drawing)
     if drawing.limited:
         figures["available-power"] = lambda: available_power(drawing)
-    if drawing.islands:
-        figures |= {f"microgrids_{case}": partial(microgrids, drawing, case) for case in drawing.histories}
+    figures |= {f"microgrids_{case}": partial(microgrids, drawing, case) for case in drawing.island_intervals}
     return figures
 
 

@@ -77,13 +77,13 @@ def experiment(name: str) -> Experiment:
     scenario, feeder = load_scenario(name)
     nameplates = Nameplates.of(feeder.inverters)
     events = [(event.label, event.t_s) for event in scenario.events]
-    histories = {}
+    cases = {}
+    opened = windows(events, scenario.time.end_s)
     for case in scenario.cases:
         recorded, outcome = ran(name, case)
         assert not outcome.broke
         assert outcome.reproducible
-        histories[case] = History.of(nameplates.names, recorded.rows)
-    opened = windows(events, scenario.time.end_s)
-    cases = {case: CaseRecord(history=history, windows=opened) for case, history in histories.items()}
+        history = History.of(nameplates.names, recorded.rows)
+        cases[case] = CaseRecord(history=history, windows=opened, events=recorded.events)
     found = find(scenario, feeder, cases)
-    return Experiment(nameplates, histories, found)
+    return Experiment(nameplates, {case: record.history for case, record in cases.items()}, found)

@@ -15,10 +15,11 @@ from netem.schema.node_fault import NodeFault, Skew
 from plant.equipment import Feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.numbers.departures import compare
+from scenarios.live.numbers.live_figures import live_drawing
 from scenarios.live.numbers.live_report import write_report
 from scenarios.results.event_windows import CaseRecord, windows
 from scenarios.results.findings import find
-from scenarios.results.history import History
+from scenarios.results.history import History, history_of
 from scenarios.results.metrics_file import RunMetrics, metrics_json
 from scenarios.results.record import Recorded, Recorder
 from scenarios.results.report import plain
@@ -203,18 +204,12 @@ def test_a_live_switch_opens_a_window_as_the_scenarios_events_do(
     assert ", ".join(one.label for one in opened.not_reached) == not_reached
 
 
-def test_what_people_did_is_an_event_of_what_happened() -> None:
-    """Islands after each event are those of the switches as they stood, and each live event says what it was."""
+def test_each_live_event_says_what_people_did() -> None:
+    """What they operate in one step is one event, with a label of its own."""
     compared = compare(
         *one_case("islanding"), [switch(2.5), switch(2.5, name="sw9 (18-135)"), switch(5, "closed")], 7.0
     )
 
-    assert [(event.label, event.open, event.close) for event in compared.happened.events] == [
-        ("event1", ("13-152",), ()),
-        ("live at 2.5 s", ("67s-67",), ()),
-        ("event2", *(getattr(one_case("islanding")[0].events[1], key) for key in ("open", "close"))),
-        ("live at 5 s", (), ("67s-67",)),
-    ]
     assert compared.live == {
         "live at 2.5 s": "switch sw1_2 (67s-67) opened; switch sw9 (18-135) opened",
         "live at 5 s": "switch sw1_2 (67s-67) closed",
@@ -261,9 +256,8 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     recorder = Recorder()
     run_inprocess(plant, agents, recorder)
     history = History.of(tuple(row.name for row in feeder.inverters), recorder.rows)
-    found = find(
-        scenario, feeder, {"IV": CaseRecord(history=history, windows=windows([("event1", 1.0), ("event2", 4.0)], 7.0))}
-    )
+    came = windows([("event1", 1.0), ("event2", 4.0)], 7.0)
+    found = find(scenario, feeder, {"IV": CaseRecord(history=history, windows=came, events=recorder.events)})
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, recorded, 8.0)
@@ -346,7 +340,8 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     )
     history = History.of(switched.inverters, switched.rows)
     came = [(event.label, event.t_s) for event in events]
-    found = find(whole, feeder, {"IV": CaseRecord(history=history, windows=windows(came, whole.time.end_s))})
+    opened = windows(came, whole.time.end_s)
+    found = find(whole, feeder, {"IV": CaseRecord(history=history, windows=opened, events=switched.events)})
     ran = RunMetrics(scenario=whole, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
     metrics, report = account(tmp_path, switched, 8.5)
@@ -371,3 +366,20 @@ def test_what_people_switched_is_measured_as_a_scenario_with_the_same_events_is(
     assert "live at 2.5 s" in report.splitlines()[1]
     assert "live at 2.5 s: switch sw1_2 (67s-67) opened; live at 7.5 s: switch sw1_2 (67s-67) closed" in report
     assert "paper's Table" not in report
+
+
+def test_figures_have_the_islands_that_a_person_made(switched: Recorded) -> None:
+    """From the moment at which the tie is opened to that at which it is closed; the scenario tells of neither."""
+    scenario, feeder = one_case("islanding")
+    departures = compare(scenario, feeder, switched.events, switched.ended)
+    drawing = live_drawing(departures, scenario, feeder, history_of(switched), switched.events)
+    intervals = drawing.island_intervals["IV"]
+
+    assert [(it.start, it.end, list(it.islands)) for it in intervals] == [
+        (2.5, 4.0, ["inv1", "inv4"]),
+        (4.0, 7.5, ["inv1", "inv4"]),
+    ]
+    assert [drawing.island_title(island) for island in drawing.most_islands("IV").values()] == [
+        "microgrid 1",
+        "island of inv4",
+    ]

@@ -11,7 +11,7 @@ from matplotlib.image import imread
 
 from plant.tables import read_feeder
 from scenarios.results.history import History, Nameplates
-from scenarios.results.island_membership import IslandInterval
+from scenarios.results.island_membership import Island, IslandInterval
 from scenarios.results.plots.drawing import Drawing, Mark
 from scenarios.results.plots.marks import GAP, LETTER, placed
 from scenarios.results.plots.run_figures import draw, draw_all
@@ -90,8 +90,8 @@ def test_no_curve_hides_another_that_it_lies_upon(cases: list[str]) -> None:
 
 def test_a_microgrid_is_no_mean_of_all_inverters() -> None:
     """Its frequency and voltage are means of its own inverters, and the axes say so."""
-    islands = {"inv1": ("inv1", "inv2", "inv3"), "inv4": ("inv4", "inv5", "inv6")}
-    page = draw(replace(drawing("IV"), islands=islands), "microgrids_IV")
+    islands = {"inv1": Island(("inv1", "inv2", "inv3"), False), "inv4": Island(("inv4", "inv5", "inv6"), False)}
+    page = draw(replace(drawing("IV"), island_intervals={"IV": [IslandInterval(4.0, 7.0, islands)]}), "microgrids_IV")
 
     assert [axes.get_ylabel() for axes in page.axes[2:]] == ["mean of its GFM, f (Hz)", "mean of its inverters, V (pu)"]
 
@@ -189,14 +189,10 @@ def test_values_that_are_no_numbers_do_not_stop_a_figure(tmp_path: Path) -> None
 def test_where_there_are_islands_the_worst_is_drawn() -> None:
     """Their mean hides what is wrong: here one is 0.03 Hz too fast, and the other two 0.015 Hz too slow."""
     it = drawing("IV")
-    islands: dict[str, tuple[str, ...]] = {
-        "inv1": ("inv1", "inv2", "inv3"),
-        "inv4": ("inv4", "inv5", "inv6"),
-        "inv7": ("inv7", "inv8", "inv9"),
-    }
+    islands = {f"inv{i}": Island((f"inv{i}", f"inv{i + 1}", f"inv{i + 2}"), False) for i in (1, 4, 7)}
     history = it.histories["IV"]
     history.f[history.t > 4.0] = 60.0 + np.repeat([-0.015, 0.03, -0.015], 3)
-    page = draw(replace(it, island_intervals=[IslandInterval(4.0, 7.0, islands)]), "overview")
+    page = draw(replace(it, island_intervals={"IV": [IslandInterval(4.0, 7.0, islands)]}), "overview")
 
     line = next(line for line in page.axes[0].get_lines() if line.get_label() == "IV: made up")
     drawn = np.asarray(line.get_ydata())

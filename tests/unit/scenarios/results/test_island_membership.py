@@ -1,0 +1,95 @@
+"""Islands of tables and figures: those that the plant recorded, not those that the scenario plans."""
+
+from __future__ import annotations
+
+from math import inf
+
+import numpy as np
+import pytest
+
+import gridpeers as gp
+from scenarios.results.event_windows import Window
+from scenarios.results.island_membership import island_intervals, islands_at_end
+from scenarios.results.plots.case_figures import measured
+from scenarios.results.plots.drawing import drawing_of
+from scenarios.results.plots.run_figures import figures_of
+from scenarios.schema import load_scenario
+from wire.messages import PlantEvent
+
+TIE = {"inv1": ("inv1", "inv2", "inv3", "inv4", "inv5", "inv6"), "inv7": ("inv7", "inv8", "inv9")}
+"""Islands that the open switch sw2_3 leaves, by name."""
+
+
+@pytest.fixture(scope="module")
+def waiting() -> gp.Result:
+    """Two islands at 60 Hz, whose switch waits until the end of the run: their voltages are 2.7 % apart."""
+    events = [
+        {"label": "islanding", "t_s": 0.4, "open": ["13-152"]},
+        {"label": "parting", "t_s": 1.0, "open": ["sw2_3"]},
+        {"label": "rejoining", "t_s": 2.0, "close": ["sw2_3"], "synchronised": True},
+    ]
+    keys = {"event": events, "time.end_s": 3.0, "plant.sync_check.V_pu": 0.02, "paper": ""}
+    return gp.load("islanding").replace(keys).run("IV")
+
+
+def test_a_switch_that_never_closes_leaves_two_islands_in_the_tables(waiting: gp.Result) -> None:
+    """Each has its own measures, and what is shared has none over both, though the scenario plans one island."""
+    assert waiting.events.kind.tolist()[-1] == "warning"
+    assert list(waiting.islands.index) == [(window, name) for window in ("parting", "rejoining") for name in TIE]
+    assert waiting.islands.MPSI["rejoining"].max() < 0.001
+    assert np.isnan(waiting.metrics.MPSI["rejoining"])
+    assert "MPSI" not in waiting.metrics.reasons["rejoining"]
+
+
+def test_a_switch_that_never_closes_leaves_two_islands_in_the_figures(waiting: gp.Result) -> None:
+    """They show the worse of both to the end of the run, and each alone in a figure of its own."""
+    drawing = waiting.drawing()
+
+    assert [(it.start, it.end) for it in drawing.island_intervals["IV"]] == [(1.0, inf)]
+    assert {name: island.inverters for name, island in drawing.most_islands("IV").items()} == TIE
+    assert "microgrids_IV" in figures_of(drawing)
+    errors = np.abs(waiting.record.V[-1] / drawing.nameplates.V_nom - 1.0)
+    assert measured(drawing, "IV", "V_error")[-1] == max(errors[:6].mean(), errors[6:].mean())
+
+
+def test_cases_of_one_run_have_islands_of_their_own(waiting: gp.Result) -> None:
+    """Where a switch waits, or opens, in one case alone, the others have none, and no figure of any."""
+    scenario, feeder = load_scenario("islanding")
+    recorded = {"I": [], "IV": [_operated(1.0, "opened")]}
+    drawing = drawing_of(scenario, feeder, dict.fromkeys(recorded, waiting.record), recorded, [])
+
+    assert list(drawing.island_intervals) == ["IV"]
+    assert [name for name in figures_of(drawing) if name.startswith("microgrids")] == ["microgrids_IV"]
+    ours, whole = (measured(drawing, case, "V_error")[-1] for case in ("IV", "I"))
+    assert ours > whole
+
+
+def _operated(t: float, text: str) -> PlantEvent:
+    closed = "closed" in text
+    return PlantEvent(t=t, kind="switch", subject="97s-97", text=f"switch sw2_3 (97s-97) {text}", closed=closed)
+
+
+def test_a_window_has_the_islands_of_its_end() -> None:
+    """Its steady values are of then; what operates at the very end belongs to the next window."""
+    scenario, feeder = load_scenario("islanding")
+    names = tuple(name for members in TIE.values() for name in members)
+    events = [_operated(1.0, "opened"), _operated(2.5, "closed in step"), _operated(3.0, "opened")]
+    intervals = island_intervals(scenario, feeder, names, events)
+
+    assert [(it.start, it.end, len(it.islands)) for it in intervals] == [
+        (-inf, 1.0, 1),
+        (1.0, 2.5, 2),
+        (2.5, 3.0, 1),
+        (3.0, inf, 2),
+    ]
+    found = [len(islands_at_end(intervals, Window(label="", start=1.0, end=end))) for end in (2.0, 2.5, 3.0, 3.1)]
+    assert found == [2, 2, 1, 2]
+
+
+def test_an_inverter_that_only_people_started_is_in_its_island() -> None:
+    """The scenario lets no inverter 10 join; the columns of the history have it."""
+    scenario, feeder = load_scenario("islanding")
+    _, apart = island_intervals(scenario, feeder, ("inv1", "inv10", "inv7"), [_operated(1.0, "opened")])
+
+    assert "inv10" in {name for island in apart.islands.values() for name in island.inverters}
+    assert [island.fed for island in apart.islands.values()] == [True, False]
