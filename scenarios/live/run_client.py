@@ -102,7 +102,12 @@ class RunClient:
     @property
     def plant(self) -> bool:
         """Whether the plant's token is there."""
-        return bool(self._tokens.epochs)
+        return bool(self.epochs)
+
+    @property
+    def epochs(self) -> set[int]:
+        """Epochs of the plants of this run whose tokens are there."""
+        return self._tokens.epochs
 
     @property
     def present(self) -> list[str]:
@@ -123,7 +128,7 @@ class RunClient:
             message = decode(payload)
         except RejectedError:  # nothing depends on a visitor
             return None
-        of_plant = message.sender == PLANT and message.epoch in self._tokens.epochs
+        of_plant = message.sender == PLANT and message.epoch in self.epochs
         match self.keys.parts(key), message:
             case ("status", name), AgentStatus():
                 believed = message.sender == name
