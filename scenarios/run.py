@@ -35,7 +35,7 @@ from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
-from scenarios.schema.plugin_keys import checks_of, claims_of
+from scenarios.schema.plugin_keys import checks_of, checks_off, claims_of
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.open_files import too_few_files
 from wire.driver.output import OutputLostError
@@ -224,7 +224,7 @@ def verdicts_on(
 
     scenario, folder = request.scenario, request.folder / case
     checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, record.events, folder)
-    return judge_case(checked, checks_of(scenario), stop)
+    return judge_case(checked, checks_of(scenario), stop, checks_off(scenario))
 
 
 def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:

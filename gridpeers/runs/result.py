@@ -28,7 +28,7 @@ from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
 from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.schema import scenario_model as model
-from scenarios.schema.plugin_keys import checks_of, claims_of
+from scenarios.schema.plugin_keys import checks_of, checks_off, claims_of
 from wire.messages import PlantEvent
 from wire.schema.suggestion import suggestion
 
@@ -107,7 +107,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
             file = self.folder / checks_file.FILE
             self._checks = self._folder.read(file.name, checks_file.read_verdicts) if file.exists() else {}
         if case not in self._checks:
-            self._checks[case] = judge_case(self[case].checked_case, checks_of(self._spec))
+            self._checks[case] = judge_case(self[case].checked_case, checks_of(self._spec), off=checks_off(self._spec))
         return self._checks[case]
 
     @property

@@ -80,6 +80,18 @@ def chosen_checks(entries: Iterable[str | Mapping[str, Any]]) -> dict[str, Plugi
     return found
 
 
+def switched_off(entries: Iterable[str | Mapping[str, Any]]) -> tuple[str, ...]:
+    """Return the names of the checks of every run that a scenario's entries take out.
+
+    Examples
+    --------
+    >>> switched_off([{"use": "steady", "off": True}, {"use": "rating", "P_limit_pu": 1.2}])
+    ('steady',)
+    """
+    chosen = chosen_checks(entries)
+    return tuple(name for name in ALWAYS if name not in chosen)
+
+
 def check_name(entry: str | Mapping[str, Any]) -> str:
     """Return the name of an entry in the verdict: its own, or the last part of its reference.
 

@@ -6,8 +6,9 @@ from typing import Literal
 
 import msgspec
 
-CheckStatus = Literal["passed", "failed", "not judged"]
-"""Not judged: the record has no data for the check, or the run never was in a state that it is about."""
+CheckStatus = Literal["passed", "failed", "not judged", "off"]
+"""Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario
+takes the check out of the verdict."""
 
 SHOWN_VIOLATIONS = 20
 """Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`."""
@@ -17,6 +18,9 @@ MOST_VIOLATIONS = 1_000_000
 
 INTERRUPTED = "interrupted"
 """Reason of a check that was not judged because somebody ended the run while it, or one before it, judged."""
+
+SWITCHED_OFF = "switched off by the scenario"
+"""Reason of a check that is off."""
 
 
 class NotJudgedError(Exception):
@@ -65,7 +69,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     status: CheckStatus
     """Its judgement."""
     reason: str = ""
-    """Why it was not judged, or, of a check that raised an error, why it failed."""
+    """Why it was not judged, is off, or, of a check that raised an error, why it failed."""
     violations: tuple[Violation, ...] = ()
     """The violations, the first `SHOWN_VIOLATIONS` as the check gave them."""
     count: int = 0
@@ -80,17 +84,21 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
-    """Return the verdict of a case on one line: how many passed, and each that failed.
+    """Return the verdict of a case on one line: how many passed, each that is off, and each that failed.
 
     Examples
     --------
     >>> summary((CheckVerdict(check="rating", status="passed"), CheckVerdict(check="heal", status="not judged")))
     '1 of 1 checks passed, 1 not judged'
+    >>> summary((CheckVerdict(check="rating", status="passed"), CheckVerdict(check="steady", status="off")))
+    '1 of 1 checks passed, steady switched off'
     """
     passed = sum(verdict.status == "passed" for verdict in verdicts)
     failed = [verdict for verdict in verdicts if verdict.status == "failed"]
-    idle = len(verdicts) - passed - len(failed)
+    off = [verdict.check for verdict in verdicts if verdict.status == "off"]
+    idle = len(verdicts) - passed - len(failed) - len(off)
     line = f"{passed} of {passed + len(failed)} checks passed" + (f", {idle} not judged" if idle else "")
+    line += f", {', '.join(off)} switched off" if off else ""
     ended = [verdict.check for verdict in verdicts if verdict.status == "not judged" and verdict.reason == INTERRUPTED]
     late = [f"{', '.join(ended)} not judged: {INTERRUPTED}"] if ended else []
     return "; ".join([line, *late, *(verdict.sentence for verdict in failed)])

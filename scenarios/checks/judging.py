@@ -17,6 +17,7 @@ from scenarios.checks.check_verdict import (
     INTERRUPTED,
     MOST_VIOLATIONS,
     SHOWN_VIOLATIONS,
+    SWITCHED_OFF,
     CheckVerdict,
     NotJudgedError,
     Violation,
@@ -53,9 +54,9 @@ class JudgingStop:
 
 
 def judge_case(
-    case: CheckedCase, checks: Mapping[str, Plugin], stop: JudgingStop | None = None
+    case: CheckedCase, checks: Mapping[str, Plugin], stop: JudgingStop | None = None, off: Iterable[str] = ()
 ) -> tuple[CheckVerdict, ...]:
-    """Return the verdict of each check on a case.
+    """Return the verdict of each check on a case; those that are off come last.
 
     A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged.
 
@@ -67,9 +68,12 @@ def judge_case(
         The checks by their names in the verdict (`check_registry.chosen_checks`).
     stop : JudgingStop, optional
         Takes a request to end: this check and all further ones are not judged. Without it the request goes through.
+    off : Iterable[str], optional
+        Names of checks that the scenario switches off (`check_registry.switched_off`).
     """
     with np.errstate(all="ignore"):  # a value that is no number is within no limit, or has its own reason
-        return tuple(_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items())
+        judged = [_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items()]
+    return *judged, *(CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in off)
 
 
 def _unless_stopped(name: str, plugin: Plugin, case: CheckedCase, stop: JudgingStop | None) -> CheckVerdict:

@@ -19,7 +19,7 @@ from netem.models.own_fault import FAULTS
 from netem.schema.netem import Netem
 from plant.equipment import Feeder, InverterRow
 from scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
-from scenarios.checks.check_registry import CHECKS, check_name, chosen_checks
+from scenarios.checks.check_registry import CHECKS, check_name, chosen_checks, switched_off
 from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
 from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
 from scenarios.schema.participants import with_agent
@@ -80,6 +80,11 @@ def claims_of(scenario: ScenarioModel) -> list[Plugin]:
 def checks_of(scenario: ScenarioModel) -> dict[str, Plugin]:
     """Return the checks that judge a scenario's runs, by their names in the verdict."""
     return chosen_checks(scenario.checks)
+
+
+def checks_off(scenario: ScenarioModel) -> tuple[str, ...]:
+    """Return the names of the checks of every run that a scenario switches off."""
+    return switched_off(scenario.checks)
 
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:

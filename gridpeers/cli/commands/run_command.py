@@ -70,7 +70,8 @@ def run(
         bool, typer.Option("--self-check", help="Test afterwards whether emulated links did what the scenario says.")
     ] = False,
     require_checks: Annotated[
-        bool, typer.Option("--require-checks", help="Exit code 1 also if a check fails, which else is only shown.")
+        bool,
+        typer.Option("--require-checks", help="Exit code 1 also if a check fails; one that is not judged has not."),
     ] = False,
     out: Annotated[
         Path | None,
@@ -86,7 +87,8 @@ def run(
     """Run a scenario and show its results, beside published ones.
 
     Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed (with
-    --require-checks a check, too), 2 bad usage or a bad file, 3 the run broke.
+    --require-checks a check, too; one that cannot be judged, or is off, has not failed), 2 bad usage or a bad file, 3
+    the run broke.
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """

@@ -23,7 +23,7 @@ from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
-from scenarios.schema.plugin_keys import checks_of
+from scenarios.schema.plugin_keys import checks_of, checks_off
 from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
@@ -58,7 +58,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
         scenario, feeder, case, record.history, record.windows, record.events, metrics.folder / case
     )
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
-    checks = {case: judge_case(checked, checks_of(scenario), stop)}
+    checks = {case: judge_case(checked, checks_of(scenario), stop, checks_off(scenario))}
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from scenarios.catalogue_files import CATALOGUE
+from scenarios.checks.check_registry import ALWAYS
 from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
@@ -217,6 +218,25 @@ def test_a_failed_claim_is_exit_code_1(elsewhere: Path) -> None:
     assert code == 1
     assert "FAIL" in text
     assert "never" in text
+
+
+@pytest.mark.parametrize(("check", "exit_code"), [("fails", 1), ("cannot_judge", 0)])
+def test_a_required_check_that_fails_is_exit_code_1_and_one_that_is_not_judged_is_0(
+    check: str, exit_code: int, elsewhere: Path
+) -> None:
+    """A check that the run gives no occasion for has not failed; the line says that it was not judged."""
+    judges = "def fails(case):\n    return [gp.Violation(text='late')]\n"
+    judges += "def cannot_judge(case):\n    raise gp.NotJudgedError('no cut')\n"
+    (elsewhere / "mine.py").write_text(f"import gridpeers as gp\n{judges}")
+    off = ", ".join(f'{{ use = "{name}", off = true }}' for name in ALWAYS)
+    (elsewhere / "short.toml").write_text(f'checks = ["mine:{check}", {off}]\n{SHORT}')
+
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--require-checks", "--out", "here")
+
+    assert code == exit_code, text
+    said = {"fails": "0 of 1 checks passed, ", "cannot_judge": "0 of 0 checks passed, 1 not judged, "}[check]
+    assert f"CHECKS  case I: {said}frequency, voltage, power_sharing" in text
+    assert "last_words switched off" in text
 
 
 def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(

@@ -193,10 +193,12 @@ def test_a_scenario_names_checks_of_its_own_and_other_limits() -> None:
     own = [{"use": f"{HERE}:Nadir", "least_Hz": 59.99}, {"use": "frequency", "name": "tight", "within_s": 0.5}]
     run = gp.load("islanding").replace({"checks": [*keys, *own], "time.end_s": 4.5}).run("IV")
 
-    assert list(run.checks.index) == [*(name for name in ALWAYS if name != "steady"), "Nadir", "tight"]
+    assert list(run.checks.index) == [*(name for name in ALWAYS if name != "steady"), "Nadir", "tight", "steady"]
     status = run.checks["status"]
     assert [status[name] for name in ("frequency", "rating", "Nadir", "tight")] == ["passed", *3 * ["failed"]]
     assert run.checks["limit"]["Nadir"] == 59.99
+    assert (status["steady"], run.checks["text"]["steady"]) == ("off", "switched off by the scenario")
+    assert ", steady switched off; " in summary(run.check_verdicts)
     assert run.check_verdicts == read_verdicts(run.folder / "checks.json")["IV"]
 
 
