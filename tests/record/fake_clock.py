@@ -33,6 +33,7 @@ from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Listen, Log, Publish
 from wire.backlog import Loss
 from wire.codec import decode, encode
+from wire.journal import RecordLevel
 from wire.keys import Keys
 from wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
 
@@ -121,10 +122,16 @@ class FakeClockRun:
         """Let a process stand still for some time (s)."""
         self._frozen[name] = self.now + seconds
 
-    def lose(self, name: str, key: str, number: int) -> None:
+    def lose(self, name: str, key: str, number: int, kind: str = "excess") -> None:
         """Have a process drop messages on a key (without `gridpeers/<run>/`) unread, as in a flood."""
-        self._nodes[name].lost(Loss(self.keys.prefix + key, "excess", "4000 messages were waiting", number), self.now)
+        self._nodes[name].lost(Loss(self.keys.prefix + key, kind, "4000 messages were waiting", number), self.now)
         self._work(name)
+
+    def lose_sight(self, name: str, of: str, seconds: float) -> None:
+        """Have a process not see the token of another one for some time (s)."""
+        token = self._nodes[of].token
+        self._tell(token, name, appeared=False)
+        self._later(seconds, lambda: self._tell(token, name, appeared=True))
 
     def command(self, verb: Any, **further: Any) -> None:
         """Send the plant a command."""
@@ -254,6 +261,7 @@ def fake_clock_record(
     end: float = 1.0,
     netem: Netem | None = None,
     control: Control = ALL_FULL,
+    record: RecordLevel = "all",
     delay: Delay = at_once,
     happens: Callable[[FakeClockRun], None] = lambda run: None,
 ) -> RunRecord:
@@ -273,6 +281,8 @@ def fake_clock_record(
         Faults of emulated links; without it there are none.
     control : Control, optional
         Rule of control.
+    record : {"all", "decisions"}, optional
+        How much is recorded.
     delay : Delay, optional
         Of every message.
     happens : Callable[[FakeClockRun], None], optional
@@ -283,10 +293,10 @@ def fake_clock_record(
     if netem is not None:
         microgrids = {agent.name: agent.microgrid for agent in agents}
         links = EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=True).to_tree()
-    plant = replace(plant, clock="wall", links=links, record="all", wait_for_agents=5.0)
-    agents = tuple(replace(agent, clock="wall", links=links, record="all", deadline=0.0) for agent in agents)
+    plant = replace(plant, clock="wall", links=links, record=record, wait_for_agents=5.0)
+    agents = tuple(replace(agent, clock="wall", links=links, record=record, deadline=0.0) for agent in agents)
     info = RecordInfo(
-        level="all",
+        level=record,
         scenario="toy",
         case="case",
         toml="",

@@ -19,8 +19,9 @@ class MessageAccount:
 
     Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision
     has the neighbours' states of the tick before; in wall-clock time every number arrives, from the first one on that
-    does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`). A process that is silent for
-    long, as it is frozen, begins anew: its links are given up.
+    does between two processes, or once both have been there for 7 s (`LINKED_WITHIN`), unless its receiver says at that
+    time that it dropped as many. A process that is silent for long, as it is frozen, begins anew: its links are given
+    up.
     """
 
     in_flight_s: Annotated[float, Unit("s"), Plausible("the time of a message on its way", 0.0, 60.0)] = 1.0
@@ -42,12 +43,14 @@ class MessageAccount:
                 if link[1] == agent:
                     yield from _missing(link, missing, f"states of {link[0]} neither heard nor lost")
         if not (found.counts or links):
-            raise NotJudgedError("no agent listens to another")
+            raise NotJudgedError("no agent listens to another" if found.has_arrivals else _NO_ARRIVALS)
 
     def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
         """Return what is missing on each link whose receiver keeps no account of it."""
         if found.simulated:
             return {link: missing for link, missing in found.unheard.items() if link not in found.counts}
+        if not found.has_arrivals:
+            return {}
         return {link: self._not_arrived(found, link) for link in sorted(found.arrivals)}
 
     def _not_arrived(self, found: CommunicationSummary, link: Link) -> Missing:
@@ -58,6 +61,9 @@ class MessageAccount:
                 if t <= until:
                     missing.add(t)
         return missing
+
+
+_NO_ARRIVALS = 'in wall-clock time a record = "decisions" does not have what arrived'
 
 
 def _missing(link: Link, missing: Missing, text: str) -> Iterator[Violation]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from netem.ledger import LinkCounts, LinkTrace
+from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.heals import Heal, Heals
 from scenarios.checks.communication.link_accounts import (
     ArrivalAccount,
@@ -87,6 +88,11 @@ class CommunicationSummary:
     def simulated(self) -> bool:
         """Whether the run kept simulated time."""
         return self.info.simulated
+
+    @property
+    def has_arrivals(self) -> bool:
+        """Whether the record has what arrived: in simulated time decisions say it."""
+        return self.simulated or self.info.level == "all"
 
     @property
     def agents(self) -> tuple[str, ...]:
@@ -175,6 +181,11 @@ class SummaryPass:
         """Take a state that arrived in wall-clock time."""
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.heard(link, epoch, number)
+
+    def dropped(self, link: Link, states: DroppedStates) -> None:
+        """Take the number of states that a receiver dropped in wall-clock time."""
+        if not self._simulated and self._names.issuperset(link):
+            self._arrivals.dropped(link, states)
 
     def counts(self, link: Link, counts: LinkCounts) -> None:
         """Take the account of an emulated link up to now."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from math import inf
 
 from netem.ledger import LinkTrace
+from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.neighbour_use import Uses
 from scenarios.checks.communication.record_pass import Link, SentState
 from scenarios.checks.communication.sent_states import SentStates
@@ -182,6 +183,8 @@ class ArrivalAccounts:
         """When each agent was there, in the order of time."""
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
         self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
+        self._dropped: dict[Link, deque[DroppedStates]] = defaultdict(lambda: deque(maxlen=WAIT))
+        """What receivers say that they dropped, until all states are known that it may be."""
         self._links_of: dict[str, list[Link]] = defaultdict(list)
         self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=3))
         """The last accounts of each link: what comes later than others did is still missing there."""
@@ -214,8 +217,28 @@ class ArrivalAccounts:
         if len(arrived) > MOST_WAITING:
             del arrived[next(iter(arrived))]
 
+    def dropped(self, link: Link, states: DroppedStates) -> None:
+        """Note that a receiver dropped some states."""
+        self.listens(link)
+        self._dropped[link].append(states)
+
     def flush(self, until: float) -> None:
-        """Close the accounts of what was sent up to a run time (s), as far as it has come."""
+        """Close the accounts of what was sent up to a run time (s), as far as it has come, or was dropped."""
+        self._close(until)
+        for link, dropped in self._dropped.items():
+            while dropped and dropped[0].until <= until:
+                self._excuse(link, dropped.popleft())
+
+    def _excuse(self, link: Link, dropped: DroppedStates) -> None:
+        """Take as many states that are missing off the accounts as were dropped, the oldest first."""
+        left = dropped.number
+        for account in self._open[link]:
+            missing = [key for key, t in account.late.items() if dropped.since <= t <= dropped.until]
+            for key in missing[:left]:
+                del account.late[key]
+            left -= min(left, len(missing))
+
+    def _close(self, until: float) -> None:
         for src, states in self._states.items():
             links = self._links_of.get(src, ())
             while states and states[0].t <= until:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
+from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.record_pass import Link, SentState, end_of, opened, read_into
 from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
@@ -39,6 +40,8 @@ class RecordContent:
     file is damaged there, or the rest of a journal is missing."""
     heard: Mapping[Link, dict[tuple[int, int], str]] = field(default_factory=dict)
     """Wall-clock time: epoch and number of each state that arrived, and why it was rejected, if it was."""
+    dropped: Mapping[Link, list[DroppedStates]] = field(default_factory=dict)
+    """Wall-clock time: numbers of states that a receiver dropped, without more."""
     counts: Mapping[Link, LinkCounts] = field(default_factory=dict)
     """Last account of each emulated link."""
     traces: Mapping[Link, list[LinkTrace]] = field(default_factory=dict)
@@ -91,6 +94,7 @@ def read_content(path: Path) -> RecordContent:
         decisions={agent: _in_order(of, simulated=simulated) for agent, of in all_of_it.decisions.items()},
         holes=end.holes,
         heard=all_of_it.arrivals,
+        dropped=all_of_it.drops,
         counts=all_of_it.last_counts,
         traces=all_of_it.traces,
         unreadable=end.unreadable,
@@ -105,6 +109,7 @@ class _Content:
         self.states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
         self.decisions: dict[str, dict[tuple[int, int], Decision]] = defaultdict(dict)
         self.arrivals: dict[Link, dict[tuple[int, int], str]] = defaultdict(dict)
+        self.drops: dict[Link, list[DroppedStates]] = defaultdict(list)
         self.last_counts: dict[Link, LinkCounts] = {}
         self.traces: dict[Link, list[LinkTrace]] = defaultdict(list)
 
@@ -116,6 +121,9 @@ class _Content:
 
     def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         self.arrivals[link][epoch, number] = rejected
+
+    def dropped(self, link: Link, states: DroppedStates) -> None:
+        self.drops[link].append(states)
 
     def counts(self, link: Link, counts: LinkCounts) -> None:
         self.last_counts[link] = counts

@@ -16,6 +16,7 @@ import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
+from scenarios.checks.communication.dropped_states import OF_SENDER, DroppedStates, DropTimes
 from scenarios.emulation.link_reports import data_of
 from scenarios.record.decision_entries import is_periodic
 from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage
@@ -23,7 +24,7 @@ from scenarios.record.journal_reader import entry_of, raw_entries, values_of, wh
 from scenarios.record.record_file import RecordFile
 from wire.bounds import MOST_COUNT
 from wire.codec import sound
-from wire.journal import Decision, Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
+from wire.journal import Decision, Entry, Exchange, MessageReference, ReceivedMessage, RejectedCount, SentMessage
 from wire.journal_keys import kind_of, name_of
 from wire.messages import PLANT, Journal, LinkReport, State
 from wire.timing.clock import time_of
@@ -60,6 +61,10 @@ class RecordSink(Protocol):
 
     def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
         """Take a state that arrived in wall-clock time, and why it was rejected, if it was."""
+        ...
+
+    def dropped(self, link: Link, states: DroppedStates) -> None:
+        """Take the number of states that a receiver dropped unread in wall-clock time, or too late to note each."""
         ...
 
     def counts(self, link: Link, counts: LinkCounts) -> None:
@@ -134,6 +139,7 @@ class _Pass:
         self._most = int((self._t_end + self._ahead) / self._T_c) if self._simulated else MOST_COUNT
         """Largest number of a state: in simulated time that of its tick."""
         self._coverage: dict[str, JournalCoverage] = {}
+        self._drop_times = DropTimes(self._t_end, file.info.plant.speed)
         fields = file.info.fields.get(State.__name__, ())
         self._length = len(fields)
         self._places = {name: fields.index(name) for name in _VALUES if name in fields}
@@ -157,6 +163,7 @@ class _Pass:
     def _journal(self, journal: Journal) -> None:
         """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
         before, ticks = self._unreadable, list[int]()
+        self._drop_times.note(journal)
         for entry in self._entries(journal):
             if isinstance(entry, Decision | Exchange):
                 if not self._is_timely(journal, time_of(entry.tick, self._T_c) if self._simulated else journal.t):
@@ -214,6 +221,13 @@ class _Pass:
             case MessageReference(key=key, epoch=epoch, seq=number, rejected=rejected):
                 if kind_of(key) == "state":
                     self._sink.heard((name_of(key), journal.sender), epoch, number, rejected)
+            case ReceivedMessage(key=key):
+                if kind_of(key) == "state":
+                    self._rejected(journal, name_of(key), entry)
+            case RejectedCount(key=key, kind=kind):
+                if kind_of(key) == "state" and kind in OF_SENDER:
+                    link = name_of(key), journal.sender
+                    self._sink.dropped(link, self._drop_times.of(journal.sender, entry))
             case Decision() if journal.sender != PLANT:
                 self._sink.decision(journal.sender, journal.epoch, entry)
 
@@ -237,6 +251,17 @@ class _Pass:
             self._sink.state(sender, state)
         else:
             self._unreadable += 1
+
+    def _rejected(self, journal: Journal, src: str, message: ReceivedMessage) -> None:
+        """Take a message that was rejected: it arrived, if it is a state of the sender that its key names."""
+        link = src, journal.sender
+        if message.rejected == "excess" and not message.payload:  # of records until 2026-11: it stands for any number
+            count = RejectedCount(message.at, message.key, message.rejected, MOST_COUNT)
+            self._sink.dropped(link, self._drop_times.of(journal.sender, count))
+        elif message.rejected not in _NOT_SOUND:
+            match values_of(message.payload):
+                case {"sender": str(sender), "epoch": int(epoch), "seq": int(number)} if sender == src:
+                    self._sink.heard(link, epoch, number, message.rejected)
 
     def _report(self, report: LinkReport) -> None:
         try:
@@ -272,6 +297,9 @@ _STATE_KEYS = ("state", "set_points")
 
 _END = object()
 """Behind the last entry of a part."""
+
+_NOT_SOUND = ("corrupt", "garbled")
+"""Kinds of rejected messages whose numbers are not those that were sent."""
 
 _AHEAD = 5.0
 """How far (s of wall time) an entry may be ahead of its journal: far more than clocks of two processes differ by."""

@@ -55,6 +55,8 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
     for link, heard in content.heard.items():
         for (epoch, number), why in heard.items():
             entries.append((of[link[0], epoch, number] + late, 2, partial(sums.heard, link, epoch, number, why)))
+    for link, dropped in content.dropped.items():
+        entries += [(each.until + late, 3, partial(sums.dropped, link, each)) for each in dropped]
     for traces in content.traces.values():
         entries += [(trace.t[-1] + late if trace.t else 0.0, 3, partial(sums.trace, trace)) for trace in traces]
     for _, _, take in sorted(entries, key=lambda entry: entry[:2]):
