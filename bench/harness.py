@@ -14,6 +14,9 @@ from statistics import median
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
+GRIDPEERS = (sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()")
+"""The command `gridpeers` of this interpreter."""
+
 
 def options(text: str | None, **defaults: float | str) -> argparse.Namespace:
     """Return the options of the command line, each of its default's type; `text` is the docstring of the bench."""

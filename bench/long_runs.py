@@ -28,15 +28,13 @@ from typing import NamedTuple
 import numpy as np
 
 import gridpeers as gp
-from bench.harness import load, machine, say
+from bench.harness import GRIDPEERS, load, machine, say
 from bench.peers.long_parts import LONG_RUNS, long_part
 from bench.peers.measured import Measure, measure_in_turns
 from bench.peers.publish import keep, publish
 from bench.peers.stored import DATA_FILE
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.results.record import PARTIAL
-
-COMMAND = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()"]
 
 FLAT = 0.05
 """Growth from the warm-up to the end, as a part of the size after the warm-up, that counts as none."""
@@ -115,14 +113,14 @@ def command_of(kind: str, folder: Path, given: argparse.Namespace) -> list[str]:
     out = ["--out", str(folder / "here")]
     if kind == "live":
         words = ["--run", f"long{os.getpid()}", "--listen", free_endpoint(), "--speed", f"{given.speed:g}"]
-        return [*COMMAND, "up", "islanding", *words, *out]
+        return [*GRIDPEERS, "up", "islanding", *words, *out]
     changes: dict[str, object] = {"time.end_s": simulated(kind, given)}
     if kind == "links":
         changes["link"] = [{"on": "* <-> *", "delay": 0.01}]
     file = folder / "long.toml"
     file.write_text(gp.load("islanding").replace({"paper": None}).replace(changes).to_toml(), encoding="utf-8")
     driver = "processes" if kind == "processes" else "inprocess"
-    return [*COMMAND, "run", str(file), "--case", "IV", "--driver", driver, *out]
+    return [*GRIDPEERS, "run", str(file), "--case", "IV", "--driver", driver, *out]
 
 
 def watch(kind: str, given: argparse.Namespace) -> dict[str, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
 import sys
 import tempfile
 from contextlib import ExitStack
@@ -15,9 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Self
 import numpy as np
 import pytest
 
+from bench.live_processes import BUILD, END, LiveProcesses
 from bench.scale import write_scenario
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.live.run_address import RunAddress
 from scenarios.live.run_client import RunClient
 from scenarios.live.run_requests import ask, plant_status
 from scenarios.schema import load_scenario
@@ -26,19 +24,15 @@ from wire.codec import decode
 from wire.messages import LoadSetting, Measurement, Pacing
 
 if TYPE_CHECKING:
+    import subprocess
     from types import TracebackType
 
     from playwright.sync_api import Browser, Page
-
-COMMAND = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()"]
 
 RUN = "viewed"
 
 HOSTS = 8
 """Processes that share the agents of a larger run."""
-
-BUILD = 300.0
-"""Longest wait (s) for a run to begin: the plant may be compiled first."""
 
 OFFSETS = 20
 """Round trips to the page by which its clock is compared with ours."""
@@ -68,25 +62,25 @@ class ViewedRun:
         self._arrivals: list[tuple[float, float]] = []
         """Arrival (s, monotonic) and run time (s) of each measurement."""
         self._taken = 0
-        self._stack, self._children = ExitStack(), list[subprocess.Popen[bytes]]()
+        self._stack = ExitStack()
         self._browser: Browser | None = None
 
     def __enter__(self) -> Self:
         """Start plant and agents; return once the run has gone on for some seconds."""
         signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by SIGTERM"))  # so that the context ends, too
         try:
-            self.folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="gridpeers-view-")))
-            self.endpoint = free_endpoint()
-            place = ["--run", RUN, "--listen", self.endpoint, "--wait", "120"]
+            folder = Path(self._stack.enter_context(tempfile.TemporaryDirectory(prefix="gridpeers-view-")))
+            self._processes = self._stack.enter_context(LiveProcesses(folder, RUN))
+            place = [*self._processes.listen, "--wait", "120"]
             if self.agents == 9:
-                self._start("run", "up", "islanding", *place)
+                self._processes.start("run", "up", "islanding", *place)
             else:
-                file = write_scenario(self.folder, self.agents, self.period, 3600.0, ["ring"], apart=False)
+                file = write_scenario(folder, self.agents, self.period, 3600.0, ["ring"], apart=False)
                 names = [row.name for row in load_scenario(str(file))[1].inverters]
-                self._start("plant", "plant", str(file), *place)
+                self._processes.start("plant", "plant", str(file), *place)
                 for k in range(HOSTS):
-                    self._start(f"host{k}", "agent", *names[k::HOSTS], *self._where())
-            self.client = self._stack.enter_context(RunClient(RunAddress(run=RUN, connect=(self.endpoint,))))
+                    self._processes.start(f"host{k}", "agent", *names[k::HOSTS], *self._processes.connect)
+            self.client = self._stack.enter_context(RunClient(self._processes.address))
             self.client.find_plant(BUILD)
             self.client.listen(self.client.keys.measurement("inv1"))
             self.listen_until(lambda: len(self._arrivals) * self.period > 6.0, BUILD)  # after both events
@@ -100,25 +94,7 @@ class ViewedRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End the page, the browser and all processes."""
-        for child in self._children:
-            if child.poll() is None:
-                child.send_signal(signal.SIGTERM)
-        for child in self._children:
-            try:
-                child.wait(20.0)
-            except subprocess.TimeoutExpired:
-                child.kill()
-                child.wait()
         self._stack.close()
-
-    def _where(self) -> list[str]:
-        return ["--run", RUN, "--connect", self.endpoint]
-
-    def _start(self, name: str, *words: str) -> subprocess.Popen[bytes]:
-        with (self.folder / f"{name}.log").open("wb") as log:
-            child = subprocess.Popen([*COMMAND, *words], stdout=log, stderr=log, cwd=self.folder)
-        self._children.append(child)
-        return child
 
     # ---------------------------------------------------------------- the page
 
@@ -134,11 +110,10 @@ class ViewedRun:
 
     def open_view(self) -> View:
         """Start a view and open its page; return once it shows numbers of now."""
-        server = self._start("view", "view", "--port", "0", *self._where())
-        log, end = self.folder / "view.log", monotonic() + 60.0
-        while not (found := re.search(r"open (http://\S+) in a browser", log.read_text())):
+        server, end = self._processes.start("view", "view", "--port", "0", *self._processes.connect), monotonic() + 60.0
+        while not (found := re.search(r"open (http://\S+) in a browser", self._processes.printed("view"))):
             if server.poll() is not None or monotonic() > end:
-                raise RuntimeError(f"the view has not begun: {log.read_text()}")
+                raise RuntimeError(f"the view has not begun: {self._processes.printed('view')}")
             self.listen(0.1)
         page = self.browser.new_page(viewport={"width": 1500, "height": 1000})
         page.goto(found[1])
@@ -149,8 +124,7 @@ class ViewedRun:
         """Close the page, and end its server."""
         view.page.close()
         view.server.send_signal(signal.SIGTERM)
-        view.server.wait(20.0)
-        self._children.remove(view.server)
+        view.server.wait(END)
 
     # ---------------------------------------------------------------- the run
 
@@ -172,7 +146,7 @@ class ViewedRun:
         end = monotonic() + longest
         while not done():
             if monotonic() > end:
-                logs = "\n".join(path.read_text()[-500:] for path in self.folder.glob("*.log"))
+                logs = "\n".join(path.read_text()[-500:] for path in self._processes.folder.glob("*.log"))
                 raise RuntimeError(f"the run has not come so far within {longest:g} s:\n{logs}")
             for key, payload, at in self.client.take(0.05):
                 if key == self.client.keys.measurement("inv1"):

@@ -7,8 +7,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 
-GRIDPEERS = (sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()")
-"""The command `gridpeers` of this interpreter."""
+from bench.harness import GRIDPEERS
 
 LONGEST = 300
 """Most characters of a reason."""

@@ -7,7 +7,8 @@ import tempfile
 from pathlib import Path
 from time import perf_counter, sleep
 
-from bench.peers.failure import DEADLINE, GRIDPEERS, checked
+from bench.harness import GRIDPEERS
+from bench.peers.failure import DEADLINE, checked
 from bench.peers.our_case import CASE, OurCase
 from scenarios.results.record import PARTIAL
 

@@ -12,7 +12,8 @@ from msgspec.structs import replace
 
 import gridpeers as gp
 from agents.agent_config import AgentConfig
-from bench.peers.failure import GRIDPEERS, checked
+from bench.harness import GRIDPEERS
+from bench.peers.failure import checked
 from bench.scale import timed_run
 from plant.build import build_plant
 from plant.plant_config import PlantConfig

@@ -5,13 +5,11 @@ from __future__ import annotations
 import os
 import re
 import signal
-import subprocess
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from typing import NamedTuple
 
-from bench.long_runs import COMMAND
 from bench.soak.soak_actions import SETTLE, SoakAction
 from bench.soak.watched_run import PATIENCE, WatchedRun
 
@@ -142,14 +140,7 @@ class SoakRun(WatchedRun):
         """Start an agent, and measure how long it takes until it and the others use each other."""
         began, deaf = monotonic(), self._client.renewals
         self._logs += 1
-        with (self._folder / f"{name}-{self._logs}.log").open("wb") as log:
-            agent = subprocess.Popen(
-                [*COMMAND, "agent", name, *self._where()],
-                stdout=log,
-                stderr=log,
-                cwd=self._folder,
-                start_new_session=True,
-            )
+        agent = self._processes.start(f"{name}-{self._logs}", "agent", name, *self._processes.connect)
         self._started[name], self._pids[name] = agent, (agent.pid, began)
         self._starting[agent.pid] = f"agent {name}", began
         others = self._others(name)

@@ -1,14 +1,11 @@
 """The run of a soak: its processes, the commands that it is given, and what is looked at while it is waited for.
 
-All processes are started as a user starts them: `gridpeers up` with a record, and `gridpeers agent` for every agent
-that comes back. Each is in a session of its own: the Ctrl-C of a terminal reaches the soak alone, which ends them in
-order.
+They are `gridpeers up` with a record, and `gridpeers agent` for every agent that comes back.
 """
 
 from __future__ import annotations
 
 import os
-import signal
 import subprocess
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -21,7 +18,9 @@ from typing import NamedTuple, Self
 import numpy as np
 
 import gridpeers as gp
-from bench.long_runs import COMMAND, processes, processor_time, size
+from bench.harness import GRIDPEERS
+from bench.live_processes import BUILD, LiveProcesses
+from bench.long_runs import processes, processor_time, size
 from bench.soak.judging import LAST_WORDS
 from bench.soak.late_steps import LateSteps, Start, late_steps
 from bench.soak.process_sizes import MachineTime, ProcessSize, machine_time, size_of, waiting_times
@@ -30,15 +29,10 @@ from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.checks.checks_file import FILE as CHECKS
 from scenarios.checks.checks_file import read_verdicts
 from scenarios.checks.communication.last_words_check import LastWords
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.live.run_address import RunAddress
 from scenarios.live.run_client import RunClient
 from scenarios.live.show.watching import RunSubscriber
 from scenarios.record.record_info import FILE as RECORD
 from wire.messages import PLANT
-
-BUILD = 300.0
-"""Longest wait (s) for the run to begin: the plant may be compiled first."""
 
 CALM = 6.0
 """Run time (s) at which both events of the scenario are over."""
@@ -126,7 +120,7 @@ class WatchedRun:
         self.problems: list[str] = []
         """What went wrong beside: a command that failed, a process that ended."""
         self._recorded = recorded
-        self._folder, self._endpoint, self._name = folder, free_endpoint(), f"soak{os.getpid()}"
+        self._processes = LiveProcesses(folder, f"soak{os.getpid()}")
         self._pids: dict[str, tuple[int, float]] = {}
         """Process and its start (s, monotonic) of the plant, the command and each agent."""
         self._started: dict[str, subprocess.Popen[bytes]] = {}
@@ -148,7 +142,7 @@ class WatchedRun:
     @property
     def here(self) -> Path:
         """Folder of the run."""
-        return self._folder / "run"
+        return self._processes.folder / "run"
 
     @property
     def steps(self) -> int:
@@ -158,15 +152,11 @@ class WatchedRun:
     def __enter__(self) -> Self:
         """Start all processes; return once the run is calm."""
         try:
-            self._log = self._stack.enter_context((self._folder / "up.log").open("wb"))
-            words = ["up", "islanding", "--run", self._name, "--listen", self._endpoint]
-            words += ["--out", str(self.here)] if self._recorded else []
+            self._stack.enter_context(self._processes)
+            out = ["--out", str(self.here)] if self._recorded else []
             born = monotonic()
-            self._up = subprocess.Popen(
-                [*COMMAND, *words], stdout=self._log, stderr=self._log, cwd=self._folder, start_new_session=True
-            )
-            where = RunAddress(run=self._name, connect=(self._endpoint,))
-            self._client = CountingClient(where, meet_agents=True)
+            self._up = self._processes.start("up", "up", "islanding", *self._processes.listen, *out)
+            self._client = CountingClient(self._processes.address, meet_agents=True)
             self._stack.callback(self._client.close)
             self._client.find_plant(BUILD)
             self._subscriber = RunSubscriber(self._client, self.monitor)
@@ -189,15 +179,6 @@ class WatchedRun:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """End all processes that still run."""
-        for process in (*self._started.values(), *([self._up] if hasattr(self, "_up") else [])):
-            if process.poll() is None:
-                process.send_signal(signal.SIGCONT)
-                process.send_signal(signal.SIGTERM)
-                try:
-                    process.wait(20.0)
-                except subprocess.TimeoutExpired:
-                    process.kill()
-                    process.wait()
         self._stack.close()
 
     def rest(self, seconds: float) -> None:
@@ -210,18 +191,13 @@ class WatchedRun:
     def _command(self, *words: str) -> str:
         """Run a command to its end; return what it printed."""
         began = monotonic()
-        process = subprocess.Popen(
-            [*COMMAND, *words, *self._where()],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=self._folder,
-            start_new_session=True,
-        )
+        process = self._processes.start("command", *words, *self._processes.connect)
         self._others_of_ours[process.pid] = began
         self._starting[process.pid] = f"gridpeers {words[0]}", began
         if not self._until(lambda: process.poll() is not None, PATIENCE):
             process.kill()
-        text = process.communicate()[0].decode(errors="replace")
+            process.wait()
+        text = self._processes.printed("command")
         self._others_of_ours.pop(process.pid)
         self._ready(process.pid)
         if process.returncode:
@@ -240,7 +216,8 @@ class WatchedRun:
         """End the run, and wait for its report."""
         self._look_at_sizes()  # an agent that came back may have come since the last look
         self._pids = {"command": self._pids["command"]}  # the others end now
-        down = subprocess.run([*COMMAND, "down", *self._where()], capture_output=True, text=True, timeout=PATIENCE)
+        words = [*GRIDPEERS, "down", *self._processes.connect]
+        down = subprocess.run(words, capture_output=True, text=True, timeout=PATIENCE)
         if down.returncode:
             self.problems.append(f"gridpeers down ended with {down.returncode}: {down.stdout}{down.stderr}".strip())
         began, peak = monotonic(), 0.0
@@ -257,11 +234,8 @@ class WatchedRun:
             report_s=took,
             peak_MB=float(peak),
             files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},
-            printed=(self._folder / "up.log").read_text(errors="replace"),
+            printed=self._processes.printed("up"),
         )
-
-    def _where(self) -> list[str]:
-        return ["--run", self._name, "--connect", self._endpoint]
 
     def _others(self, name: str) -> tuple[str, ...]:
         return tuple(other for other in self.agents if other != name)
@@ -310,6 +284,5 @@ class WatchedRun:
 
     def _need(self, sound: bool, why: str) -> None:
         if not sound:
-            self._log.flush()
-            last = (self._folder / "up.log").read_text(errors="replace").splitlines()[-8:]
+            last = self._processes.printed("up").splitlines()[-8:]
             raise SoakError("\n".join((why, *last)))
