@@ -67,7 +67,7 @@ def test_a_report_that_the_plant_passes_on_is_taken_and_an_order_of_anybody_else
 
 
 def test_only_the_answer_to_the_last_question_counts() -> None:
-    """An answer that nobody waits for any more would put the order out of step."""
+    """An answer that nobody waits for any more would put the order out of step; one that nobody asked for is told."""
     it = recorder(TelemetryStream())
     it.core.appeared(KEYS.alive_plant(7))
     it.hear(telemetry(0))
@@ -78,7 +78,23 @@ def test_only_the_answer_to_the_last_question_counts() -> None:
 
     assert asked is not None
     assert it.taken == [telemetry(0), telemetry(1)]
-    assert it.core.rejects.counts == {"stale": 1}
+    assert it.core.rejects.counts == {"unexpected": 1}
+
+
+def test_a_late_answer_of_a_busy_plant_is_neither_used_nor_told() -> None:
+    """Each question that waits for a second is asked again; the plant answers all of them, and that is no fault."""
+    it = recorder(TelemetryStream())
+    it.core.appeared(KEYS.alive_plant(7))
+    it.hear(telemetry(0))
+    asked = [it.core.question(now=QUIET + 1.0 + seconds) for seconds in (0.0, 1.5, 3.0)]
+    for seq, first in ((1, "9"), (2, "9"), (3, "1")):
+        it.hear(Answer(sender="plant", epoch=7, seq=seq, t=0.0, ok=True, text=first), KEYS.answer("fleet"))
+    it.hear(telemetry(1))
+
+    assert None not in asked
+    assert it.taken == [telemetry(0), telemetry(1)]
+    assert not it.core.rejects.counts
+    assert not it.core.rejects.has_lines
 
 
 def test_plants_that_have_gone_keep_no_place() -> None:
