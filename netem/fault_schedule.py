@@ -98,6 +98,10 @@ class FaultSchedule:
             for span in self.spans
         )
 
+    def after(self, t: float) -> FaultSchedule:
+        """Return the schedule without the entries that have ended by time t (s); it tells nothing of earlier times."""
+        return FaultSchedule(span for span in self.spans if span.to_s > t)
+
     def flat(self) -> tuple[Span, ...]:
         """Return the same without precedence: spans that do not overlap within a kind, by kind and time."""
         spans: list[Span] = []

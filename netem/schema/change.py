@@ -50,8 +50,15 @@ def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids:
     return schedule
 
 
+MOST_SPANS, PAST = 16, 60.0
+"""Faults of a link above which those are forgotten that ended some time (s of run time) before the last two changes: a
+change is about its own time, which is hardly ever before that of the change that came first."""
+
+
 class LinkSchedules:
     """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
+
+    They tell of the times of changes to come, so what has ended long ago is forgotten.
 
     Parameters
     ----------
@@ -70,6 +77,8 @@ class LinkSchedules:
 
     def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
         self._netem, self._microgrids = netem, microgrids
+        self._latest = -math.inf
+        """Time of the last change (s)."""
 
     @cached_property
     def _schedules(self) -> dict[Link, FaultSchedule]:
@@ -78,8 +87,11 @@ class LinkSchedules:
 
     def apply(self, change: Change) -> None:
         """Take up a change."""
-        for link, schedule in self._schedules.items():
-            self._schedules[link] = changed(schedule, change, link, self._microgrids)
+        over = min(self._latest, change.from_s) - PAST
+        self._latest = change.from_s
+        for link, before in self._schedules.items():
+            schedule = changed(before, change, link, self._microgrids)
+            self._schedules[link] = schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule
 
     def of(self, link: Link) -> FaultSchedule:
         """Return the schedule of a link after all changes so far."""
