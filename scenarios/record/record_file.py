@@ -9,8 +9,7 @@ run is still recorded.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Collection, Iterator
-from functools import lru_cache
+from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import BinaryIO, NamedTuple, get_args
@@ -30,6 +29,9 @@ from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, Record
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
 _TIMES = struct.Struct("<QQQ")
+
+RECENT = 8
+"""Chunks whose messages stay in memory."""
 
 MOST_CHUNK = 256_000_000
 """Most bytes of a chunk: far more than a writer of ours makes of a second."""
@@ -98,7 +100,8 @@ class RecordFile:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
         self.info: RecordInfo = self._info
         """The run."""
-        self._load: Callable[[int], tuple[RecordMessage, ...]] = lru_cache(maxsize=8)(self._load_chunk)
+        self._recent: dict[int, tuple[RecordMessage, ...]] = {}
+        """Messages of the chunks that were read last, by their places, the latest last."""
 
     @property
     def damage(self) -> tuple[str, ...]:
@@ -221,6 +224,15 @@ class RecordFile:
             raise RecordFileError(
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"
             ) from None
+
+    def _load(self, index: int) -> tuple[RecordMessage, ...]:
+        """Return the messages of a chunk; those of the last few stay, as readers go back and forth."""
+        # not an lru_cache of a method: in a cycle with its file it would stay in memory long after
+        messages = self._recent.pop(index) if index in self._recent else self._load_chunk(index)
+        self._recent[index] = messages
+        if len(self._recent) > RECENT:
+            del self._recent[next(iter(self._recent))]
+        return messages
 
     def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
         """Read a chunk."""
