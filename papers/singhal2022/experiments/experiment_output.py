@@ -136,6 +136,8 @@ class ExperimentTable:
     rows: Sequence[Sequence[TableCell]]
     digits: int = 3
     """Significant digits in Markdown; CSV has all."""
+    apart: int = 0
+    """Number of first columns whose values part it into tables of their own in Markdown."""
 
     def write(self, folder: Path) -> None:
         """Write table.csv and table.md into a folder."""
@@ -157,9 +159,24 @@ class ExperimentTable:
         |---|---|
         | full | 0.641 |
         | path | never |
+        >>> print(ExperimentTable(columns=("graph", "f (s)"), rows=rows[:1], apart=1).markdown(), end="")
+        **full**
+        <BLANKLINE>
+        | f (s) |
+        |---|
+        | 0.641 |
         """
-        lines = ["| " + " | ".join(self.columns) + " |", "|" + "---|" * len(self.columns)]
-        lines += ["| " + " | ".join(self._text(cell) for cell in row) + " |" for row in self.rows]
+        texts = [[self._text(cell) for cell in row] for row in self.rows]
+        names = dict.fromkeys(tuple(row[: self.apart]) for row in texts)
+        return "\n".join(
+            self._one(name, [row[self.apart :] for row in texts if tuple(row[: self.apart]) == name]) for name in names
+        )
+
+    def _one(self, name: tuple[str, ...], rows: Sequence[Sequence[str]]) -> str:
+        columns = self.columns[self.apart :]
+        lines = [f"**{', '.join(name)}**", ""] if name else []
+        lines += ["| " + " | ".join(columns) + " |", "|" + "---|" * len(columns)]
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
         return "\n".join(lines) + "\n"
 
     def _text(self, cell: TableCell) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -31,6 +31,14 @@ MEASURES: tuple[tuple[str, str, float, tuple[float, float], float], ...] = (
     ("S_max_pu", "largest S at the end (pu)", 1.2, (0.4, 1.4), 0.0),
 )
 """Measures, labels, the limit of the checks, ends of the axis, and the least value that is drawn."""
+
+LIMITS = {index: limit for index, _, limit, _, _ in MEASURES}
+
+LETTERS = {"MPSI": "P", "MQSI": "Q", "S_max_pu": "S"}
+"""Signs of measures that are out of their limits, beside the frequency."""
+
+INDEXES = (*LIMITS, "V_min_pu", "V_max_pu")
+"""Measures of the tables."""
 
 SIZES = (("P_set_W", 1e-3, " kW"), ("P_set", 1.0, ""), ("delay_s", 1.0, " s"))
 """Keys of a lie that are its size: key, factor, and unit in words."""
@@ -80,14 +88,49 @@ def hostile(sweep: SweepData) -> ExperimentResult:
     )
     table: list[tuple[TableCell, ...]] = []
     for case in GRAPHS:
-        for attack in attacks:
-            cells = []
-            for defence in defences:
-                f, MPSI, MQSI, S = (measured(case, attack, defence, index) for index, *_ in MEASURES)
-                low, high = (measured(case, attack, defence, index) for index in ("V_min_pu", "V_max_pu"))
-                cells.append(f"{f:.3f} / {MPSI:.2f} / {MQSI:.2f} / {S:.2f} / {low:.2f}..{high:.2f}")
-            table.append((case, attack, *cells))
-    return ExperimentResult(page=page, table=ExperimentTable(columns=("graph", "attack", *defences), rows=table))
+        for what, cell in CELLS.items():
+            for attack in attacks:
+                found = [{index: measured(case, attack, defence, index) for index in INDEXES} for defence in defences]
+                table.append((case, what, attack, *map(cell, found)))
+    columns = ("graph", "numbers", "attack", *defences)
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table, apart=2))
+
+
+def frequency_cell(found: Mapping[str, float]) -> str:
+    """Return the frequency error (Hz), bold out of its limit, with a letter for everything else that is out of its own.
+
+    Examples
+    --------
+    >>> frequency_cell({"f_off_Hz": 0.034, "MPSI": 0.02, "MQSI": 0.1, "S_max_pu": 0.56})
+    '**0.034** P'
+    >>> frequency_cell({"f_off_Hz": 0.004, "MPSI": 0.0, "MQSI": 0.3, "S_max_pu": 1.3})
+    '0.004 Q S'
+    """
+    out = [letter for index, letter in LETTERS.items() if found[index] > LIMITS[index]]
+    return " ".join([_bold_if_out(found, "f_off_Hz", ".3f"), *out])
+
+
+def sharing_cell(found: Mapping[str, float]) -> str:
+    """Return MPSI and MQSI, bold out of their limits."""
+    return f"{_bold_if_out(found, 'MPSI', '.2f')} / {_bold_if_out(found, 'MQSI', '.2f')}"
+
+
+def rating_cell(found: Mapping[str, float]) -> str:
+    """Return the largest apparent power, bold out of its limit, and the range of voltages (pu)."""
+    return f"{_bold_if_out(found, 'S_max_pu', '.2f')} / {found['V_min_pu']:.2f}..{found['V_max_pu']:.2f}"
+
+
+def _bold_if_out(found: Mapping[str, float], index: str, form: str) -> str:
+    text = f"{found[index]:{form}}"
+    return f"**{text}**" if found[index] > LIMITS[index] else text
+
+
+CELLS: Mapping[str, Callable[[Mapping[str, float]], str]] = {
+    "frequency error (Hz)": frequency_cell,
+    "MPSI / MQSI": sharing_cell,
+    "S / V (pu)": rating_cell,
+}
+"""The tables of a graph: their numbers, and a cell of them from what was measured."""
 
 
 def _unique(rows: Any, *columns: str) -> list[tuple[str, ...]]:
