@@ -1,9 +1,9 @@
 """Read the file of a record, whole or cut off, without trusting anything in it.
 
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
-half written, and no index at the end. So the index is not used: the reader goes from record to record, which takes one
-look at each chunk of about a second, and stops where the file ends or makes no sense. There it can go on later, if the
-run is still recorded.
+half written, and no index at the end. So no chunk is found by the index: the reader goes from record to record, which
+takes one look at each chunk of about a second, and stops where the file ends or makes no sense. There it can go on
+later, if the run is still recorded. The index tells of a chunk that is not met so: what begins it is damaged.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, Record
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
 _TIMES = struct.Struct("<QQQ")
+_FOOTER = 20
+"""Bytes of the record that ends a file."""
 
 RECENT = 8
 """Chunks whose messages stay in memory."""
@@ -94,6 +96,8 @@ class RecordFile:
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
         """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
         self._chunks: list[_ChunkPlace] = []
+        self._indexed: list[_ChunkPlace] = []
+        """The same chunks as the index at the end has them."""
         self._info: RecordInfo | None = None
         self._read_on()
         if self._info is None:
@@ -171,8 +175,9 @@ class RecordFile:
             if start + length > self._size:
                 self._cut("within a chunk" if opcode == Opcode.CHUNK else "within a record")
                 return
-            if opcode == Opcode.FOOTER:
+            if opcode == Opcode.FOOTER and length == _FOOTER:
                 self.complete = True
+                self._note_missing()
                 return
             if opcode == Opcode.CHUNK and length > _TIMES.size:
                 since, until, size = _TIMES.unpack(file.read(_TIMES.size))
@@ -181,6 +186,9 @@ class RecordFile:
                     self.holes.append((self.t_end, self.t_end))
                 else:
                     self._chunks.append(_ChunkPlace(start, length, since, until))
+            elif opcode == Opcode.CHUNK_INDEX and length > _TIMES.size:
+                since, until, offset = _TIMES.unpack(file.read(_TIMES.size))
+                self._indexed.append(_ChunkPlace(offset + _FRAME.size, 0, since, until))
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
             elif opcode == Opcode.METADATA:
@@ -189,6 +197,17 @@ class RecordFile:
             file.seek(self._offset)
         if not self._damage:
             self._cut("between two chunks")
+
+    def _note_missing(self) -> None:
+        """Note the chunks that only the index has: their first byte is damaged, so that they look like something else."""
+        found = {place.offset for place in self._chunks}
+        if len(self._indexed) <= len(found):  # every chunk is there, and an offset in the index may be damaged
+            return
+        for place in self._indexed:
+            if place.offset not in found and place.since <= place.until:
+                hole = place.since / 1e9, place.until / 1e9
+                self.holes.append(hole)
+                self._damage.append(f"a chunk cannot be found, from t = {hole[0]:.2f} s to {hole[1]:.2f} s")
 
     def _cut(self, where: str) -> None:
         at = f" after t = {self.t_end:.2f} s" if self._chunks else ""
