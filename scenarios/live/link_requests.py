@@ -14,7 +14,7 @@ from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import LinkStatus, decode_statuses
 from scenarios.live.run_address import UsageError
 from scenarios.live.run_client import NobodyError, RunClient
-from scenarios.live.run_requests import configurations, request
+from scenarios.live.run_requests import configurations, data_of, request
 from wire.messages import PLANT, Answer, LinkAcknowledgement
 from wire.schema.table_schema import Problem
 
@@ -26,11 +26,6 @@ class _LinkReply(msgspec.Struct, frozen=True):
     t: float
     asked: tuple[str, ...]
     receivers: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, answer: Answer) -> _LinkReply:
-        """Return the data of an answer."""
-        return msgspec.convert(answer.data, cls)
 
     @property
     def reached(self) -> tuple[str, ...]:
@@ -94,7 +89,7 @@ def check_link_command(command: LinkCommand, setup: EmulationConfig | None) -> N
 def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
     """Give a command and wait until every receiver concerned has taken it, or for `ACKNOWLEDGED` seconds."""
     answer, answers = _request(client, verb="link", link_command=command.to_tree())
-    reply = _LinkReply.of(answer)
+    reply = data_of(client, answer, _LinkReply)
     refused = {name: answers[name].text for name in reply.reached if name in answers and not answers[name].ok}
     silent = tuple(name for name in reply.reached if name != PLANT and name not in answers)
     return LinkCommandResult(
@@ -110,7 +105,7 @@ def command_links(client: RunClient, command: LinkCommand) -> LinkCommandResult:
 def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkStatus], tuple[str, ...]]:
     """Return the run time (s), the state of every link that has or had a fault, and the receivers without an answer."""
     answer, answers = _request(client, verb="links")
-    reply = _LinkReply.of(answer)
+    reply = data_of(client, answer, _LinkReply)
     statuses: dict[tuple[str, str], LinkStatus] = {}
     for name, acknowledgement in answers.items():
         if acknowledgement.ok:
@@ -123,4 +118,4 @@ def link_states(client: RunClient) -> tuple[float, dict[tuple[str, str], LinkSta
 
 
 def _request(client: RunClient, **command_fields: Any) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
-    return request(client, lambda answer: _LinkReply.of(answer).answers_needed, **command_fields)
+    return request(client, lambda answer: data_of(client, answer, _LinkReply).answers_needed, **command_fields)

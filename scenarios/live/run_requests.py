@@ -5,7 +5,7 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable, Iterator, Mapping
 from time import monotonic
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import msgspec
 
@@ -19,6 +19,9 @@ from wire.bounds import MOST_COUNT
 from wire.codec import encode
 from wire.driver.command_line import command_line
 from wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
+from wire.printable import printable
+
+T = TypeVar("T")
 
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
@@ -99,7 +102,24 @@ def _of_number(
 def plant_status(client: RunClient) -> PlantStatus:
     """Return the state of the run as the plant reports it."""
     answer, _ = request(client, lambda answer: set(), verb="status")
-    return msgspec.convert(answer.data, PlantStatus)
+    return data_of(client, answer, PlantStatus)
+
+
+def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
+    """Return the data of an answer.
+
+    Raises
+    ------
+    NobodyError
+        If they are something else: anybody may answer as a plant on open links, and one of another version may.
+    """
+    try:
+        return msgspec.convert(answer.data, kind)
+    except msgspec.ValidationError as error:
+        raise NobodyError(
+            f"the plant of {client.where} answers what cannot be read here: {printable(str(error), 200)}; is it of "
+            "another version?"
+        ) from None
 
 
 def has_left(client: RunClient, name: str) -> bool:

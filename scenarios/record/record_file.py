@@ -199,7 +199,7 @@ class RecordFile:
             self._cut("between two chunks")
 
     def _note_missing(self) -> None:
-        """Note the chunks that only the index has: their first byte is damaged, so that they look like something else."""
+        """Note the chunks that only the index has: their first byte is damaged, so they look like something else."""
         found = {place.offset for place in self._chunks}
         if len(self._indexed) <= len(found):  # every chunk is there, and an offset in the index may be damaged
             return

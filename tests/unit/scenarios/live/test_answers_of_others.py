@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from scenarios.live.run_requests import request
+import pytest
+
+from scenarios.live.link_requests import link_states
+from scenarios.live.run_client import NobodyError
+from scenarios.live.run_requests import plant_status, request
 from wire.codec import decode
 from wire.keys import Keys
 from wire.messages import Answer, AnyMessage, Command, LinkAcknowledgement
@@ -16,7 +20,8 @@ class Client:
 
     id, where, keys = "z1", "run demo", Keys("demo")
 
-    def __init__(self) -> None:
+    def __init__(self, **data: Any) -> None:
+        self._data = {"number": 3, "t": 2.0, "asked": ["inv2"], "receivers": ["inv2"]} | data
         self.numbers: list[int] = []
         self._waiting: list[AnyMessage] = []
 
@@ -31,9 +36,8 @@ class Client:
                 Answer(sender="plant", seq=number, ok=False, text="lie", data={}, **common),
                 LinkAcknowledgement(sender="inv2", seq=0, ok=True, text="lie", reply_to=self.id, **common),
             ]
-        data = {"number": 3, "t": 2.0, "asked": ["inv2"], "receivers": ["inv2"]}
         self._waiting += [
-            Answer(sender="plant", seq=command.seq, ok=True, text="true", data=data, **common),
+            Answer(sender="plant", seq=command.seq, ok=True, text="true", data=self._data, **common),
             LinkAcknowledgement(sender="inv2", seq=2, ok=True, text="old", reply_to=self.id, **common),
             LinkAcknowledgement(sender="inv2", seq=3, ok=False, text="true", reply_to=self.id, **common),
         ]
@@ -65,3 +69,11 @@ def test_numbers_of_commands_cannot_be_foreseen() -> None:
 
     assert len({*client.numbers}) == 20
     assert client.numbers != sorted(client.numbers)
+
+
+def test_an_answer_of_another_form_is_told_in_one_line() -> None:
+    """Of a plant of another version, or of whoever speaks as one on open links: nothing else is raised."""
+    with pytest.raises(NobodyError, match=r"run demo answers what cannot be read here: .* `phase`; is it of another"):
+        plant_status(Client())  # type: ignore[arg-type]
+    with pytest.raises(NobodyError, match=r"Expected `int`, got `bool` - at `\$.number`; is it of another version"):
+        link_states(Client(number=True))  # type: ignore[arg-type]
