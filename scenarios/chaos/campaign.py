@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -113,14 +113,14 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
     campaign : Campaign
         What to do.
     folder : ChaosFolder
-        Its folder.
+        Its folder; runs of which it has the results are not done again.
     tell : Tell
         Takes the progress: runs, then failures that are shrunk.
     """
     failures: dict[str, Failure] = {}
     try:
         _tell_runs(campaign, folder, tell)
-        with closing(_results(campaign)) as results:
+        with closing(_results(campaign, folder.rows)) as results:
             for row in results:
                 first = folder.rows.get(row.number)
                 folder.add(row if first is None else compared(first, row, REPEATS))
@@ -162,20 +162,26 @@ def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Fail
     return summary
 
 
-def _results(campaign: Campaign) -> Generator[ChaosRow, None, None]:
-    """Yield the results of all runs, and those of the repeated ones once more."""
+def _results(campaign: Campaign, rows: Mapping[int, ChaosRow]) -> Generator[ChaosRow, None, None]:
+    """Yield the results of all runs that have none, and those of the repeated ones once more."""
     text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
-    calls = ((text, seed, number, schedule, driver) for number, schedule in _numbered(campaign))
+    calls = ((text, seed, number, schedule, driver) for number, schedule in _numbered(campaign, dict(rows)))
     yield from on_this_machine(calls, 1 if driver == "processes" else campaign.jobs, run_number)
 
 
-def _numbered(campaign: Campaign) -> Iterator[tuple[int, Schedule]]:
-    """Yield number and schedule of each run as they are asked for; of repeated ones again, at the end of the batch."""
+def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
+    """Yield number and schedule of each run as they are asked for; of repeated ones again, at the end of the batch.
+
+    Runs that are known are left out, and the second time of those that are known to repeat.
+    """
     for batch in range(-(-campaign.runs // BATCH)):
-        runs = [*enumerate(drawn(campaign.base, campaign.seed, batch), batch * BATCH)]
-        runs = runs[: campaign.runs - batch * BATCH]
-        yield from runs
-        yield from (run for run in runs if run[0] % REPEATED == 0)
+        numbers = range(batch * BATCH, min((batch + 1) * BATCH, campaign.runs))
+        once = {number for number in numbers if number not in known}
+        twice = {n for n in numbers if n % REPEATED == 0 and (n in once or REPEATS not in known[n].passed)}
+        if not once | twice:
+            continue
+        schedules = dict(zip(numbers, drawn(campaign.base, campaign.seed, batch), strict=False))
+        yield from ((number, schedules[number]) for which in (once, twice) for number in sorted(which))
 
 
 def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:

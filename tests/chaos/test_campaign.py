@@ -16,8 +16,8 @@ from scenarios.catalogue_files import CATALOGUE
 from scenarios.chaos import campaign as campaigns
 from scenarios.chaos import schedule_search
 from scenarios.chaos.campaign import Campaign, run_campaign
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import run_scenario
+from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
+from scenarios.chaos.chaos_run import ChaosRow, run_scenario
 from scenarios.chaos.disturbance import counted_kinds
 from scenarios.checks.check_registry import ALWAYS
 from scenarios.schema import load_scenario
@@ -209,3 +209,73 @@ def test_a_scenario_that_fails_by_itself_is_refused(elsewhere: Path) -> None:
     assert "small, case IV: violated without any disturbance: frequency failed" in text
     assert "switch these checks off" in text
     assert not (elsewhere / "out").exists()
+
+
+def test_an_interrupted_campaign_goes_on(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With --resume only what is missing is done, and the table is that of a campaign in one go."""
+    _small(elsewhere)
+    words = ("chaos", "small.toml", "--seed", "3", "--jobs", "1")
+    invoke(*words, "--runs", "4", "--out", "whole")
+    invoke(*words, "--runs", "2", "--out", "part")
+    done: list[int] = []
+    run_number = campaigns.run_number
+
+    def counted(text: str, seed: int, number: int, *rest: Any) -> Any:
+        done.append(number)
+        return run_number(text, seed, number, *rest)
+
+    monkeypatch.setattr(campaigns, "run_number", counted)
+    code, text = invoke(*words, "--runs", "4", "--resume", "part")
+
+    whole, part = ([{**row, "took_s": ""} for row in _rows(elsewhere / name)] for name in ("whole", "part"))
+    assert all(row["status"] == "passed" for row in whole[:2]), "or they would be done again"
+    assert done == [2, 3]
+    assert part == whole
+    assert (code, text.endswith("\n\nResults: part/\n")) == (0, True)
+    assert (elsewhere / "part" / "status.txt").read_text(encoding="utf-8") == "complete\n"
+
+
+def test_runs_that_violated_are_done_again_when_a_campaign_goes_on(elsewhere: Path) -> None:
+    """The table has their sentences in one cell; and half a line, of a kill -9 while it was written, is left out."""
+    base = base_in(_small(elsewhere))
+    table = elsewhere / "chaos.csv"
+    folder = ChaosFolder(elsewhere, base, 3, "")
+    folder.add(ChaosRow(number=0, schedule=(), passed=("ends", "repeats")))
+    folder.add(ChaosRow(number=1, schedule=(), violated={"frequency": "60.1 Hz; too high"}))
+    folder.add(ChaosRow(number=2, schedule=(), collapse="no control prevents it"))
+    table.write_text(table.read_text(encoding="utf-8") + "3,3000003,pas", encoding="utf-8")
+
+    assert kept_rows(elsewhere, base, 3, 9) == {0: folder.rows[0]}
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--resume", "none"), "--resume none: no folder of a campaign: No such file or directory; name one with"),
+        (
+            ("--resume", "old", "--seed", "4"),
+            "run 0 has seed 3000000, with --seed 4 it would be 4000000; give",
+        ),
+        (("--resume", "old", "--runs", "1"), "--resume old: it has run 1 already; give --runs 2 or more"),
+        (("--resume", "other"), "--resume other: its scenario.toml is not the scenario and case"),
+        (("--resume", "bad"), "--resume bad: line 2 of chaos.csv cannot be read: "),
+        (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
+    ],
+)
+def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[str, ...], why: str) -> None:
+    """One line says what does not fit, before anything is run, and the folder stays as it is."""
+    base = base_in(_small(elsewhere))
+    for name in ("old", "other", "bad"):
+        (elsewhere / name).mkdir()
+        folder = ChaosFolder(elsewhere / name, base, 3, "")
+        folder.add(ChaosRow(number=0, schedule=()))
+        folder.add(ChaosRow(number=1, schedule=()))
+    (elsewhere / "other" / "scenario.toml").write_text("", encoding="utf-8")
+    table = elsewhere / "bad" / "chaos.csv"
+    table.write_text(table.read_text(encoding="utf-8").replace("3000000", "many"), encoding="utf-8")
+    before = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
+
+    code, text = invoke("chaos", "small.toml", "--seed", "3", *options)
+
+    assert (code, why in " ".join(text.split())) == (2, True), text
+    assert {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()} == before

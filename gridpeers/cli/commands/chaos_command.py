@@ -37,6 +37,10 @@ def chaos(
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
     ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Folder of a campaign that was interrupted, or is to be longer: go on there."),
+    ] = None,
 ) -> None:
     """Disturb a scenario at random; judge and shrink what fails.
 
@@ -46,6 +50,8 @@ def chaos(
 
     Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, 130 interrupted by
     Ctrl-C: what came until then is written.
+
+    A campaign that was interrupted goes on with --resume, and the same scenario and seed.
 
     Example:  gridpeers chaos islanding --runs 200
     """
@@ -58,20 +64,27 @@ def chaos(
     from rich.console import Console
 
     from scenarios.chaos.campaign import Campaign
-    from scenarios.chaos.chaos_folder import ChaosFolder
+    from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import FolderError, new_folder, shown
+    from scenarios.results.run_files import FolderError, new_folder, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
+    if out is not None and resume is not None:
+        fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     base = ChaosBase(spec, feeder)
+    try:
+        rows = {} if resume is None else kept_rows(resume, base, seed, runs)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
     campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     console = Console()
     _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     try:
-        path = new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
-        folder = ChaosFolder(path, base, seed, command_line(*words))
+        path = resume or new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
+        set_status(path, "running")
+        folder = ChaosFolder(path, base, seed, command_line(*words), rows)
     except (FolderError, OSError) as error:
         fail([str(error)], BAD_INPUT)
     summary = _carry_out(console, campaign, folder)
