@@ -32,6 +32,9 @@ LONGEST = 20
 GAP = 0.06
 """Least distance between two texts (inches)."""
 
+ROUNDING = 1e-9
+"""By how much less (inches) is no less: an edge at GAP from a text may come out so by the last bit."""
+
 MOST = 12.0
 """Lines in an inch of a frame that leave its curves to be seen."""
 
@@ -107,7 +110,7 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
         for standing in best:
             edge = max(standing.edge, leftmost - GAP)  # nothing stands further left any more, so these are alike
             for option in each:
-                if option.placed is not None and option.start < edge + GAP:
+                if option.placed is not None and option.start < edge + GAP - ROUNDING:
                     continue
                 end, cost = max(edge, option.end), standing.cost + option.price
                 if end not in found or cost < found[end].cost:

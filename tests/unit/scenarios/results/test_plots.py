@@ -160,6 +160,14 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
     assert inches_per_s < 2.0 or len(found) == 4
 
 
+def test_words_that_have_room_are_written_wherever_they_are() -> None:
+    """Two events side by side: both have their words at any time, whatever the last bit of their edges."""
+    for t in np.arange(1.0, 3.0, 0.01):
+        found = placed([Mark("a", t, "xx"), Mark("b", t + 0.1, "yy")], 1.0)
+
+        assert [(text, side) for text, _, side in found] == [("a\nxx", "right"), ("b\nyy", "left")]
+
+
 def test_a_thousand_events_leave_the_curves_to_be_seen() -> None:
     """An hour in which people change something all the time: only events with words have a line, and all are placed."""
     it = drawing("IV")
