@@ -9,7 +9,7 @@ from typing import Annotated
 from agents.agent_config import MAX_AGE
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judged_time import Since
+from scenarios.checks.judged_time import Since, require_time
 from wire.schema.plausible import Plausible, Unit
 
 
@@ -29,6 +29,7 @@ class StaleValues:
         found = case.communication
         if not found.used:
             raise NotJudgedError("no decision used a neighbour's value")
+        require_time(case.history, self.since_s)
         limits = {
             config.name: self.max_age_s or config.control.degraded_communication.max_age or MAX_AGE
             for config in found.info.agents

@@ -269,6 +269,12 @@ def test_a_window_that_ends_too_soon_after_the_time_of_a_check_is_not_judged(sou
     assert verdict(sound, check, since_s=6.5).status == "not judged"
 
 
+@pytest.mark.parametrize("check", ["frequency", "voltage", "power_sharing", "steady", "rating", "stale_values"])
+def test_a_check_whose_time_begins_after_the_run_has_not_passed(sound: CheckedCase, check: str) -> None:
+    """The run ends at 7 s: nothing of it was judged."""
+    assert verdict(sound, check, since_s=7.1).status == "not judged"
+
+
 def test_an_inverter_whose_agent_was_killed_can_be_left_out() -> None:
     """It stays at its set-points, and does not share the load that is left; the others do."""
     killed = ran_with((("case.IV.node", repr([{"name": "inv5", "from_s": 2.0, "kill": True}])),)).checked_case
