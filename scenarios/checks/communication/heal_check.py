@@ -8,7 +8,6 @@ from typing import Annotated
 
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.communication.heals import Heal
 from wire.schema.plausible import Plausible, Unit
 
@@ -29,7 +28,7 @@ class Rejoined:
             for heal in found.heals:
                 if heal.link[1] != agent:
                     continue
-                took = self._took(found, heal)
+                took = self._took(heal)
                 judged += took is not None
                 if took is not None and took > self.within_s:
                     yield Violation(
@@ -45,19 +44,11 @@ class Rejoined:
                 f"after no cut was its link whole, and both of its agents at work, for {self.within_s:g} s"
             )
 
-    def _took(self, found: CommunicationSummary, heal: Heal) -> float | None:
+    def _took(self, heal: Heal) -> float | None:
         """Return after what time (s) a new value was used, infinity if never; None if that cannot be told.
 
-        It cannot if the link was lost again too soon; nor unless one process of the sender speaks to its neighbours,
-        and one of the receiver decides, for the limit's time after.
+        It cannot if they were never both at work, with a whole link, for the limit's time.
         """
         if heal.took is not None:
             return heal.took
-        if heal.waited < inf:
-            return inf if heal.waited > self.within_s else None
-        src, dst = (found.sent[name] for name in heal.link)
-        until = heal.t + self.within_s
-        if until > heal.lost_again:
-            return None
-        lasts = all(any(first <= heal.t and last >= until for first, last in it.epochs.values()) for it in (src, dst))
-        return inf if lasts and src.spoke_at >= until and dst.decided_at >= until else None
+        return inf if heal.waited > self.within_s else None

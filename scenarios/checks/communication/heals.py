@@ -38,8 +38,10 @@ class Heal:
     which one of them stood still, as it was paused, do not count."""
     lost_again: float = inf
     """When (s) the link was next cut, or began to lose messages."""
-    waited: float = inf
-    """For how long (s) both had been at work without a break then, if nothing new was used before; else infinite."""
+    at_work_since: float | None = None
+    """Since when (s) both have been at work without a break, if they are, and the sender has spoken since the heal."""
+    waited: float = 0.0
+    """Longest time (s) for which both were at work without a break, the link was whole and nothing new was used."""
 
 
 class Heals:
@@ -111,23 +113,27 @@ class Heals:
                 src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
                 begins = max(_at_work_since(src, used, heal.t), _at_work_since(dst, state.number, heal.t))
                 heal.took = max(0.0, state.t - begins)
-            elif state.t > heal.lost_again:
-                heal.waited = self._waited(heal, state)
-        self._waiting[agent] = [heal for heal in waiting if heal.took is None and heal.waited == inf]
+            else:
+                self._note_work(heal, state)
+        self._waiting[agent] = [heal for heal in waiting if heal.took is None and state.t <= heal.lost_again]
 
-    def _waited(self, heal: Heal, state: SentState) -> float:
-        """Return for how long (s) both had been at work without a break when a link was lost again.
-
-        In simulated time numbers are ticks, so that pauses show; else it is the time in which both had a process.
-        """
+    def _note_work(self, heal: Heal, state: SentState) -> None:
+        """Note for how long both have been at work, with an own state of the receiver that uses nothing new."""
         src, dst = (self._sent[name] for name in heal.link)
-        begins = _at_work_since(dst.window_at(state.t), state.number, heal.t)
-        if self._T_c is not None:
-            last, window = round(heal.lost_again / self._T_c) - 1, src.window_at(state.t)
-            begins = max(begins, _at_work_since(window, last, heal.t) if window.decided(last) else inf)
-            return max(0.0, heal.lost_again - begins)
-        lives = (min(last, heal.lost_again) - max(first, begins) for first, last in src.epochs.values())
-        return max((0.0, *lives))
+        window, number, T_c = dst.window_at(state.t), state.number, self._T_c
+        goes_on = window.decided(number - 1)
+        if T_c is not None:  # numbers are ticks, so that pauses of the sender show, and states that it did not tell
+            theirs = src.window_at(state.t)
+            speaks, works = theirs.spoke(number - 1), theirs.decided(number - 1)
+        else:
+            speaks, works = src.spoke_at >= heal.t, any(first <= state.t <= last for first, last in src.epochs.values())
+        if not works:
+            heal.at_work_since = None
+        elif heal.at_work_since is None or not goes_on:
+            before = (window.t(number - 1) or 0.0) if goes_on else inf
+            heal.at_work_since = (heal.t if before <= heal.t else state.t) if speaks else None
+        if heal.at_work_since is not None:
+            heal.waited = max(heal.waited, min(state.t, heal.lost_again) - heal.at_work_since)
 
     def _is_lossy(self, link: Link, t: float) -> bool:
         """Return whether a link is planned to lose messages at a time (s): a cut may hold one and give it later."""

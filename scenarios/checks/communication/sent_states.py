@@ -26,8 +26,8 @@ class SentStates:
         self._windows: dict[int, StateWindow] = {}
         self.epochs: dict[int, tuple[float, float]] = {}
         """Run time (s) of the first and of the last state of each process, by its epoch."""
-        self.spoke_at = self.decided_at = -inf
-        """Run time (s) of the last state that was for the neighbours, and of the last one that was not idle."""
+        self.spoke_at = -inf
+        """Run time (s) of the last state that was for the neighbours."""
 
     def window_at(self, t: float) -> StateWindow:
         """Return the states of the process that spoke last at a run time (s)."""
@@ -54,8 +54,6 @@ class SentStates:
             return False
         first, last = self.epochs.get(state.epoch, (state.t, state.t))
         self.epochs[state.epoch] = min(first, state.t), max(last, state.t)
-        if not state.idle:
-            self.decided_at = max(self.decided_at, state.t)
-            if not state.quiet:
-                self.spoke_at = max(self.spoke_at, state.t)
+        if not (state.idle or state.quiet):
+            self.spoke_at = max(self.spoke_at, state.t)
         return True

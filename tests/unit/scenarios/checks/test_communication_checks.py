@@ -191,6 +191,26 @@ def test_a_heal_is_judged_by_the_time_until_its_link_is_lost_again(again_s: floa
     ]
 
 
+@pytest.mark.parametrize(("until", "count"), [(140, 0), (170, 1)])
+def test_the_longest_time_that_both_are_at_work_is_that_of_a_heal(until: int, count: int) -> None:
+    """inv1 pauses again and again after a cut: it must use nothing new of inv2 for the limit's time in one piece."""
+    pauses = [(2.2, 2.4), (2.5, 2.7), (until * 0.02, 3.9)]
+    changes = (
+        ("case.IV.link", repr([{"on": "inv2 -> inv1", "cut": True, "from_s": 1.5, "to_s": 2.1}])),
+        ("case.IV.node", repr([{"name": "inv1", "pause": True, "from_s": a, "to_s": b} for a, b in pauses])),
+        ("time.end_s", "4.5"),
+    )
+    case = ran_with(changes).checked_case
+    content = case.content
+    decisions = {
+        agent: [(epoch, deaf(entry) if agent == "inv1" and entry.tick >= 75 else entry) for epoch, entry in entries]
+        for agent, entries in content.decisions.items()
+    }
+    found = verdict(with_content(case, replace(content, decisions=decisions)), "heal", within_s=0.65)
+
+    assert found.count == count
+
+
 def test_a_heal_is_judged_whatever_is_planned_after_the_last_decision() -> None:
     """A cut that is planned for later than anybody decides excuses nobody."""
     spans = [(2.0, 2.16), (4.99, 5.0)]
