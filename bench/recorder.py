@@ -30,11 +30,11 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.process_driver import run_processes
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorder
-from scenarios.run import versions
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_writing import to_toml
+from scenarios.versions import versions
 from wire.journal import RecordLevel
 
 Level = Literal["none", "physics", "decisions", "all"]

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from scenarios.results.evaluation.metric import METRICS
     from scenarios.results.evaluation.window_metrics import WindowData
     from scenarios.results.run_files import FolderError
-    from scenarios.run import BrokenRunError
+    from scenarios.run_request import BrokenRunError
     from scenarios.schema.loading import catalogue
     from scenarios.schema.scenario_errors import ScenarioError
     from wire.schema.plausible import Plausible, Range, Unit
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
     check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
 
 _HOME = {
-    "BrokenRunError": "scenarios.run",
+    "BrokenRunError": "scenarios.run_request",
     "CheckVerdict": "scenarios.checks.check_verdict",
     "CheckedCase": "scenarios.checks.checked_case",
     "Claim": "scenarios.results.evaluation.claims",

@@ -18,7 +18,7 @@ from scenarios.results.run_files import (
     shown,
     write_whole,
 )
-from scenarios.run import versions
+from scenarios.versions import versions
 from wire.driver.output import OutputLostError
 from wire.schema.suggestion import suggestion
 

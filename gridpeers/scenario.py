@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import How
     from plant.equipment import Feeder
-    from scenarios.run import Driver
+    from scenarios.run_request import Driver
     from scenarios.sweep.file.paths import Tree
 
 

@@ -1,95 +1,45 @@
 """One run from a checked scenario to its folder: cases, records, metrics, figures, claims, report.
 
-The drivers (`scenarios.drivers`) are given configurations here, and their telemetry is taken.
+`run_case` runs the cases; all else here comes of their records.
 """
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import platform
 import traceback
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
-from datetime import datetime
-from functools import cache
-from importlib import import_module, metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
 from plant.realtime.pacer import sentence
-from scenarios.drivers.free_endpoint import local_endpoint
-from scenarios.drivers.outcome import Outcome
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_info import RecordInfo
 from scenarios.results.broken_folder import broken_if_ended
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
-from scenarios.results.metrics_file import Clock, RunMetrics, case_facts, metrics_json
-from scenarios.results.record import Recorded, Recorder, RecordError
+from scenarios.results.figure_processes import drawn_on_all_cores
+from scenarios.results.metrics_file import Clock, case_facts, metrics_json
+from scenarios.results.record import Recorded
 from scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
-from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of
+from scenarios.run_case import run_case
+from scenarios.run_request import BrokenRunError, Progress, Request
 from scenarios.schema.plugin_keys import checks_of, checks_off, claims_of
 from scenarios.schema.scenario_writing import to_toml
+from scenarios.versions import version_of, versions
 from wire.driver.open_files import too_few_files
 from wire.driver.output import OutputLostError
-from wire.messages import Pacing, Telemetry
+from wire.messages import Pacing
 
 if TYPE_CHECKING:
-    from plant.plant_interface import PlantLike
     from scenarios.checks.check_verdict import CheckVerdict
     from scenarios.checks.judging import JudgingStop
     from scenarios.live.numbers.departures import Departures
     from scenarios.results.event_windows import CaseRecord
     from scenarios.results.report import RunReport
 
-Driver = Literal["processes", "inprocess"]
-"""Driver of a case: one process per agent over Zenoh, or all in this process."""
-
-Progress = Callable[[str, float, float], None]
-"""Takes the case, the time it has reached (s) and its end (s)."""
-
 _SHOWN = 3
 """Laws that failed which a report names."""
-
-_AFTER_RUN = (
-    *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
-    *("scenarios.results.report", "scenarios.results.plots.drawing", "scenarios.checks.judging"),
-    *("scenarios.checks.physics.balance_check", "scenarios.checks.communication.record_content"),
-)
-"""Modules that are used after a run, with numpy and scipy, and imported while it goes on: this process has little to do
-then."""
-
-_VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
-
-
-class BrokenRunError(RuntimeError):
-    """The run could not be finished; the folder says so too."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request(RunMetrics):
-    """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""
-
-    driver: Driver
-    keys: str | Path | None = None
-    """Folder with the certificates of plant and agents; None: links are open, on the loopback."""
-    processes: int = 0
-    """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
-    strict: bool = False
-    """Wall-clock: whether the run breaks when the plant cannot keep pace."""
-    self_check: bool = False
-    """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
-    outside: tuple[str, ...] | None = None
-    """Inverters that federates of a HELICS federation control instead of our agents; None for a run without HELICS."""
-    lasting: bool = True
-    """Whether the folder stays: one that goes with the results of a notebook has no figures, and is not named."""
 
 
 def run(request: Request, progress: Progress) -> RunReport:
@@ -255,129 +205,6 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     }
 
 
-def run_case(
-    request: Request,
-    case: str,
-    toml: str,
-    progress: Progress,
-    plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
-) -> tuple[Recorded, Outcome]:
-    """Run one case by the driver asked for, and record it.
-
-    Parameters
-    ----------
-    request : Request
-        The run.
-    case : str
-        Name of the case.
-    toml : str
-        The scenario as run, for its record.
-    progress : Progress
-        Takes the progress.
-    plant_at_rest : Callable[[PlantConfig], PlantLike], optional
-        In one process: gives the plant at t = 0 instead of building it.
-
-    Raises
-    ------
-    BrokenRunError
-        If the case broke.
-    """
-    time = request.scenario.time
-    plant, agents = _configs(request, case)
-    record = _record_info(request, case, toml, plant, agents)
-    self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
-    ahead = request.lasting and request.clock == "simulated"  # in real time nothing else may take a core
-    with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
-
-        def note(telemetry: Telemetry) -> None:
-            nonlocal ahead
-            if ahead:  # from the first row on: before, every core is busy with the start
-                ahead = False
-                prepare_figures()
-                for module in _AFTER_RUN:
-                    import_module(module)
-            recorder(telemetry)
-            progress(case, recorder.ended, time.end_s)
-
-        progress(case, 0.0, time.end_s)
-        try:
-            if request.driver == "inprocess":
-                from scenarios.drivers.inprocess import run_inprocess
-
-                ready = None if plant_at_rest is None else plant_at_rest(plant)
-                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder, plant=ready)
-            else:
-                from scenarios.drivers.process_driver import run_processes
-
-                outcome = run_processes(
-                    plant,
-                    agents,
-                    request.folder / "log" / case,
-                    note,
-                    on_links=recorder,
-                    on_journal=recorder,
-                    shared=request.processes,
-                )
-            if outcome.broke:
-                raise BrokenRunError(f"case {case}: {outcome.broke}")
-            recorded = recorder.finish(time.end_s, time.record_s)
-            if recorder.record_failure:
-                outcome = dataclasses.replace(
-                    outcome, notes=(*outcome.notes, f"{recorder.record_failure}; the run went on without it")
-                )
-            return recorded, outcome
-        except RecordError as error:
-            raise BrokenRunError(f"case {case}: {error}") from error
-
-
-def _record_info(
-    request: Request, case: str, toml: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]
-) -> RecordInfo:
-    """Return what the record of a case says about its run."""
-    scenario, real = request.scenario, request.clock == "wall"
-    return RecordInfo(
-        level=plant.record,
-        scenario=scenario.name,
-        case=case,
-        toml=toml,
-        seed=scenario.seed,
-        driver=request.driver,
-        versions=versions(),
-        inverters=tuple(row.name for row in inverters_of(scenario, request.feeder)),
-        plant=plant,
-        agents=agents,
-        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",
-    )
-
-
-def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of a case in the kind of time asked for."""
-    listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
-    real = request.clock == "wall"
-    plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
-    plant = msgspec.structs.replace(plant, record=request.scenario.record)
-    agents = tuple(msgspec.structs.replace(agent, record=request.scenario.record) for agent in agents)
-    if request.outside is not None:
-        plant = msgspec.structs.replace(
-            plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)
-        )
-        agents = tuple(agent for agent in agents if agent.name not in request.outside)
-    if request.keys is not None:
-        from scenarios.drivers.secured import secured
-
-        inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
-        started = {agent.name for agent in agents}
-        plant = msgspec.structs.replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
-        plant, agents, _ = secured(plant, agents, Path(request.keys), started=started, inverters=inverters)
-    if request.clock == "simulated":
-        return plant, agents
-    if request.driver != "processes":
-        raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
-    replace, clock, speed = msgspec.structs.replace, request.clock, request.speed
-    plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
-    return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)
-
-
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
     """Return notes on cases that cannot be repeated."""
     if clock == "wall":
@@ -391,19 +218,5 @@ def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
 
 def _as_run(request: Request) -> dict[str, Any]:
     simulator = request.scenario.plant.simulator
-    own = {simulator: _version(simulator)} if simulator != "gridpeers" else {}
+    own = {simulator: version_of(simulator)} if simulator != "gridpeers" else {}
     return {"driver": request.driver} | versions() | own
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that has a part in the numbers of a run."""
-    return {"python": platform.python_version()} | {name: _version(name) for name in _VERSIONS}
-
-
-@cache
-def _version(package: str) -> str:
-    """Version of an installed package; one process does not need all of them."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"

@@ -10,7 +10,7 @@ import msgspec
 
 from scenarios.live.run_speed import SPEEDS
 from scenarios.results.metrics_file import Clock
-from scenarios.run import Driver
+from scenarios.run_request import Driver
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
 from wire.schema.suggestion import suggestion

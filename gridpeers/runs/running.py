@@ -13,8 +13,8 @@ from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from plant.tables import read_feeder
 from scenarios.results.file_sizes import file_sizes, require_room
 from scenarios.results.run_files import FolderError, is_complete
-from scenarios.run import BrokenRunError, Driver, Progress, Request
 from scenarios.run import run as run_request
+from scenarios.run_request import BrokenRunError, Driver, Progress, Request
 from scenarios.schema import ScenarioError
 from scenarios.schema.configs import as_in
 from scenarios.schema.loading import read_tables, read_toml

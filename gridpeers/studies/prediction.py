@@ -16,7 +16,7 @@ from scenarios.predict.case_prediction import CasePrediction, predict_cases
 from scenarios.predict.closed_form import DelayKind
 from scenarios.predict.load_steps import LoadError
 from scenarios.predict.prediction_table import case_text
-from scenarios.run import BrokenRunError
+from scenarios.run_request import BrokenRunError
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
 from scenarios.schema.plugin_keys import law_of

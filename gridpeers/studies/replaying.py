@@ -26,7 +26,7 @@ from scenarios.replay.replay_error import ReplayError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from scenarios.run import Progress
+    from scenarios.run_request import Progress
 
 RecordSource = Result | RunRecord | str | Path
 """A result, its record, or the folder of a case or its run.mcap."""

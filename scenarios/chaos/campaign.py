@@ -24,7 +24,7 @@ from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.schedule_search import BATCH, drawn
 from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete
-from scenarios.run import Driver
+from scenarios.run_request import Driver
 from scenarios.sweep.workers import on_this_machine
 from wire.counted import counted
 

@@ -19,7 +19,9 @@ from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.record import Recorded
 from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
-from scenarios.run import BrokenRunError, Driver, Request, run_case, verdicts_on
+from scenarios.run import verdicts_on
+from scenarios.run_case import run_case
+from scenarios.run_request import BrokenRunError, Driver, Request
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.sweep.sweep_case import plant_at_start
 from wire.messages import PlantEvent

@@ -17,9 +17,9 @@ from plant.plant_config import PlantConfig
 from scenarios.live.ended_scenario import ended_scenario
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
-from scenarios.run import versions
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
+from scenarios.versions import versions
 
 LIVE: Literal["live"] = "live"
 """The driver of a live run, as files name it."""

@@ -26,9 +26,10 @@ from scenarios.results.broken_folder import broken_if_ended
 from scenarios.results.metrics_file import RunMetrics
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.results.run_files import set_status, write_whole
-from scenarios.run import Progress, versions
+from scenarios.run_request import Progress
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
+from scenarios.versions import versions
 from wire.messages import LinkReport, Telemetry
 
 

@@ -17,10 +17,10 @@ from types import TracebackType
 import msgspec
 
 from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
-from scenarios.run import versions
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import SweepRow
+from scenarios.versions import versions
 
 MANIFEST, JOURNAL, LOCK = "sweep.json", "runs.jsonl", ".lock"
 

@@ -33,7 +33,7 @@ def predict(
     require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
 
     from gridpeers.studies.prediction import predictions
-    from scenarios.run import BrokenRunError
+    from scenarios.run_request import BrokenRunError
     from scenarios.schema import ScenarioError
 
     if not feeder.inverters:

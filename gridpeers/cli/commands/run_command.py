@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     from gridpeers.runs.choices import Pace
     from plant.equipment import Feeder
-    from scenarios.run import Driver
+    from scenarios.run_request import Driver
     from scenarios.schema import ScenarioModel
 
 
@@ -173,8 +173,8 @@ def carry_out(
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from scenarios.results.file_sizes import file_sizes, require_room
     from scenarios.results.run_files import RUNS, FolderError, new_folder, shown
-    from scenarios.run import BrokenRunError, Request
     from scenarios.run import run as run_scenario
+    from scenarios.run_request import BrokenRunError, Request
 
     try:
         if driver == "processes":

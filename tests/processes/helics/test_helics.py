@@ -20,7 +20,7 @@ from plant.helics.federate import HelicsError, HelicsFederate
 from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import PlantConfig, PlantSettings
 from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.run import BrokenRunError
+from scenarios.run_request import BrokenRunError
 from tests.command_line import invoke
 from tests.toy.toy_plant import ToyPlant
 

@@ -20,7 +20,8 @@ from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import read_verdicts, verdicts_json
 from scenarios.checks.judging import JudgingStop, judge_case
 from scenarios.record.record_reader import RunRecord
-from scenarios.run import Request, run
+from scenarios.run import run
+from scenarios.run_request import Request
 from scenarios.schema import load_scenario
 from tests.unit.scenarios.checks.cases import ran
 from wire.plugins.plugin import Plugin, plugin_problems

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.run import BrokenRunError, Request, run
+from scenarios.run import run
+from scenarios.run_request import BrokenRunError, Request
 from scenarios.schema import load_scenario
 from tests.scenario_files import written
 

@@ -160,7 +160,8 @@ def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_pa
 
 def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_path: Path) -> None:
     """A sweep's sample, written as a scenario, has the history and the indexes of its row, with unit and parameters."""
-    from scenarios.run import Request, run
+    from scenarios.run import run
+    from scenarios.run_request import Request
     from scenarios.schema.scenario_writing import to_toml
 
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0011]\n')

@@ -1,0 +1,160 @@
+"""One case of a run: its configurations to a driver (`scenarios.drivers`), and the driver's telemetry to its record."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import msgspec
+
+from agents.agent_config import AgentConfig
+from plant.plant_config import PlantConfig
+from scenarios.drivers.free_endpoint import local_endpoint
+from scenarios.drivers.outcome import Outcome
+from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_info import RecordInfo
+from scenarios.results.figure_processes import prepare_figures
+from scenarios.results.record import Recorded, Recorder, RecordError
+from scenarios.run_request import BrokenRunError, Progress, Request
+from scenarios.schema.configs import configs
+from scenarios.schema.participants import inverters_of
+from scenarios.versions import versions
+from wire.messages import Telemetry
+
+if TYPE_CHECKING:
+    from plant.plant_interface import PlantLike
+
+_AFTER_RUN = (
+    *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
+    *("scenarios.results.report", "scenarios.results.plots.drawing", "scenarios.checks.judging"),
+    *("scenarios.checks.physics.balance_check", "scenarios.checks.communication.record_content"),
+)
+"""Modules that are used after a run, with numpy and scipy, and imported while it goes on: this process has little to do
+then."""
+
+
+def run_case(
+    request: Request,
+    case: str,
+    toml: str,
+    progress: Progress,
+    plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
+) -> tuple[Recorded, Outcome]:
+    """Run one case by the driver asked for, and record it.
+
+    Parameters
+    ----------
+    request : Request
+        The run.
+    case : str
+        Name of the case.
+    toml : str
+        The scenario as run, for its record.
+    progress : Progress
+        Takes the progress.
+    plant_at_rest : Callable[[PlantConfig], PlantLike], optional
+        In one process: gives the plant at t = 0 instead of building it.
+
+    Raises
+    ------
+    BrokenRunError
+        If the case broke.
+    """
+    time = request.scenario.time
+    plant, agents = _configs(request, case)
+    record = _record_info(request, case, toml, plant, agents)
+    self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
+    ahead = request.lasting and request.clock == "simulated"  # in real time nothing else may take a core
+    with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
+
+        def note(telemetry: Telemetry) -> None:
+            nonlocal ahead
+            if ahead:  # from the first row on: before, every core is busy with the start
+                ahead = False
+                prepare_figures()
+                for module in _AFTER_RUN:
+                    import_module(module)
+            recorder(telemetry)
+            progress(case, recorder.ended, time.end_s)
+
+        progress(case, 0.0, time.end_s)
+        try:
+            if request.driver == "inprocess":
+                from scenarios.drivers.inprocess import run_inprocess
+
+                ready = None if plant_at_rest is None else plant_at_rest(plant)
+                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder, plant=ready)
+            else:
+                from scenarios.drivers.process_driver import run_processes
+
+                outcome = run_processes(
+                    plant,
+                    agents,
+                    request.folder / "log" / case,
+                    note,
+                    on_links=recorder,
+                    on_journal=recorder,
+                    shared=request.processes,
+                )
+            if outcome.broke:
+                raise BrokenRunError(f"case {case}: {outcome.broke}")
+            recorded = recorder.finish(time.end_s, time.record_s)
+            if recorder.record_failure:
+                outcome = dataclasses.replace(
+                    outcome, notes=(*outcome.notes, f"{recorder.record_failure}; the run went on without it")
+                )
+            return recorded, outcome
+        except RecordError as error:
+            raise BrokenRunError(f"case {case}: {error}") from error
+
+
+def _record_info(
+    request: Request, case: str, toml: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]
+) -> RecordInfo:
+    """Return what the record of a case says about its run."""
+    scenario, real = request.scenario, request.clock == "wall"
+    return RecordInfo(
+        level=plant.record,
+        scenario=scenario.name,
+        case=case,
+        toml=toml,
+        seed=scenario.seed,
+        driver=request.driver,
+        versions=versions(),
+        inverters=tuple(row.name for row in inverters_of(scenario, request.feeder)),
+        plant=plant,
+        agents=agents,
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds") if real else "",
+    )
+
+
+def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Configurations of a case in the kind of time asked for."""
+    listen = local_endpoint(request.scenario.processes.port) if request.driver == "processes" else ""
+    real = request.clock == "wall"
+    plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
+    plant = msgspec.structs.replace(plant, record=request.scenario.record)
+    agents = tuple(msgspec.structs.replace(agent, record=request.scenario.record) for agent in agents)
+    if request.outside is not None:
+        plant = msgspec.structs.replace(
+            plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)
+        )
+        agents = tuple(agent for agent in agents if agent.name not in request.outside)
+    if request.keys is not None:
+        from scenarios.drivers.secured import secured
+
+        inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
+        started = {agent.name for agent in agents}
+        plant = msgspec.structs.replace(plant, listen=tuple(text.replace("tcp/", "tls/", 1) for text in plant.listen))
+        plant, agents, _ = secured(plant, agents, Path(request.keys), started=started, inverters=inverters)
+    if request.clock == "simulated":
+        return plant, agents
+    if request.driver != "processes":
+        raise BrokenRunError("wall-clock time needs one process per agent: use the driver processes")
+    replace, clock, speed = msgspec.structs.replace, request.clock, request.speed
+    plant = replace(plant, clock=clock, speed=speed, strict=request.strict)
+    return plant, tuple(replace(agent, clock=clock, speed=speed) for agent in agents)
