@@ -8,13 +8,18 @@ from contextlib import contextmanager
 
 from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
 from scenarios.results.broken_folder import TerminatedError
-from wire.driver.stop_signal import StopSignal
+from wire.driver.stop_signal import StopSignal, ctrl_c_or
 
 
 @contextmanager
 def interruptible() -> Iterator[None]:
-    """Have SIGTERM, and a terminal that goes away, end what is inside as Ctrl-C does: by `KeyboardInterrupt`."""
-    terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
+    """Have SIGTERM, and a terminal that goes away, end what is inside as Ctrl-C does: by `KeyboardInterrupt`.
+
+    Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
+    """
+    terminate, numbers = StopSignal(ctrl_c_or(TerminatedError)), [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
+        numbers.append(signal.SIGINT)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, terminate) for number in numbers}

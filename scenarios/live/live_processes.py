@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import re
-import signal
 import sys
 import threading
 from collections.abc import Callable
@@ -33,7 +32,7 @@ from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError
-from wire.driver.stop_signal import StopSignal
+from wire.driver.stop_signal import StopSignal, stop_at_signals
 from wire.messages import PLANT, Pacing
 from wire.printable import printable
 
@@ -100,7 +99,7 @@ def plant_here(
     record : RecordInfo, optional
         The run, for its record.
     """
-    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
+    requests = stop_at_signals(StoppedError)
     _log()
     config = _recorded(config, folder)
 
@@ -121,7 +120,7 @@ def plant_here(
         record=record,
         credentials=config.credentials,
     )
-    outcome = _follow(recorder, run)
+    outcome = _follow(recorder, run, requests)
     if outcome.interrupted:  # else the plant has said it
         _say_end(recorder, config)
     return outcome
@@ -152,15 +151,15 @@ def all_here(
     record : RecordInfo, optional
         The run, for its record.
     """
-    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
+    requests = stop_at_signals(StoppedError)
     config = _recorded(config, folder)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
-    plant_ended = threading.Event()
+    over = threading.Event()
 
     def on_exit(child: Child) -> None:
         if child.name == PLANT:
-            plant_ended.set()
-        elif supervisor.failed(child) and not plant_ended.is_set():
+            over.set()
+        elif supervisor.failed(child) and not over.is_set():
             say(child.report(f"after t = {recorder.client.t:.2f} s"))
 
     def on_word(word: str) -> None:
@@ -172,12 +171,13 @@ def all_here(
             supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
             release()
             try:
-                while not plant_ended.wait(min(supervisor.wait, CHECK)):
+                while not over.wait(min(supervisor.wait, CHECK)):
                     if recorder.client.progress is not None:
                         supervisor.note_time(*recorder.client.progress)
                     supervisor.work()
                 supervisor.children.wait(LEAVING)
             finally:
+                over.set()  # what is killed from here on, is so because it did not end in time
                 supervisor.end_faults()
         plant = supervisor.children[PLANT]
         return "" if plant.status == 0 else plant.report(f"after t = {recorder.client.t:.2f} s")
@@ -187,7 +187,7 @@ def all_here(
     recorder = LiveRecorder(
         config.run, endpoint, say, folder, link_log=link_log, record=record, credentials=config.credentials
     )
-    outcome = _follow(recorder, run)
+    outcome = _follow(recorder, run, requests)
     _say_end(recorder, config)
     return outcome
 
@@ -217,7 +217,7 @@ def agent_here(
     UsageError
         If the plant names code that does not come with gridpeers, and is not trusted.
     """
-    signal.signal(signal.SIGTERM, StopSignal(StoppedError))
+    stop_at_signals(StoppedError)
     _log()
     who = ", ".join(names)
     say(f"{who}: seeks the plant of {where}, for up to {wait:g} s")
@@ -242,15 +242,22 @@ def agent_here(
         return ProcessOutcome(interrupted=_signal_of(stop))
 
 
-def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str]) -> ProcessOutcome:
+def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str], requests: StopSignal) -> ProcessOutcome:
     """Run something with its recorder until it returns why it broke, or a signal ends it."""
     broke = interrupted = ""
     try:
         with recorder:
-            broke = run(recorder)
+            try:
+                broke = run(recorder)
+            except (StoppedError, KeyboardInterrupt) as stop:
+                if requests.requests > 1:
+                    recorder.cut_short = f"{_signal_of(stop)} came again before the plant had ended"
+                raise
         broke = broke or recorder.failure
     except (StoppedError, KeyboardInterrupt) as stop:
         interrupted = _signal_of(stop)
+        if recorder.recorded is None:  # a whole record has its numbers
+            broke = recorder.failure
     return ProcessOutcome(
         broke=broke, interrupted=interrupted, recorded=recorder.recorded, pacing=recorder.client.pacing
     )

@@ -67,6 +67,8 @@ class LiveRecorder:
         """The record, once it is closed, if it is whole."""
         self.failure = ""
         """Why something could not be recorded: the first reason; "" if everything was."""
+        self.cut_short = ""
+        """Why the plant's last message does not come, if that is known."""
         self._limit = RateLimit()
         self._run, self._endpoint = run, endpoint
         self.client: TelemetryClient
@@ -107,7 +109,8 @@ class LiveRecorder:
             if recorder.count < 2:
                 self._say("nothing was recorded, so there are no numbers")
             elif not self.client.ended:
-                self._fail(f"the record ends at {recorder.ended:.2f} s: then no word came of the plant")
+                why = self.cut_short or "then no word came of the plant"
+                self._fail(f"the record ends at {recorder.ended:.2f} s: {why}")
             else:
                 self.recorded = recorder.finish(recorder.ended, recorder.record_step)
                 self._say_all(*self.recorded.link_lines)

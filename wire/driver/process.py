@@ -23,7 +23,7 @@ from wire.driver.leftover import leave
 from wire.driver.open_files import raise_limit
 from wire.driver.output import watch_readers
 from wire.driver.session import SessionError
-from wire.driver.stop_signal import StopSignal
+from wire.driver.stop_signal import stop_at_signals
 from wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
@@ -108,7 +108,7 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
         return OK if options in (["-h"], ["--help"]) else BAD_CONFIG
     logging.basicConfig(level=logging.INFO, stream=sys.stderr, format="%(asctime)s %(levelname)s %(message)s")
     log = logging.getLogger(module)
-    signal.signal(signal.SIGTERM, StopSignal(StoppedOnLeashError if options else StoppedError))
+    stop_at_signals(StoppedOnLeashError if options else StoppedError)
     try:
         text = _read_line() if options else sys.stdin.buffer.read()
         config = msgspec.json.decode(text, type=config_type)

@@ -217,9 +217,12 @@ def test_what_is_not_there_is_told_in_one_line(desk: Desk) -> None:
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds the children in /proc")
-@pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGTERM", 143)])
+@pytest.mark.parametrize(("by", "status"), [("down", 0), ("SIGTERM", 143), ("SIGINT", 130)])
 def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, status: int) -> None:
-    """The plant and nine agents at once; `down` or SIGTERM ends them all, with numbers beside the history."""
+    """The plant and nine agents at once; `down`, SIGTERM or Ctrl-C ends them all, with numbers beside the history.
+
+    A signal comes twice, as `timeout` sends it.
+    """
     (desk.folder / "events.toml").write_text(EVENTS)
     up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1], "--out", "here")
     for _ in range(9):
@@ -232,7 +235,8 @@ def test_up_stays_until_it_is_ended_and_leaves_no_process(desk: Desk, by: str, s
     if by == "down":
         assert desk.type("down")[0] == 0
     else:
-        up.signal(signal.Signals[by])
+        for _ in range(2):
+            up.signal(signal.Signals[by])
 
     assert up.end() == status
     up.expect(r"ended at t = .* steps")

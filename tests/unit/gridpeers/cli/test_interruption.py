@@ -14,7 +14,7 @@ from gridpeers.cli.interruption import ended_by_signals, exit_code, interruptibl
 @pytest.fixture(autouse=True)
 def restored() -> Iterator[None]:
     """The handlers of this process, put back whatever a test does to them."""
-    before = {number: signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)}
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
     yield
     for number, handler in before.items():
         signal.signal(number, handler)
@@ -31,6 +31,25 @@ def test_a_signal_ends_a_command_as_ctrl_c_does(sent: signal.Signals, code: int)
 
     assert exit_code(ended.value) == code
     assert [signal.getsignal(number) for number in (signal.SIGTERM, signal.SIGHUP)] == [signal.SIG_IGN, signal.SIG_DFL]
+
+
+def test_ctrl_c_passed_on_twice_is_one() -> None:
+    """`timeout` signals a command and its group: what a command does at its end is not interrupted by the second."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    left = []
+
+    def interrupted() -> None:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        finally:
+            signal.raise_signal(signal.SIGINT)
+            left.append("tidy")
+
+    with pytest.raises(KeyboardInterrupt), interruptible():
+        interrupted()
+
+    assert left == ["tidy"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_before_the_command_line_is_read_ctrl_c_is_one_line(
