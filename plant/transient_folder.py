@@ -41,8 +41,8 @@ class TransientFolder:
             shutil.rmtree(self.path, ignore_errors=True)
 
 
-def no_room(what: str, reason: str) -> str:
-    """Return words for something that a process cannot write into a temporary folder.
+def no_room(what: str, reason: str, folder: Path | None = None) -> str:
+    """Return words for something that a process cannot write into a temporary folder; the system's when left out.
 
     Examples
     --------
@@ -51,4 +51,4 @@ def no_room(what: str, reason: str) -> str:
 file sizes (ulimit -f), or set TMPDIR to another folder'
     """
     remedy = "make room there, raise the limit of file sizes (ulimit -f), or set TMPDIR to another folder"
-    return f"{what} cannot be written in {tempfile.gettempdir()} ({reason}); {remedy}"
+    return f"{what} cannot be written in {folder or tempfile.gettempdir()} ({reason}); {remedy}"

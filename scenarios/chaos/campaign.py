@@ -7,6 +7,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from plant.transient_folder import TransientFolder
 from scenarios.chaos.chaos_folder import ChaosFolder, again
 from scenarios.chaos.chaos_run import (
     ASKED,
@@ -116,25 +117,18 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
         Its folder; runs of which it has the results are not done again.
     tell : Tell
         Takes the progress: runs, then failures that are shrunk.
+
+    Raises
+    ------
+    MachineError
+        If the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
     """
     failures: dict[str, Failure] = {}
     try:
-        _tell_runs(campaign, folder, tell)
-        with closing(_results(campaign, folder.rows)) as results:
-            for row in results:
-                first = folder.rows.get(row.number)
-                folder.add(row if first is None else compared(first, row, REPEATS))
-                _tell_runs(campaign, folder, tell)
-        _add_failures(failures, folder)
-        kinds = counted(len(failures), "kind of failure", "kinds of failure")
-        if failures:
-            tell(f"shrinking, 0 of {kinds}", 0, len(failures))
-        with closing(_shrunk(campaign, tuple(failures.values()))) as simpler:
-            for i, (violated, simplest) in enumerate(simpler):
-                row = failures[violated].row
-                file = folder.write_failure(violated, row, simplest)
-                failures[violated] = Failure(violated=violated, row=row, simplest=simplest, file=file)
-                tell(f"shrinking, {i + 1} of {kinds}", i + 1, len(failures))
+        with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
+            _do_runs(campaign, folder, tell, temporary.path)
+            _add_failures(failures, folder)
+            _shrink_all(campaign, folder, failures, tell, temporary.path)
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
     except BaseException as error:
@@ -146,6 +140,31 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
             _concluded(campaign, folder, failures)
         raise
     return summary
+
+
+def _do_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell, within: Path) -> None:
+    """Do the runs that have no results, and add these as they come."""
+    _tell_runs(campaign, folder, tell)
+    with closing(_results(campaign, folder.rows, within)) as results:
+        for row in results:
+            first = folder.rows.get(row.number)
+            folder.add(row if first is None else compared(first, row, REPEATS))
+            _tell_runs(campaign, folder, tell)
+
+
+def _shrink_all(
+    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], tell: Tell, within: Path
+) -> None:
+    """Shrink each kind of failure, and write its scenario in place of the one that was drawn."""
+    kinds = counted(len(failures), "kind of failure", "kinds of failure")
+    if failures:
+        tell(f"shrinking, 0 of {kinds}", 0, len(failures))
+    with closing(_shrunk(campaign, tuple(failures.values()), within)) as simpler:
+        for i, (violated, simplest) in enumerate(simpler):
+            row = failures[violated].row
+            file = folder.write_failure(violated, row, simplest)
+            failures[violated] = Failure(violated=violated, row=row, simplest=simplest, file=file)
+            tell(f"shrinking, {i + 1} of {kinds}", i + 1, len(failures))
 
 
 def _tell_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> None:
@@ -162,10 +181,10 @@ def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Fail
     return summary
 
 
-def _results(campaign: Campaign, rows: Mapping[int, ChaosRow]) -> Generator[ChaosRow, None, None]:
+def _results(campaign: Campaign, rows: Mapping[int, ChaosRow], within: Path) -> Generator[ChaosRow, None, None]:
     """Yield the results of all runs that have none, and those of the repeated ones once more."""
     text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
-    calls = ((text, seed, number, schedule, driver) for number, schedule in _numbered(campaign, dict(rows)))
+    calls = ((text, seed, number, schedule, driver, within) for number, schedule in _numbered(campaign, dict(rows)))
     yield from on_this_machine(calls, 1 if driver == "processes" else campaign.jobs, run_number)
 
 
@@ -193,12 +212,14 @@ def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
         failures[violated] = Failure(violated=violated, row=row, simplest=row, file=file)
 
 
-def _shrunk(campaign: Campaign, failures: tuple[Failure, ...]) -> Generator[tuple[str, ChaosRow], None, None]:
+def _shrunk(
+    campaign: Campaign, failures: tuple[Failure, ...], within: Path
+) -> Generator[tuple[str, ChaosRow], None, None]:
     """Yield for each failure the run of the simplest schedule found."""
     if not failures:
         return
     calls = [
-        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated))
+        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated), within)
         for it in failures
     ]
     yield from on_this_machine(calls, min(campaign.jobs, len(calls)), _shrink)
@@ -209,5 +230,5 @@ def _driver(campaign: Campaign, violated: str) -> Driver:
     return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
 
 
-def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver) -> tuple[str, ChaosRow]:
-    return violated, shrink_number(text, seed, number, violated, driver)
+def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver, within: Path) -> tuple[str, ChaosRow]:
+    return violated, shrink_number(text, seed, number, violated, driver, within)

@@ -14,6 +14,7 @@ from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
 from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase, base_of
+from scenarios.chaos.machine_error import MachineError, machine_error, unwritten
 from scenarios.chaos.schedule_search import shrunk
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.results.event_windows import CaseRecord
@@ -86,7 +87,9 @@ def seed_of(seed: int, number: int) -> int:
     return seed * SEEDS + number
 
 
-def run_number(text: str, seed: int, number: int, schedule: Schedule, driver: Driver) -> ChaosRow:
+def run_number(
+    text: str, seed: int, number: int, schedule: Schedule, driver: Driver, within: Path | None = None
+) -> ChaosRow:
     """Run a campaign's run with a number.
 
     Parameters
@@ -101,11 +104,20 @@ def run_number(text: str, seed: int, number: int, schedule: Schedule, driver: Dr
         What was drawn for it.
     driver : {"inprocess", "processes"}
         With processes, it runs in one process too, and both must give the same bytes.
+    within : Path, optional
+        Folder of the campaign for temporary folders; that of the system when left out.
+
+    Raises
+    ------
+    MachineError
+        If the machine lacks what the run needs.
     """
-    return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver)
+    return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver, within=within)
 
 
-def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driver) -> ChaosRow:
+def shrink_number(
+    text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
+) -> ChaosRow:
     """Return the run of the simplest schedule found that violates what a run violates.
 
     Parameters
@@ -118,16 +130,41 @@ def shrink_number(text: str, seed: int, number: int, violated: str, driver: Driv
         Name of the check, or of what else is asked.
     driver : {"inprocess", "processes"}
         As for `run_number`.
+    within : Path, optional
+        As for `run_number`.
+
+    Raises
+    ------
+    MachineError
+        If the machine lacks what a run needs.
     """
     base = base_of(text)
     rows: dict[bytes, ChaosRow] = {}
 
     def row_of(schedule: Schedule) -> ChaosRow:
-        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=violated == REPEATS)
+        again = violated == REPEATS
+        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=again, within=within)
         return rows.setdefault(msgspec.json.encode(schedule), row)
 
-    simplest = shrunk(base, seed, number, lambda schedule: violated in row_of(schedule).violated)
+    def fails(schedule: Schedule) -> bool:
+        try:
+            return violated in row_of(schedule).violated
+        except MachineError as error:
+            raise _SearchEnd(error) from error
+
+    try:
+        simplest = shrunk(base, seed, number, fails)
+    except _SearchEnd as end:
+        raise end.why from None
     return rows.get(msgspec.json.encode(simplest)) or row_of(simplest)  # that of the run itself is not run to shrink it
+
+
+class _SearchEnd(BaseException):
+    """Ends a search at once: hypothesis would take an `Exception` for a failure, and shrink it."""
+
+    def __init__(self, why: MachineError) -> None:
+        super().__init__(str(why))
+        self.why = why
 
 
 def run_schedule(
@@ -138,6 +175,7 @@ def run_schedule(
     driver: Driver = "inprocess",
     *,
     again: bool = False,
+    within: Path | None = None,
 ) -> ChaosRow:
     """Run a scenario with a schedule, and judge it.
 
@@ -155,13 +193,20 @@ def run_schedule(
         See `run_number`.
     again : bool, optional
         Whether to run it twice: both must give the same bytes.
+    within : Path, optional
+        See `run_number`.
+
+    Raises
+    ------
+    MachineError
+        If the machine lacks what the run needs.
     """
     began = monotonic()
-    row = _once_restored(base, schedule, seed, number, driver)
+    row = _once_restored(base, schedule, seed, number, driver, within)
     if driver == "processes":
-        row = compared(row, _once_restored(base, schedule, seed, number, "inprocess"), SAME_IN_PROCESSES)
+        row = compared(row, _once_restored(base, schedule, seed, number, "inprocess", within), SAME_IN_PROCESSES)
     if again:
-        row = compared(row, _once_restored(base, schedule, seed, number, driver), REPEATS)
+        row = compared(row, _once_restored(base, schedule, seed, number, driver, within), REPEATS)
     return msgspec.structs.replace(row, took_s=round(monotonic() - began, 3))
 
 
@@ -204,16 +249,18 @@ def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float
     return round(last + (WITHIN_S + enter_service_s if tripped_inverters(events) else 0.0), 9)
 
 
-def _once_restored(base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver) -> ChaosRow:
+def _once_restored(
+    base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver, within: Path | None
+) -> ChaosRow:
     """Run a scenario with a schedule, and judge it without what a collapse before any control could act excuses."""
-    judged = _settled(base, schedule, seed, number, driver)
+    judged = _settled(base, schedule, seed, number, driver, within)
     row = judged.row
     if not judged.collapses or row.violated.keys().isdisjoint(RESTORED):
         return row
     changes, faultless = tuple(it for it in schedule if it.table == "event"), base.without_faults()
     plain = judged
     if len(changes) < len(schedule) or faultless is not base:  # a fault of links or agents before may have led to it
-        plain = _settled(faultless, changes, seed, number, "inprocess")
+        plain = _settled(faultless, changes, seed, number, "inprocess", within)
     # Who is in service again, or would be without faults, is to be restored like all others.
     lost = {
         label: names & judged.off & plain.off
@@ -231,12 +278,14 @@ def _once_restored(base: ChaosBase, schedule: Schedule, seed: int, number: int, 
     )
 
 
-def _settled(base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver) -> JudgedRun:
+def _settled(
+    base: ChaosBase, schedule: Schedule, seed: int, number: int, driver: Driver, within: Path | None
+) -> JudgedRun:
     """Run a scenario with a schedule; if inverters trip, again and so long that they are judged after their return."""
     since_s = base.changed_s(schedule)
     for _ in range(LONGER_RUNS):
         row = ChaosRow(number=number, schedule=schedule, since_s=since_s)
-        judged = _judged(base, base.disturbed(schedule, seed, since_s), row, driver)
+        judged = _judged(base, base.disturbed(schedule, seed, since_s), row, driver, within)
         if judged.restored_s <= since_s:
             return judged
         since_s = judged.restored_s
@@ -258,18 +307,32 @@ class JudgedRun(NamedTuple):
     """Of its checks."""
 
 
-def _judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver) -> JudgedRun:
+def _judged(
+    base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver, within: Path | None = None
+) -> JudgedRun:
     """Run a scenario once in a temporary folder."""
-    with tempfile.TemporaryDirectory(prefix="gridpeers-chaos-") as folder:
-        request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=Path(folder), lasting=False)
+    disk = Path(tempfile.gettempdir()) if within is None else within.parent
+    try:
+        temporary = tempfile.TemporaryDirectory(prefix="gridpeers-chaos-", dir=within, ignore_cleanup_errors=True)
+    except OSError as error:
+        raise machine_error(error, disk, disk) or unwritten(error.strerror or str(error), disk) from None
+    with temporary as name:
+        folder = Path(name)
+        request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=folder, lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
         try:
             recorded, _ = run_case(request, base.case, "", _ignore, at_start)
+            if recorded.record_failure:  # its checks could not judge it
+                raise unwritten(recorded.record_failure, disk)
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
             verdicts = verdicts_on(request, base.case, record)
-        except BrokenRunError as error:
-            return JudgedRun(msgspec.structs.replace(row, violated={ENDS: str(error)}))
+        except MachineError:
+            raise
         except Exception as error:
+            if lack := machine_error(error, folder, disk):
+                raise lack from error
+            if isinstance(error, BrokenRunError):
+                return JudgedRun(msgspec.structs.replace(row, violated={ENDS: str(error)}))
             return JudgedRun(msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}))
         restored_s = restored_from(recorded.events, scenario.protection.enter_service)
         collapses = collapses_at_changes(scenario, base.feeder, recorded.events)

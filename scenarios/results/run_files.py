@@ -47,6 +47,30 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     return folder
 
 
+def require_folder(out: Path | None, scenario: str) -> None:
+    """Refuse what `new_folder` would, before a run, and make nothing.
+
+    Parameters
+    ----------
+    out : Path or None
+        The user's choice.
+    scenario : str
+        Name of the scenario.
+
+    Raises
+    ------
+    FolderError
+        If the folder has something in it, is a file, or cannot be made.
+    """
+    if out is not None:
+        _require_empty(out, f"--out {out}")
+    folder = out if out is not None else RUNS / scenario
+    place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    why = "" if os.access(place, os.W_OK | os.X_OK) else "Permission denied"
+    if why := why if place.is_dir() else "Not a directory":
+        raise FolderError(_unmade(folder, why, "--out"))
+
+
 def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
     """Make a folder for results with a status, and return it; the option that names it is part of the errors.
 
@@ -55,18 +79,27 @@ def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
     FolderError
         If there is something in it, it is a file, or it cannot be made or written.
     """
-    where, other = f"{option} {folder}".strip(), f"give another folder by {option}" if option else "give another folder"
     try:
-        if folder.exists() and not folder.is_dir():
-            raise FolderError(f"{where}: this is a file; give a new or an empty folder")
-        if folder.is_dir() and any(folder.iterdir()):
-            raise FolderError(f"{where}: the folder is not empty; give a new or an empty one")
+        _require_empty(folder, f"{option} {folder}".strip())
         folder.mkdir(parents=True, exist_ok=True)
         if status:
             set_status(folder, status)
     except OSError as error:
-        raise FolderError(f"{folder}: cannot be made or written: {error.strerror}; {other}") from None
+        raise FolderError(_unmade(folder, error.strerror, option)) from None
     return folder
+
+
+def _require_empty(folder: Path, where: str) -> None:
+    """Raise FolderError if there is something in a folder, or it is a file."""
+    if folder.exists() and not folder.is_dir():
+        raise FolderError(f"{where}: this is a file; give a new or an empty folder")
+    if folder.is_dir() and any(folder.iterdir()):
+        raise FolderError(f"{where}: the folder is not empty; give a new or an empty one")
+
+
+def _unmade(folder: Path, why: str | None, option: str) -> str:
+    other = f"give another folder by {option}" if option else "give another folder"
+    return f"{folder}: cannot be made or written: {why}; {other}"
 
 
 def set_status(folder: Path, status: str) -> None:

@@ -6,6 +6,8 @@ import csv
 import errno
 import json
 import re
+import signal
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +16,14 @@ from msgspec.structs import replace
 
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.chaos import campaign as campaigns
-from scenarios.chaos import schedule_search
+from scenarios.chaos import chaos_run, schedule_search
 from scenarios.chaos.campaign import Campaign, run_campaign
 from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
 from scenarios.chaos.chaos_run import ChaosRow, run_scenario
 from scenarios.chaos.disturbance import counted_kinds
+from scenarios.chaos.machine_error import MachineError
 from scenarios.checks.check_registry import ALWAYS
+from scenarios.run_case import run_case
 from scenarios.schema import load_scenario
 from tests.chaos.bases import base_in, base_named
 from tests.command_line import invoke
@@ -156,6 +160,153 @@ def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeyp
     status = (elsewhere / "out" / "status.txt").read_text(encoding="utf-8")
     assert status.startswith("broken: ")
     assert "No space left on device after 1 of 2 runs" in status
+
+
+class FullDisk:
+    """Runs of cases, of which the machine has no room for the later ones.
+
+    Parameters
+    ----------
+    whole : int
+        Number of runs that it has room for.
+    error : OSError
+        What it says then.
+    """
+
+    def __init__(self, whole: int, error: OSError) -> None:
+        self.whole, self._error, self.asked = whole, error, 0
+
+    def __call__(self, *words: Any) -> Any:
+        """Run a case, or raise the error."""
+        self.asked += 1
+        if self.asked > self.whole:
+            raise self._error
+        return run_case(*words)
+
+
+NO_SPACE = OSError(errno.ENOSPC, "No space left on device")
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (NO_SPACE, "cannot be written in {tmp} (No space left on device); make room there"),
+        (OSError(errno.EFBIG, "File too large"), "cannot be written in {tmp} (File too large); make room there"),
+        (OSError(errno.EMFILE, "Too many open files"), "too many files are open: this process may have "),
+    ],
+)
+def test_what_the_machine_lacks_is_no_failure_of_the_scenario(
+    error: OSError, told: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The campaign ends with 3, says what and where, keeps its runs, shrinks nothing, leaves no temporary folder."""
+    _small(elsewhere)
+    (tmp := elsewhere / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp))
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(3, error))
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--seed", "3", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert told.format(tmp=tmp) in text
+    assert "2 of 9 runs are kept in out/" in text
+    assert full.asked == 4
+    assert [row["status"] for row in _rows(elsewhere / "out")] == ["passed", "passed"]
+    assert not (elsewhere / "out" / "failures").exists()
+    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: ")
+    assert [*tmp.iterdir()] == []
+
+
+def test_without_room_for_the_first_run_the_scenario_is_not_blamed(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 3, the disk, and no folder."""
+    _small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", FullDisk(0, NO_SPACE))
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--out", "out")
+
+    assert code == 3
+    assert f"cannot be written in {tempfile.gettempdir()} (No space left on device)" in text
+    assert "0 of 9 runs are kept and no folder was made" in text
+    assert "violated" not in text
+    assert not (elsewhere / "out").exists()
+
+
+def test_a_run_whose_record_ends_early_is_not_judged(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that is nearly full ends the record first: checks of messages would find less, and pass."""
+
+    def cut_off(*words: Any) -> Any:
+        recorded, outcome = run_case(*words)
+        return replace(recorded, record_failure="the record run.mcap ends at 0.50 s: its disk is full"), outcome
+
+    base = base_in(_small(elsewhere))
+    monkeypatch.setattr(chaos_run, "run_case", cut_off)
+
+    with pytest.raises(MachineError, match=r"the record run.mcap ends at 0.50 s: its disk is full"):
+        run_scenario(base)
+
+
+def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a run lacks while a failure is shrunk ends that, and is not taken for the failure."""
+    base = base_in(_small(elsewhere))
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
+
+    with pytest.raises(MachineError, match="No space left on device"):
+        chaos_run.shrink_number(base.text, 8, 3, "frequency", "inprocess")
+    assert full.asked == 1
+
+
+def test_a_signal_in_the_first_run_is_told(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As later ones: what is kept, and the exit code of the signal."""
+
+    def ended(*words: Any) -> Any:
+        signal.raise_signal(signal.SIGTERM)
+
+    _small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", ended)
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--out", "out")
+
+    assert code == 143
+    assert "interrupted; 0 of 9 runs are kept and no folder was made" in text
+
+
+def test_workers_that_are_ended_leave_no_folder(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Theirs are in one of the campaign, which goes with it; those of other campaigns stay."""
+    base = base_in(_small(elsewhere))
+    (tmp := elsewhere / "tmp").mkdir()
+    (others := tmp / "gridpeers-chaos-others").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp))
+
+    def killed(text: str, seed: int, number: int, schedule: Any, driver: str, within: Path) -> Any:
+        (within / "gridpeers-chaos-of-worker").mkdir()
+        assert within.parent == tmp
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaigns, "run_number", killed)
+    folder = ChaosFolder(elsewhere, base, 8, "")
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda what, done, of: None)
+
+    assert [*tmp.iterdir()] == [others]
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [
+        ("small.toml", "--out small.toml: this is a file; give a new or an empty folder"),
+        ("/dev/null", "--out /dev/null: this is a file; give a new or an empty folder"),
+        ("small.toml/new/one", "small.toml/new/one: cannot be made or written: Not a directory; give another folder"),
+        (".", "--out .: the folder is not empty; give a new or an empty one"),
+    ],
+)
+def test_a_folder_that_cannot_be_used_is_refused_before_the_first_run(
+    out: str, said: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 2, and no run is done for nothing."""
+    _small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
+    code, text = invoke("chaos", "small.toml", "--out", out)
+
+    assert (code, said in " ".join(text.split())) == (2, True), text
+    assert full.asked == 0
 
 
 def test_every_disturbance_is_counted_by_a_noun_of_its_kind() -> None:

@@ -100,7 +100,7 @@ COLLAPSED = Collapse("event1", "event1: at t = 1.016 s inv1 tripped", WEST)
 def _run(monkeypatch: pytest.MonkeyPatch, faulty: JudgedRun, plain: JudgedRun, *agents: str) -> ChaosRow:
     """The row of a run with a lie, in which these agents violate a check, and which is `plain` without the lie."""
 
-    def judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: str) -> JudgedRun:
+    def judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, *rest: object) -> JudgedRun:
         verdict = _verdict(*agents)
         failed = replace(row, violated={"frequency": verdict.sentence, "links": "lost"})
         return (faulty if LIE in row.schedule else plain)._replace(row=failed, verdicts=(verdict,))
@@ -156,7 +156,7 @@ def test_violations_that_a_verdict_does_not_keep_are_not_excused() -> None:
 def test_a_run_that_never_settles_says_so(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """Inverters that trip again in each longer run: the last is judged too early, and its line in chaos.csv tells."""
 
-    def judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: str) -> JudgedRun:
+    def judged(base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, *rest: object) -> JudgedRun:
         return JudgedRun(row, restored_s=row.since_s + 9.0)
 
     base = base_named("islanding")

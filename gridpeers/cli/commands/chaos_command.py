@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -48,8 +48,8 @@ def chaos(
     Once the last of it has ended, the checks judge the run (docs/chaos.md). Each kind of failure becomes a scenario
     file with few disturbances, for `gridpeers run`.
 
-    Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, 130 interrupted by
-    Ctrl-C: what came until then is written.
+    Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, or the machine
+    lacks what a run needs, such as room in TMPDIR, 130 Ctrl-C, 143 SIGTERM: what came until then is written.
 
     A campaign that was interrupted goes on with --resume, and the same scenario and seed.
 
@@ -66,7 +66,7 @@ def chaos(
     from scenarios.chaos.campaign import Campaign
     from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import FolderError, new_folder, set_status, shown
+    from scenarios.results.run_files import FolderError, new_folder, require_folder, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
@@ -75,11 +75,16 @@ def chaos(
     base = ChaosBase(spec, feeder)
     try:
         rows = {} if resume is None else kept_rows(resume, base, seed, runs)
+        if resume is None:
+            require_folder(out, f"{spec.name}-chaos")
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        fail([f"--out {out}: {error.strerror}; give another folder"], BAD_INPUT)
     campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     console = Console()
-    _try_undisturbed(console, campaign)
+    with _kept_if_ended(campaign, rows, resume):
+        _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     try:
         path = resume or new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
@@ -135,19 +140,33 @@ def _work(campaign: Campaign) -> str:
 
 def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder) -> Summary:
     """Do the campaign, showing how far it is; whatever ends it early ends the command."""
-    from gridpeers.cli.interruption import exit_code, interruptible
     from scenarios.chaos.campaign import run_campaign
+
+    with _kept_if_ended(campaign, folder.rows, folder.path), _stages(console) as tell:
+        return run_campaign(campaign, folder, tell)
+
+
+@contextmanager
+def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None) -> Iterator[None]:
+    """End the command with what went wrong, and how many runs are kept, if what is inside is ended early."""
+    from gridpeers.cli.interruption import exit_code, interruptible
+    from scenarios.chaos.machine_error import MachineError
     from scenarios.results.run_files import refusal, shown
     from scenarios.sweep.workers import WorkersError
+    from wire.driver.open_files import too_few_files
 
     try:
-        with interruptible(), _stages(console) as tell:
-            return run_campaign(campaign, folder, tell)
-    except (KeyboardInterrupt, OSError, WorkersError) as error:
-        kept = f"{len(folder.rows)} of {campaign.runs} runs are kept in {shown(folder.path)}/"
+        with interruptible():
+            yield
+    except (KeyboardInterrupt, OSError, MachineError, WorkersError) as error:
+        where = f"in {shown(folder)}/" if folder else "and no folder was made"
+        kept = f"{len(rows)} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {kept}"], exit_code(error))
-        fail([refusal(folder.path, error) if isinstance(error, OSError) else str(error), kept], BROKEN)
+        why = str(error)
+        if isinstance(error, OSError):
+            why = too_few_files(error) or (refusal(folder, error) if folder else why)
+        fail([why, kept], BROKEN)
 
 
 @contextmanager
