@@ -96,7 +96,8 @@ def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict
         if verdict.status == "failed" and verdict.check in RESTORED:
             rest = tuple(violation for violation in verdict.violations if violation.agent not in excused)
             count = verdict.count - len(verdict.violations) + len(rest)
-            reason = verdict.reason or f"{count} violations, beyond the {SHOWN_VIOLATIONS} that a verdict keeps"
+            beyond = "" if rest else f"{count} violations, beyond the {SHOWN_VIOLATIONS} that a verdict keeps"
+            reason = verdict.reason or beyond
             of_others = msgspec.structs.replace(verdict, violations=rest, count=count, reason=reason)
             found[verdict.check] = of_others.sentence if count or verdict.reason else ""
     return found

@@ -69,7 +69,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     status: CheckStatus
     """Its judgement."""
     reason: str = ""
-    """Why it was not judged, is off, or, of a check that raised an error, why it failed."""
+    """Why it was not judged, is off, or what a check that failed has raised, also behind its violations."""
     violations: tuple[Violation, ...] = ()
     """The violations, the first `SHOWN_VIOLATIONS` as the check gave them."""
     count: int = 0
@@ -79,7 +79,8 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     def sentence(self) -> str:
         """The verdict on one line."""
         more = f", and {self.count - 1} more" if self.count > 1 else ""
-        detail = self.violations[0].sentence + more if self.violations else self.reason
+        found = [self.violations[0].sentence + more] if self.violations else []
+        detail = "; ".join([*found, *filter(None, [self.reason])])
         return f"{self.check} {self.status}" + (f": {detail}" if detail else "")
 
 

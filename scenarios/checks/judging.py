@@ -58,7 +58,8 @@ def judge_case(
 ) -> tuple[CheckVerdict, ...]:
     """Return the verdict of each check on a case; those that are off come last.
 
-    A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged.
+    A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged. What it
+    has yielded before counts, whatever it raises then, also `NotJudgedError`.
 
     Parameters
     ----------
@@ -110,25 +111,29 @@ def tell(text: str) -> None:
 
 def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
     violations: list[Violation] = []
-    count = 0
+    count, raised = 0, ""
     try:
         with _named_if_slow(name, plugin, case):
             found = made(CHECKS, plugin)(case)
             if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
                 raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")
-            for count, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
-                checked = _checked(violation)
+            for number, violation in enumerate(islice(found, MOST_VIOLATIONS), 1):
+                checked, count = _checked(violation), number
                 if count <= SHOWN_VIOLATIONS:
                     violations.append(checked)
     except NotJudgedError as error:
-        return CheckVerdict(check=name, status="not judged", reason=printable(str(error), 300) or "no reason given")
+        raised = printable(str(error), 300) or "no reason given"
+        if not violations:
+            return CheckVerdict(check=name, status="not judged", reason=raised)
+        raised = f"not judged further: {raised}"
     except PluginError as error:
-        return CheckVerdict(check=name, status="failed", reason=printable(str(error), 300))
+        raised = printable(str(error), 300)
     except ANYTHING as error:  # a check is a user's code
-        return CheckVerdict(check=name, status="failed", reason=f"cannot judge: {named(error)}")
+        raised = f"cannot judge{' further' if violations else ''}: {named(error)}"
     return CheckVerdict(
         check=name,
-        status="failed" if violations else "passed",
+        status="failed" if violations or raised else "passed",
+        reason=raised,
         violations=tuple(violations),
         count=count,
     )

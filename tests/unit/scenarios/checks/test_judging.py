@@ -82,6 +82,31 @@ def test_a_check_of_ones_own_passes_fails_or_is_not_judged(
     assert judged(check, monkeypatch).sentence.startswith(said)
 
 
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (NotJudgedError("no more clouds"), "not judged further: no more clouds"),
+        (NotJudgedError(), "not judged further: no reason given"),
+        (ZeroDivisionError("division"), "cannot judge further: ZeroDivisionError: division"),
+    ],
+)
+def test_what_a_check_has_yielded_counts_whatever_it_raises_then(
+    error: Exception, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has failed, with its violations, and with what was raised beside them."""
+
+    def check(case: CheckedCase) -> Iterator[Violation]:
+        yield Violation(text="late", agent="inv2")
+        yield Violation(text="late", agent="inv3")
+        raise error
+
+    found = judged(check, monkeypatch)
+
+    assert (found.status, found.count, [it.agent for it in found.violations]) == ("failed", 2, ["inv2", "inv3"])
+    assert found.reason == said
+    assert found.sentence == f"mine failed: late: inv2, and 1 more; {said}"
+
+
 def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
     """Numbers of numpy are numbers; those that are none are left out."""
     many = [Violation(text="x", t=np.float64(k), value=float("nan")) for k in range(100)]  # type: ignore[arg-type]
