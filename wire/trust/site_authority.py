@@ -7,7 +7,7 @@ import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -32,6 +32,11 @@ LIFE_DAYS = 365
 
 SKEW = timedelta(minutes=5)
 """A certificate is valid from so long before its issue: clocks of hosts differ."""
+
+RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
+"""No names of members: those of the site's own files, with and without their suffix."""
+
+_TWIN = "{name}: differs from {twin} in case alone, and some disks take their files for the same; rename one of them"
 
 FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
 """Members of every new site."""
@@ -135,14 +140,35 @@ def issue(
 
 def objection(known: MemberList, name: str, role: Role) -> str:
     """Return why no certificate of a role can be issued to a name; empty if one can."""
-    if not is_name(name) or name in (Path(CA).stem, Path(LIST).stem):
-        return f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", "."; not "ca", "members"'
+    if not is_name(name) or name[0] in ".-":  # which would hide its files, or be an option of a command
+        return (
+            f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", ".", the first of them '
+            "neither a dot nor a dash"
+        )
+    if name.casefold() in RESERVED:
+        return f'"{name}" cannot be a name: it is that of a file of the site; give the {role} another name'
     before = known.of(name)
+    if before is None and (twin := _twin(name, [member.name for member in known.members])):
+        return _TWIN.format(name=name, twin=twin)
     if before is not None and before.role != role:
         return f"{name}: has the role {before.role} already; give the {role} another name"
     if len(f"{role}:{name}") > LONGEST_COMMON_NAME - 4:  # room for later generations
         return f"{name}: is too long for a certificate; {role}:NAME has at most {LONGEST_COMMON_NAME - 4} letters"
     return ""
+
+
+def objections(known: MemberList, names: Sequence[str], role: Role) -> list[str]:
+    """Return why certificates of a role cannot be issued to names, each a line; empty if all can."""
+    found = [objection(known, name, role) for name in names]
+    for k, name in enumerate(names):
+        if not found[k] and (twin := _twin(name, names[:k])):
+            found[k] = _TWIN.format(name=name, twin=twin)
+    return [problem for problem in found if problem]
+
+
+def _twin(name: str, others: Sequence[str]) -> str:
+    """Return another name that differs in case alone; empty if there is none."""
+    return next((other for other in others if other != name and other.casefold() == name.casefold()), "")
 
 
 def revoke(folder: Path, name: str) -> Member:

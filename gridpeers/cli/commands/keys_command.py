@@ -64,11 +64,11 @@ def issue(
     """
     with _errors(days):
         from wire.trust.key_folder import KeysError, read_list
-        from wire.trust.site_authority import issue, objection
+        from wire.trust.site_authority import issue, objections
 
         names = list(dict.fromkeys(names))
         known = read_list(keys)
-        if problems := [problem for name in names if (problem := objection(known, name, role))]:
+        if problems := objections(known, names, role):
             raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
         for name in names:
             member = issue(keys, name, role, days=days)

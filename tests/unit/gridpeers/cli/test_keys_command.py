@@ -59,6 +59,8 @@ def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
 def test_names_are_all_judged_before_any_certificate_is_issued(elsewhere: Path) -> None:
     """A line for each name that cannot be used; the good one among them gets nothing, until it stands alone."""
     assert invoke("keys", "init", "lab")[0] == 0
+    assert refused("keys", "issue", "a", "A", "--keys", "lab").startswith("gridpeers: A: differs from a in case alone")
+    assert refused("keys", "issue", ".", "CA", "--keys", "lab").count("cannot be a name") == 2
     text = refused("keys", "issue", "inv1", "a b", "plant", "ca", "--keys", "lab")
 
     assert [line.partition(": ")[2].split()[0] for line in text.splitlines()] == ['"a', "plant:", '"ca"']

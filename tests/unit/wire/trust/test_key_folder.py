@@ -237,7 +237,13 @@ def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
     for name, role, text in (
         ("inv1", "viewer", "inv1: has the role agent already; give the viewer another name"),
         ("a/b", "agent", '"a/b" cannot be a name'),
+        ("..", "agent", r'"\.\." cannot be a name.*neither a dot nor a dash'),
+        ("-v", "agent", '"-v" cannot be a name'),
         ("ca", "agent", '"ca" cannot be a name'),
+        ("CA", "agent", '"CA" cannot be a name: it is that of a file of the site'),
+        ("Ca.Key", "viewer", '"Ca.Key" cannot be a name'),
+        ("members.json", "agent", '"members.json" cannot be a name'),
+        ("INV1", "agent", "INV1: differs from inv1 in case alone"),
         ("x" * 60, "agent", "is too long for a certificate"),
     ):
         with pytest.raises(KeysError, match=text):
