@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,8 @@ import pytest
 from msgspec.structs import replace
 
 from plant.dynamics import live_network
-from plant.dynamics.foreseen_cache import ROOM
+from plant.dynamics.circuit import Circuit
+from plant.dynamics.foreseen_cache import OTHERS
 from plant.equipment.load_powers import set_power
 from plant.equipment.named_loads import named_loads, with_powers
 from plant.feeder import Plant
@@ -270,12 +272,27 @@ def test_loads_set_by_hand_do_not_push_out_what_an_event_to_come_needs(monkeypat
     later = replace(ISLANDED, t=2.0)
     p = plant("microgrid123", later, loads=(LoadEvent(t=1.9, load="48", setting=LoadSetting(factor=1.3)), back))
     at_start = len(made)
-    for number in range(ROOM + 2):
+    for number in range(OTHERS + 2):
         p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * (number + 1)))
         p.advance()
     by_hand = len(made) - at_start
     run(p, 2.1 - p.tick * T_C)
 
-    assert (at_start, by_hand) == (3, ROOM + 2)
+    assert (at_start, by_hand) == (3, OTHERS + 2)
     assert len(made) == at_start + by_hand
     assert [event.t for event in p.take_events() if event.kind == "switch"] == [2.0]
+
+
+def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory() -> None:
+    """In a run of hours people may set thousands: the plant keeps the circuits of the last few."""
+    p = plant()
+
+    def circuits(numbers: range) -> int:
+        for number in numbers:
+            p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * number))
+            p.advance()
+        gc.collect()
+        return sum(isinstance(it, Circuit) for it in gc.get_objects())
+
+    few = circuits(range(1, OTHERS + 2))
+    assert circuits(range(OTHERS + 2, 3 * OTHERS)) == few
