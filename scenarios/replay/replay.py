@@ -68,13 +68,13 @@ class Replay:
 
     @property
     def difference(self) -> Difference | None:
-        """The first difference of all in run time; None if the replay gives what was recorded."""
+        """The first difference of all in run time; None if the replay gives what was recorded, as far as it goes."""
         found = [part.difference for part in self.parts if part.difference is not None]
         return min(found, key=lambda difference: difference.t, default=None)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Sentences on what was not compared."""
+        """Sentences on what was not compared; those on damage of the record itself are `RunRecord.damage`."""
         return tuple(dict.fromkeys(part.note for part in self.parts if part.note))
 
 

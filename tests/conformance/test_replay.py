@@ -97,7 +97,22 @@ def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhe
         assert (elsewhere / "would" / name).stat().st_size > 100
     code, text = invoke("replay", str(run.folder))
     assert code == 0, text
-    assert "The replay gives what was recorded, within 1e-9." in text
+    assert "The replay gives what was recorded, within 1e-9.\n" in text
+    assert "NOTE" not in text
+
+
+def test_of_part_of_a_record_only_that_part_is_said_to_be_the_same(run: Result, tmp_path: Path) -> None:
+    """The sentence itself says that not all was compared, and notes say what; nothing differs: exit code 0."""
+    whole = (run.folder / "IV" / "run.mcap").read_bytes()
+    (tmp_path / "run.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+
+    code, text = invoke("replay", str(tmp_path))
+
+    assert code == 0, text
+    said = text.partition("The replay gives what was recorded, within 1e-9, as far as it was compared:\n")[2]
+    assert "NOTE  the record lacks later decisions" in said, text
+    assert "NOTE  the file is cut off within a chunk" in said
+    assert "within 1e-9." not in text
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -52,8 +53,9 @@ def replay(
     The cores get again what they got, when they got it, and must decide the same within 1e-9. With a change, the loop
     is closed on our plant from then on. docs/replay.md explains both.
 
-    Exit code: 0 all is the same, or what would have been is written, 1 something differs from the record, 2 bad usage,
-    no record, or nothing in it to be replayed, 130 Ctrl-C, 143 SIGTERM.
+    Exit code: 0 all that was compared is the same (notes say what was not), or what would have been is written,
+    1 something differs from the record, 2 bad usage, no record, or nothing in it to be replayed, 130 Ctrl-C,
+    143 SIGTERM.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """
@@ -83,8 +85,7 @@ def replay(
             fail([str(error)], BAD_INPUT)
         except OSError as error:
             fail([refusal(out or Path("runs"), error)], BAD_INPUT)
-    for damage in record.damage:
-        typer.echo(f"NOTE  {damage}")
+    _tell_notes(record.damage)
     if differs:
         raise SystemExit(CLAIM_FAILED)
 
@@ -119,15 +120,22 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         of = "rows" if part.name == "plant" else "states"
         verdict = f"then {part.difference}" if part.difference else "the same" if part.count else "nothing to compare"
         typer.echo(f"  {part.name:<8}{part.count:>7} {of} up to {part.t_end:.2f} s: {verdict}")
-    for note in done.notes:
-        typer.echo(f"NOTE  {note}")
+    if done.difference is None and not any(part.count for part in done.parts):
+        _tell_notes(done.notes)
+        fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
+    if done.difference is None:
+        same = "The replay gives what was recorded, within 1e-9"
+        partly = bool(done.notes or record.damage)  # its damage is told behind the notes
+        typer.echo(f"{same}, as far as it was compared:" if partly else f"{same}.")
+    _tell_notes(done.notes)
     if done.difference is not None:
         typer.echo(f"The first difference: {done.difference}")
-        return True
-    if not any(part.count for part in done.parts):
-        fail(["the record ends before anything that a replay could be compared with"], BAD_INPUT)
-    typer.echo("The replay gives what was recorded, within 1e-9.")
-    return False
+    return done.difference is not None
+
+
+def _tell_notes(notes: Iterable[str]) -> None:
+    for note in notes:
+        typer.echo(f"NOTE  {note}")
 
 
 def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
@@ -156,8 +164,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
         typer.echo(str(done))
         write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")
         (figure,) = save(done.plot(), folder / "plots", "counterfactual")
-    for note in done.notes:
-        typer.echo(f"NOTE  {note}")
+    _tell_notes(done.notes)
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
     if done.difference is not None:
         typer.echo(f"It is not to be trusted: before the change, {done.difference}")
