@@ -51,7 +51,7 @@ class Islands:
         return [first[k] for k in label], fed
 
     def report(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
-        """Return the events at t (s) of changed islands and newly dead buses, with these switches closed."""
+        """Return the events at t (s) of changed islands and newly de-energised buses, with these switches closed."""
         names, _ = self.names(reduction)
         texts = {}
         for name in dict.fromkeys(names):
@@ -71,7 +71,7 @@ class Islands:
         return events + self.report_dead(t, closed, reduction)
 
     def report_dead(self, t: float, closed: frozenset[str], reduction: SwitchState) -> list[PlantEvent]:
-        """Return the event at t (s) of newly dead buses, with their inverters and loads."""
+        """Return the event at t (s) of newly de-energised buses, with their inverters and loads."""
         before = set(self._dead)
         self._dead = self._dead_buses(closed, reduction.live[reduction.label])
         new = [bus for bus in self._dead if bus not in before]
@@ -82,7 +82,7 @@ class Islands:
         some = ", ".join(new[:6]) + (", ..." if len(new) > 6 else "")
         idle = [unit.name for unit in network.inverters if unit.bus in new]
         count = counted(len(new), "bus", "buses")
-        text = f"dead: {count} ({some}) without substation or GFM, {lost:.0f} kW of load not served"
+        text = f"de-energised: {count} ({some}) without substation or GFM, {lost:.0f} kW of load not served"
         text += f", {', '.join(idle)} idle" if idle else ""
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 

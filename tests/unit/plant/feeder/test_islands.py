@@ -64,5 +64,6 @@ def test_an_island_without_gfm_is_dead_and_told_once(network: Network) -> None:
 
     (event,) = first
     assert (event.kind, again, fed) == ("dead", [], [])
+    assert event.text.startswith("de-energised: ")
     assert "without substation or GFM, 985 kW of load not served, inv4, inv5, inv6 idle" in event.text
     assert last == first
