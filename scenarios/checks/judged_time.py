@@ -1,4 +1,4 @@
-"""The limit `since_s` of checks: the run time from which on they judge."""
+"""The time of a run that a check judges: from `since_s` on, and long enough for its limits."""
 
 from __future__ import annotations
 
@@ -17,3 +17,21 @@ def require_time(history: History, since_s: float) -> None:
     end = float(history.t[-1])
     if since_s > end:
         raise NotJudgedError(f"the run ends at {end:g} s, before since_s = {since_s:g} s")
+
+
+def require_longer(judged_s: float, limit: str, limit_s: float) -> None:
+    """Raise NotJudgedError if nothing in a run is long enough to break a limit of time: it would pass unjudged.
+
+    Parameters
+    ----------
+    judged_s : float
+        Time of the run that a check judges (s).
+    limit : str
+        Name of the limit.
+    limit_s : float
+        The limit (s).
+    """
+    if judged_s <= limit_s + 1e-9:
+        raise NotJudgedError(
+            f"the run is shorter than needed: it has {judged_s:g} s to judge, and {limit} = {limit_s:g} s"
+        )

@@ -11,6 +11,7 @@ from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.communication.link_accounts import Missing
 from scenarios.checks.communication.record_pass import Link
+from scenarios.checks.judged_time import require_longer
 from wire.schema.plausible import Plausible, Unit
 
 
@@ -44,6 +45,8 @@ class MessageAccount:
                     yield from _missing(link, missing, f"states of {link[0]} neither heard nor lost")
         if not (found.counts or links):
             raise NotJudgedError("no agent listens to another" if found.has_arrivals else _NO_ARRIVALS)
+        if links and not (found.counts or found.simulated):
+            require_longer(found.t_end, "in_flight_s", self.in_flight_s)
 
     def _without_account(self, found: CommunicationSummary) -> dict[Link, Missing]:
         """Return what is missing on each link whose receiver keeps no account of it."""

@@ -11,6 +11,7 @@ import msgspec
 from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
+from scenarios.checks.judged_time import require_longer
 from scenarios.emulation.emulation_config import EmulationConfig
 from wire.messages import PlantEvent
 from wire.schema.plausible import Plausible, Unit
@@ -52,6 +53,7 @@ class LastWords:
                     unit="s",
                     limit=self.silent_s,
                 )
+        require_longer(end, "silent_s", self.silent_s)
 
     def _explained(self, case: CheckedCase, agent: str, last: float, killed: dict[str, float]) -> bool:
         """Whether an event, or a fault of the scenario, explains that an agent ends at a time (s)."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenarios.checks.check_verdict import Violation
 from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judged_time import Since, require_time
+from scenarios.checks.judged_time import Since, require_longer, require_time
 from scenarios.results.history import Flags
 from wire.schema.plausible import Plausible, Unit
 
@@ -35,6 +35,7 @@ class Rating:
         """Yield the longest overload of each inverter that is too long."""
         history, s = case.history, case.nameplates.s
         require_time(history, self.since_s)
+        require_longer(float(history.t[-1] - max(history.t[0], self.since_s)), "longest_s", self.longest_s)
         judged: Flags = (history.t >= self.since_s - 1e-9)[:, None] & (self.with_killed | ~case.killed(history))
         P, S = np.abs(history.P) / s, np.hypot(history.P, history.Q) / s
         for name, loading, limit in (("P", P, self.P_limit_pu), ("S", S, self.S_limit_pu)):

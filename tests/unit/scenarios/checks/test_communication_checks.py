@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tracemalloc
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -14,14 +15,16 @@ from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication import record_content
 from scenarios.checks.communication.communication_summary import LINKED_WITHIN, SummaryPass
-from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts
+from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts, Missing
 from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.communication.record_pass import SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.checks.communication.state_window import StateWindow
+from scenarios.checks.judging import judge_case
 from scenarios.record.record_file import RecordFile
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
 from wire.journal import Decision
+from wire.plugins.plugin import Plugin
 
 COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
 
@@ -51,6 +54,39 @@ def test_a_sound_run_passes(sound: CheckedCase, check: str) -> None:
 def test_a_run_on_lossy_links_is_accounted_for(check: str) -> None:
     """Losses and delays of emulated links are on the account."""
     assert verdict(ran_with(LOSSY).checked_case, check).sentence == f"{check} passed"
+
+
+def test_a_silence_longer_than_the_run_is_not_judged(sound: CheckedCase) -> None:
+    """No agent could break it; one that never sends a state still does."""
+    content = sound.content
+    states = {name: states for name, states in content.states.items() if name != "inv9"}
+    silent = verdict(with_content(sound, replace(content, states=states)), "last_words", silent_s=3600.0)
+
+    assert verdict(sound, "last_words", silent_s=3600.0).reason.endswith("7 s to judge, and silent_s = 3600 s")
+    assert (silent.status, silent.violations[0].text) == ("failed", "never sends a state")
+
+
+@pytest.mark.parametrize(("in_flight_s", "status"), [(7.0, "not judged"), (6.0, "passed")])
+def test_in_wall_clock_time_a_time_of_flight_longer_than_the_run_is_not_judged(in_flight_s: float, status: str) -> None:
+    """All that was sent may be on its way; in simulated time nothing is, so that the limit does not matter."""
+    found = SimpleNamespace(
+        unreadable=0,
+        counts={},
+        unjudged={},
+        agents=("inv1", "inv2"),
+        simulated=False,
+        has_arrivals=True,
+        arrivals={("inv1", "inv2"): []},
+        t_end=7.0,
+    )
+    limits = (("in_flight_s", in_flight_s),)
+    case: Any = SimpleNamespace(communication=found, case="IV")
+    (judged,) = judge_case(case, {"message_account": Plugin(use="message_account", parameters=limits)})
+
+    assert judged.status == status
+    found.simulated, found.unheard = True, {("inv1", "inv2"): Missing()}
+    (judged,) = judge_case(case, {"message_account": Plugin(use="message_account", parameters=limits)})
+    assert judged.status == "passed"
 
 
 def test_without_a_cut_there_is_no_heal_to_judge(sound: CheckedCase) -> None:

@@ -224,6 +224,15 @@ def test_windows_that_are_too_short_are_not_judged(sound: CheckedCase, check: st
     assert verdict(sound, check, **{limit: 20.0}).status == "not judged"
 
 
+def test_a_time_of_overload_longer_than_the_run_is_not_judged(sound: CheckedCase) -> None:
+    """No run of 7 s could break it; from 6.5 s on half a second is left, which cannot break 1 s either."""
+    assert verdict(sound, "rating", longest_s=3600.0).sentence == (
+        "rating not judged: the run is shorter than needed: it has 7 s to judge, and longest_s = 3600 s"
+    )
+    assert verdict(sound, "rating", since_s=6.5).status == "not judged"
+    assert verdict(sound, "rating", since_s=5.9).status == "passed"
+
+
 def test_a_load_whose_new_power_is_not_told_ends_the_balance(sound: CheckedCase) -> None:
     """Nobody knows what such a load takes: rows from then on are not judged."""
 
