@@ -188,6 +188,7 @@ def _interval(node: NodeFault) -> _Interval:
 
 
 def _events_of(nodes: Sequence[NodeFault]) -> list[tuple[float, str, str]]:
+    """Return time (s), liar and sentence of each lie's beginning and end, as configured: links know of no roster."""
     found = []
     for node in nodes:
         if node.lies is not None:
