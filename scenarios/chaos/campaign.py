@@ -15,13 +15,11 @@ from scenarios.chaos.chaos_run import (
     SAME_IN_PROCESSES,
     ChaosRow,
     compared,
-    run_number,
     run_schedule,
-    seed_of,
-    shrink_number,
 )
 from scenarios.chaos.disturbance import Schedule, counted_kinds
 from scenarios.chaos.disturbed_scenario import ChaosBase
+from scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
 from scenarios.chaos.schedule_search import BATCH, drawn
 from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete

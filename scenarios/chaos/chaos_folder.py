@@ -11,9 +11,10 @@ from types import MappingProxyType
 
 import msgspec
 
-from scenarios.chaos.chaos_run import SEEDS, ChaosRow, seed_of
+from scenarios.chaos.chaos_run import ChaosRow
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
+from scenarios.chaos.numbered_run import SEEDS, seed_of
 from scenarios.results.run_files import FolderError, shown, write_whole
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line

@@ -1,4 +1,4 @@
-"""One run of a campaign, in whatever process: from its number to its verdict. Nothing that a run can do ends it."""
+"""One run of a campaign: from its schedule to its verdict. Nothing that a run can do ends it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ import msgspec
 from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
 from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
 from scenarios.chaos.disturbance import Schedule
-from scenarios.chaos.disturbed_scenario import ChaosBase, base_of
+from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.machine_error import MachineError, machine_error, unwritten
-from scenarios.chaos.schedule_search import shrunk
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.record import Recorded
@@ -45,9 +44,6 @@ LONGER_RUNS = 6
 """Most times that a run with trips is done, each longer than the one before: inverters stay off after three trips
 without a minute in service between."""
 
-SEEDS = 1_000_000
-"""Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
-
 
 class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     """The result of one run."""
@@ -76,97 +72,6 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     """Wall-clock time (s)."""
 
 
-def seed_of(seed: int, number: int) -> int:
-    """Return the seed of the scenario of a run.
-
-    Examples
-    --------
-    >>> seed_of(1, 12)
-    1000012
-    """
-    return seed * SEEDS + number
-
-
-def run_number(
-    text: str, seed: int, number: int, schedule: Schedule, driver: Driver, within: Path | None = None
-) -> ChaosRow:
-    """Run a campaign's run with a number.
-
-    Parameters
-    ----------
-    text : str
-        The base (`ChaosBase.text`).
-    seed : int
-        Seed of the campaign.
-    number : int
-        Number of the run.
-    schedule : Schedule
-        What was drawn for it.
-    driver : {"inprocess", "processes"}
-        With processes, it runs in one process too, and both must give the same bytes.
-    within : Path, optional
-        Folder of the campaign for temporary folders; that of the system when left out.
-
-    Raises
-    ------
-    MachineError
-        If the machine lacks what the run needs.
-    """
-    return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver, within=within)
-
-
-def shrink_number(
-    text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
-) -> ChaosRow:
-    """Return the run of the simplest schedule found that violates what a run violates.
-
-    Parameters
-    ----------
-    text : str
-        The base (`ChaosBase.text`).
-    seed, number : int
-        Of the campaign, and of the run.
-    violated : str
-        Name of the check, or of what else is asked.
-    driver : {"inprocess", "processes"}
-        As for `run_number`.
-    within : Path, optional
-        As for `run_number`.
-
-    Raises
-    ------
-    MachineError
-        If the machine lacks what a run needs.
-    """
-    base = base_of(text)
-    rows: dict[bytes, ChaosRow] = {}
-
-    def row_of(schedule: Schedule) -> ChaosRow:
-        again = violated == REPEATS
-        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=again, within=within)
-        return rows.setdefault(msgspec.json.encode(schedule), row)
-
-    def fails(schedule: Schedule) -> bool:
-        try:
-            return violated in row_of(schedule).violated
-        except MachineError as error:
-            raise _SearchEnd(error) from error
-
-    try:
-        simplest = shrunk(base, seed, number, fails)
-    except _SearchEnd as end:
-        raise end.why from None
-    return rows.get(msgspec.json.encode(simplest)) or row_of(simplest)  # that of the run itself is not run to shrink it
-
-
-class _SearchEnd(BaseException):
-    """Ends a search at once: hypothesis would take an `Exception` for a failure, and shrink it."""
-
-    def __init__(self, why: MachineError) -> None:
-        super().__init__(str(why))
-        self.why = why
-
-
 def run_schedule(
     base: ChaosBase,
     schedule: Schedule,
@@ -190,11 +95,11 @@ def run_schedule(
     number : int, optional
         Number of the run.
     driver : {"inprocess", "processes"}
-        See `run_number`.
+        With processes, it runs in one process too, and both must give the same bytes.
     again : bool, optional
         Whether to run it twice: both must give the same bytes.
     within : Path, optional
-        See `run_number`.
+        Folder of the campaign for temporary folders; that of the system when left out.
 
     Raises
     ------

@@ -22,6 +22,7 @@ from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
 from scenarios.chaos.chaos_run import ChaosRow, run_scenario
 from scenarios.chaos.disturbance import counted_kinds
 from scenarios.chaos.machine_error import MachineError
+from scenarios.chaos.numbered_run import shrink_number
 from scenarios.checks.check_registry import ALWAYS
 from scenarios.run_case import run_case
 from scenarios.schema import load_scenario
@@ -250,7 +251,7 @@ def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
 
     with pytest.raises(MachineError, match="No space left on device"):
-        chaos_run.shrink_number(base.text, 8, 3, "frequency", "inprocess")
+        shrink_number(base.text, 8, 3, "frequency", "inprocess")
     assert full.asked == 1
 
 
