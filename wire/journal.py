@@ -40,7 +40,7 @@ AT_ONCE = 64
 """Most messages in one entry: of the longest there are, they fit into a part."""
 
 
-class Entry(msgspec.Struct, frozen=True, array_like=True):
+class Entry(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """One entry; its tag is the first value of the array."""
 
 

@@ -11,17 +11,20 @@ import msgspec
 from scenarios.record.record_info import RecordInfo
 from wire.bounds import LONGEST_MESSAGE
 from wire.codec import CRC, sound
-from wire.journal import AnyEntry, Entry, Exchange
+from wire.journal import ENTRIES, AnyEntry, Entry, Exchange
 from wire.messages import AnyMessage, Measurement, State
 
 _HEAD = b"\xdd"
 """Begins an array of msgpack, before the number of its values in four bytes."""
 
+_LENGTHS = {kind.__struct_config__.tag: 1 + len(kind.__struct_fields__) for kind in ENTRIES}
+"""Number of values of an entry of each kind, with the kind itself."""
+
 _decoder = msgspec.msgpack.Decoder(list[AnyEntry])
 
 
 def whole_entries(data: bytes) -> Sequence[Entry] | None:
-    """Return all entries in the data of a `Journal` at once; None if any is damaged or unknown.
+    """Return all entries in the data of a `Journal` at once; None if any is damaged, unknown, or longer than ours.
 
     It takes a twentieth of the time of `raw_entries` and `entry_of`, which say what is wrong and read the rest.
     """
@@ -83,14 +86,21 @@ def raw_entries(data: bytes) -> Iterator[Any]:
 def entry_of(raw: Any) -> Entry | None:
     """Return the entry that a value of `raw_entries` makes; None if it is of a kind that a later version has.
 
+    Values that a later version may have added at its end are left out.
+
     Raises
     ------
     ValueError
-        If it is none of ours.
+        If it is none of ours, or has another one at its end: its length is damaged, and it took in what followed.
     """
     match raw:
         case ["exchange", int(tick), list(measurements), list(states)]:  # msgspec would copy each value in it
             return Exchange(tick, measurements, states)
+    if isinstance(raw, list) and raw and isinstance(raw[0], str) and raw[0] in _LENGTHS:
+        length = _LENGTHS[raw[0]]
+        if any(isinstance(value, list) and value and value[0] in tuple(_LENGTHS) for value in raw[length:]):
+            raise ValueError(f'an entry "{raw[0]}" has another one at its end, as its length is damaged')
+        raw = raw[:length]
     try:
         entry: Entry = msgspec.convert(raw, AnyEntry)
     except msgspec.ValidationError as error:

@@ -61,6 +61,25 @@ def test_a_part_that_is_not_all_ours_is_left_to_one_by_one(data: bytes) -> None:
     assert whole_entries(data) is None
 
 
+def test_an_entry_that_took_in_the_next_one_is_damaged() -> None:
+    """The number of its values is one too large: neither way of reading loses the next entry without a word."""
+    for part in PARTS:
+        data = bytes([part[0] + 1]) + part[1:] + PARTS[1]
+
+        assert whole_entries(data) is None
+        with pytest.raises(ValueError, match="has another one at its end"):
+            list(entries_of(data))
+
+
+@pytest.mark.parametrize("added", [b"\x07", b"\xa1\xff", b"\xd4\x05\x00"], ids=["number", "no UTF-8", "extension"])
+def test_a_value_that_a_later_version_added_is_left_out(added: bytes) -> None:
+    """The entry counts without it, if it can be read at all; both ways agree on what cannot."""
+    data = bytes([PARTS[1][0] + 1]) + PARTS[1][1:] + added
+
+    assert whole_entries(data) is None
+    assert one_by_one(data) == ([] if added == b"\xa1\xff" else [ENTRIES[1]])
+
+
 def test_what_can_be_read_of_a_part_with_an_entry_of_a_later_version_is_read() -> None:
     """The entry is left out, and those around it are there."""
     data = PARTS[1] + msgspec.msgpack.encode(["later", 1]) + PARTS[2]
