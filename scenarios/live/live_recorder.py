@@ -14,6 +14,7 @@ from scenarios.live.link_log import LinkLog
 from scenarios.live.show.snapshot import line_of
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError
+from wire.driver.large_blocks import keep_out_of_the_heap
 from wire.messages import LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
 from wire.trust.credentials import Credentials
@@ -76,6 +77,7 @@ class LiveRecorder:
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
     def __enter__(self) -> LiveRecorder:
+        keep_out_of_the_heap()
         self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take, self._credentials)
         self._thread.start()
         return self
