@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import islice
 from math import isfinite
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 from plant.dynamics import Circuit, Dynamics, PlantError
+from plant.dynamics.foreseen_cache import ROOM
 from plant.dynamics.start.at_rest import require_within_limits
 from plant.feeder.circuits import Circuits
 from plant.feeder.closings import Closings
@@ -126,8 +128,8 @@ class Plant:
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
-        # scheduled networks are factored now: in wall-clock time an event must not be late
-        for circuit in self._foreseen():
+        # the first scheduled networks are factored now: in wall-clock time an event must not be late
+        for circuit in islice(self._foreseen(), ROOM):
             self._dynamics.network.reduced(circuit, foreseen=True)
 
     def load_step(self) -> None:

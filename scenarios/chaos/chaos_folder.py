@@ -11,18 +11,18 @@ from types import MappingProxyType
 
 import msgspec
 
-from scenarios.chaos.chaos_run import ChaosRow
-from scenarios.chaos.disturbance import Schedule
+from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.numbered_run import SEEDS, seed_of
+from scenarios.chaos.numbered_run import seed_of
 from scenarios.results.run_files import FolderError, shown, write_whole
+from scenarios.run_request import Driver
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line
 
-SCENARIO, TABLE, FAILURES = "scenario.toml", "chaos.csv", "failures"
+SCENARIO, SEED, JOURNAL = "scenario.toml", "seed.txt", "runs.jsonl"
+"""Files of which a campaign goes on: the journal has a line for each run, written as it ends, the latest counts."""
 
-PASSED = "passed"
-"""Status of a run that violated nothing."""
+TABLE, FAILURES = "chaos.csv", "failures"
 
 COLUMNS = (
     *("run", "seed", "status", "violated", "why", "disturbances", "schedule"),
@@ -59,13 +59,16 @@ class ChaosFolder:
         self.rows = dict(rows)
         """Results by the number of their run."""
         write_whole(path / SCENARIO, base.text)
+        write_whole(path / SEED, f"{seed}\n")
+        write_whole(path / JOURNAL, [_journal_line(row) for row in self.rows.values()])
         self._write_table()
 
     def add(self, row: ChaosRow) -> None:
         """Keep the result of a run, in the order in which they come."""
         self.rows[row.number] = row
-        with (self.path / TABLE).open("a", encoding="utf-8", newline="\n") as file:
-            file.write(self._cells(row))
+        for name, text in ((JOURNAL, _journal_line(row)), (TABLE, self._cells(row))):
+            with (self.path / name).open("a", encoding="utf-8", newline="\n") as file:
+                file.write(text)
 
     def sort(self) -> None:
         """Write the table in the order of the runs."""
@@ -117,10 +120,8 @@ class ChaosFolder:
         return _line(cells)
 
 
-def kept_rows(folder: Path, base: ChaosBase, seed: int, runs: int) -> dict[int, ChaosRow]:
-    """Return what a campaign that was interrupted, or that was to be shorter, has of one that goes on in its folder.
-
-    Only runs that passed everything are kept: the table does not tell all that the others say, so they are done again.
+def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: int) -> dict[int, ChaosRow]:
+    """Return the runs that a campaign has in its folder, for one that goes on there.
 
     Parameters
     ----------
@@ -128,72 +129,41 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, runs: int) -> dict[int, 
         Its folder.
     base : ChaosBase
         The scenario.
-    seed, runs : int
-        Seed of the campaign that goes on, and number of its runs.
+    seed, driver, runs : int, {"inprocess", "processes"}, int
+        Of the campaign that goes on. Runs in one process are none of a campaign with processes.
 
     Raises
     ------
     FolderError
         If it is no folder of a campaign, or of one with another scenario, another seed or more runs.
     """
+    where = f"--resume {folder}"
     try:
         text = (folder / SCENARIO).read_text(encoding="utf-8")
-        with (folder / TABLE).open(encoding="utf-8", newline="") as file:
-            rows = list(csv.DictReader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        theirs = int((folder / SEED).read_text(encoding="ascii"))
+        lines = (folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # behind the last line feed: cut off by a kill -9
+    except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise FolderError(
-            f"--resume {folder}: no folder of a campaign: {why}; name one with {SCENARIO} and {TABLE}"
+            f"{where}: no folder of a campaign: {why}; name one with {SCENARIO}, {SEED} and {JOURNAL}"
         ) from None
     if text != base.text:
-        raise FolderError(
-            f"--resume {folder}: its {SCENARIO} is not the scenario and case that are to be disturbed; "
-            "begin a new folder"
-        )
-    kept: dict[int, ChaosRow] = {}
-    for line, cells in enumerate(rows, 2):
+        raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to be disturbed; begin a new folder")
+    if theirs != seed:
+        raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
+    rows: dict[int, ChaosRow] = {}
+    for place, line in enumerate(lines, 1):
         try:
-            row = _row(cells)
-            theirs = int(cells["seed"])
-        except (KeyError, TypeError, ValueError) as error:
-            if line == len(rows) + 1:  # a kill -9 came while it was written
-                continue
-            raise FolderError(f"--resume {folder}: line {line} of {TABLE} cannot be read: {error}") from None
-        if theirs != seed_of(seed, row.number):
+            row = msgspec.json.decode(line, type=ChaosRow)
+        except msgspec.MsgspecError as error:
             raise FolderError(
-                f"--resume {folder}: run {row.number} has seed {theirs}, with --seed {seed} it would be "
-                f"{seed_of(seed, row.number)}; give the seed with which it was begun: --seed {theirs // SEEDS}"
-            )
-        if row.number >= runs:
-            raise FolderError(
-                f"--resume {folder}: it has run {row.number} already; give --runs {row.number + 1} or more"
-            )
-        if cells["status"] == PASSED:
-            kept[row.number] = row
-        else:
-            kept.pop(row.number, None)
-    return kept
-
-
-def _row(cells: Mapping[str, str]) -> ChaosRow:
-    """Return a row of the table, but for what it violated.
-
-    Raises
-    ------
-    KeyError, TypeError, ValueError
-        If it is none.
-    """
-    schedule = msgspec.convert(json.loads(cells["schedule"]), Schedule)
-    return ChaosRow(
-        number=int(cells["run"]),
-        schedule=schedule,
-        passed=tuple(cells["passed"].split()),
-        history_sha256=cells["history_sha256"],
-        links_sha256=cells["links_sha256"],
-        trips=int(cells["trips"]),
-        since_s=float(cells["since_s"]),
-        took_s=float(cells["took_s"]),
-    )
+                f"{where}: line {place} of {JOURNAL} is damaged ({error}); remove it, and its run is done again"
+            ) from None
+        rows[row.number] = row
+    if rows and (last := max(rows)) >= runs:
+        raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
+    here = {SAME_IN_PROCESSES} if driver == "processes" else set()
+    return {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}
 
 
 def again(file: Path) -> str:
@@ -203,7 +173,11 @@ def again(file: Path) -> str:
 
 def _status(row: ChaosRow) -> str:
     """Return the status of a run in a word: what it violates comes before what a collapse excuses."""
-    return "violated" if row.violated else "collapse" if row.collapse else PASSED
+    return "violated" if row.violated else "collapse" if row.collapse else "passed"
+
+
+def _journal_line(row: ChaosRow) -> str:
+    return msgspec.json.encode(row).decode() + "\n"
 
 
 def _line(cells: Iterable[object]) -> str:

@@ -98,6 +98,8 @@ class RecordFile:
         self._chunks: list[_ChunkPlace] = []
         self._indexed: list[_ChunkPlace] = []
         """The same chunks as the index at the end has them."""
+        self._refused: set[int] = set()
+        """Where chunks begin that are none of ours."""
         self._info: RecordInfo | None = None
         self._read_on()
         if self._info is None:
@@ -184,6 +186,7 @@ class RecordFile:
                 if size > MOST_CHUNK or since > until:
                     self._damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
                     self.holes.append((self.t_end, self.t_end))
+                    self._refused.add(start)
                 else:
                     self._chunks.append(_ChunkPlace(start, length, since, until))
             elif opcode == Opcode.CHUNK_INDEX and length > _TIMES.size:
@@ -200,7 +203,7 @@ class RecordFile:
 
     def _note_missing(self) -> None:
         """Note the chunks that only the index has: their first byte is damaged, so they look like something else."""
-        found = {place.offset for place in self._chunks}
+        found = {place.offset for place in self._chunks} | self._refused
         if len(self._indexed) <= len(found):  # every chunk is there, and an offset in the index may be damaged
             return
         for place in self._indexed:
@@ -208,6 +211,7 @@ class RecordFile:
                 hole = place.since / 1e9, place.until / 1e9
                 self.holes.append(hole)
                 self._damage.append(f"a chunk cannot be found, from t = {hole[0]:.2f} s to {hole[1]:.2f} s")
+        self._indexed.clear()
 
     def _cut(self, where: str) -> None:
         at = f" after t = {self.t_end:.2f} s" if self._chunks else ""

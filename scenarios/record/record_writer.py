@@ -160,11 +160,11 @@ class RecordWriter:
         """Run time (ns) of the last message that was taken."""
         self.spare = 0.0
         """Room (bytes) on the disk that the run's other files still need: the record ends before it takes that."""
+        self._index = _FileIndex(path.parent)  # should the system give no file for it, there is no empty record
         self._file = _WholeWrites(path)
         # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
         compression = CompressionType.LZ4 if info.driver == "inprocess" else CompressionType.ZSTD
         self._writer = Writer(cast("Any", self._file), chunk_size=2 * CHUNK, compression=compression)
-        self._index = _FileIndex(path.parent)
         # the one place where a run of days would grow: should the library name it otherwise, a test tells
         self._writer._Writer__chunk_indices = self._index  # type: ignore[attr-defined,unused-ignore]  # noqa: SLF001
         self._channels: dict[Topic, int] = {}

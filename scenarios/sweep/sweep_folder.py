@@ -7,7 +7,6 @@ cut off by a kill has no line feed; it is removed when the sweep goes on, and it
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 from collections.abc import Mapping
@@ -16,13 +15,14 @@ from types import TracebackType
 
 import msgspec
 
+from scenarios.results.folder_lock import LOCK, locked
 from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import SweepRow
 from scenarios.versions import versions
 
-MANIFEST, JOURNAL, LOCK = "sweep.json", "runs.jsonl", ".lock"
+MANIFEST, JOURNAL = "sweep.json", "runs.jsonl"
 
 
 def folder_of(out: Path | None, name: str) -> Path:
@@ -54,7 +54,7 @@ class SweepFolder:
         try:
             known = _check(folder, whole)
             folder.mkdir(parents=True, exist_ok=True)
-            self._lock = _locked(folder)
+            self._lock = locked(folder, "--out", "sweep")
             if not known:
                 write_whole(folder / "sweep.toml", plan.text)
                 write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
@@ -124,17 +124,6 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
             "the same versions, or begin in another folder by --out"
         )
     return True
-
-
-def _locked(folder: Path) -> int:
-    """Lock the folder for this process; the system opens the lock however the process ends."""
-    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
-    try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        os.close(handle)
-        raise FolderError(f"--out {shown(folder)}: another `gridpeers sweep` is at work in it; let it end") from None
-    return handle
 
 
 def _read(journal: Path, runs: int) -> dict[int, SweepRow]:

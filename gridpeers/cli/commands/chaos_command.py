@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -22,6 +23,7 @@ _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
 
 def chaos(
+    context: typer.Context,
     scenario: ScenarioName,
     runs: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs.")] = 100,
     driver: Annotated[
@@ -66,7 +68,7 @@ def chaos(
     from scenarios.chaos.campaign import Campaign
     from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import FolderError, new_folder, require_folder, set_status, shown
+    from scenarios.results.run_files import RUNS, FolderError, new_folder, require_folder, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
@@ -74,13 +76,15 @@ def chaos(
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     base = ChaosBase(spec, feeder)
     try:
-        rows = {} if resume is None else kept_rows(resume, base, seed, runs)
+        if resume is not None and resume.is_dir():
+            _lock(context, resume, "--resume")
+        rows = {} if resume is None else kept_rows(resume, base, seed, driver, runs)
         if resume is None:
             require_folder(out, f"{spec.name}-chaos")
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except OSError as error:
-        fail([f"--out {out}: {error.strerror}; give another folder"], BAD_INPUT)
+        fail([f"--out {out or RUNS}: {error.strerror}; give another folder"], BAD_INPUT)
     campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     console = Console()
     with _kept_if_ended(campaign, rows, resume):
@@ -88,6 +92,8 @@ def chaos(
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     try:
         path = resume or new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
+        if resume is None:
+            _lock(context, path, "--out")
         set_status(path, "running")
         folder = ChaosFolder(path, base, seed, command_line(*words), rows)
     except (FolderError, OSError) as error:
@@ -97,6 +103,14 @@ def chaos(
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
     raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
+
+
+def _lock(context: typer.Context, folder: Path, option: str) -> None:
+    """Lock the campaign's folder until the command ends."""
+    from scenarios.results.folder_lock import locked
+
+    handle = locked(folder, option, "chaos")
+    context.call_on_close(lambda: os.close(handle))
 
 
 def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None, driver: str) -> None:

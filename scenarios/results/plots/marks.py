@@ -167,7 +167,7 @@ def _choices(mark: Mark) -> list[tuple[float, str, TextSide]]:
     what = " ".join(map(_abridged, mark.what.split(" ")))
     both = "\n".join(text for text in (mark.label, what) if text)
     narrow = "\n".join(text for text in (mark.label, what.replace(" ", "\n", 1)) if text)
-    texts = {both: 0.0, narrow: 5.0, mark.label: 10.0, "": 30.0}
+    texts = {mark.label: 10.0, "": 30.0} | {narrow: 5.0} | {both: 0.0}  # of equal texts the last, cheapest price counts
     sides: tuple[tuple[TextSide, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
     return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
 
