@@ -32,6 +32,10 @@ LEAVING = 10.0
 AFTERMATH = 0.3
 """The same when the run broke: processes that die of it do so in this time, the others are ended."""
 
+LAST_TELEMETRY = 2.0
+"""Longest time (s) for which the last telemetry of a plant may come after its process has ended in order: on a busy
+machine the news of its end are faster."""
+
 STOOD_STILL = 1.0
 """Time (s) by which a wait may be longer than asked for before this process counts as having stood still itself."""
 
@@ -155,6 +159,8 @@ class _ProcessDriver:
         self._began = self._ended_at = monotonic()
         self._started: float | None = None
         self._plant_ready = self._ended = False
+        self._plant_left: float | None = None
+        """When (s, monotonic) the plant's process ended in order, so that its last telemetry is still to come."""
         self._events: list[PlantEvent] = []
         self._awaited: list[str] = []
         self._notes: dict[str, str] = {}
@@ -172,7 +178,7 @@ class _ProcessDriver:
         client, since = self.client, self._began
         while not self._ended:
             deadline = self._plant_deadline if self._plant_ready else BUILD_DEADLINE
-            limit = min(deadline, supervisor.wait)
+            limit = min(deadline, supervisor.wait, LAST_TELEMETRY if self._plant_left is not None else deadline)
             asked = monotonic()
             words = client.take(limit)
             now = monotonic()
@@ -185,6 +191,8 @@ class _ProcessDriver:
                 self._take_word(word, supervisor)
             if client.progress is not None:
                 supervisor.note_time(*client.progress)
+            if self._plant_left is not None and not self._ended and now - self._plant_left > LAST_TELEMETRY:
+                self._end(supervisor.children[PLANT].report(self._when))
             if not self._ended:
                 supervisor.start_when_gone(self._awaited)
                 self._awaited.clear()
@@ -219,7 +227,9 @@ class _ProcessDriver:
         if self._ended:
             return
         begun = self.client.latest is not None
-        if child.name == PLANT or (supervisor.failed(child) and not begun and not self._wall):
+        if child.name == PLANT and child.status == 0 and begun:
+            self._plant_left = monotonic()
+        elif child.name == PLANT or (supervisor.failed(child) and not begun and not self._wall):
             self._end(child.report(self._when))
         elif supervisor.failed(child):
             self._notes[child.name] = child.report(self._when)

@@ -292,7 +292,7 @@ def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory() -> None:
             p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * number))
             p.advance()
         gc.collect()
-        return sum(isinstance(it, Circuit) for it in gc.get_objects())
+        return sum(type(it) is Circuit for it in gc.get_objects())
 
     few = circuits(range(1, OTHERS + 2))
     assert circuits(range(OTHERS + 2, 3 * OTHERS)) == few

@@ -51,7 +51,7 @@ def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
     monkeypatch.setattr(
         live_processes, "run_agents", lambda process, links: ran.extend(config.name for config in process) or ""
     )
-    monkeypatch.setattr(live_processes.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(live_processes, "stop_at_signals", lambda *_: None)
 
     if runs:
         live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
