@@ -163,7 +163,8 @@ def judged(run: SoakRun, end: SoakEnd, lasted: float, stays: Sequence[str]) -> l
         of_kind = [timed for timed in run.times if timed.what == what]
         deaf = sum(timed.deaf for timed in of_kind)
         found.append(judge_times(name, [timed.seconds for timed in of_kind if not timed.deaf], limit, deaf))
-    found.append(judge_checks(end.checks, end.silences, run.kills))
+    heals = [timed.t for timed in run.times if timed.what == "heal"]
+    found.append(judge_checks(end.checks, end.silences, run.kills, heals))
     wrong = [*run.problems, *([] if end.status == 0 else [f"gridpeers up ended with {end.status}"])]
     found.append(Finding("commands and processes", "none fails", "; ".join(wrong[:3]) or "all as asked", "PASS"))
     if wrong:

@@ -30,6 +30,12 @@ LEAST = 300.0
 LAST_WORDS = "last_words"
 """The check that names agents which end for no reason that the run knows."""
 
+FREQUENCY = "frequency"
+"""The check of the band of frequency."""
+
+SETTLED = 2.0
+"""Time (s) after which the check of frequency judges after an event."""
+
 NOTICED = 2.0
 """Longest time (s) between a kill and an agent's last state, as the observer's run time is a message old."""
 
@@ -169,7 +175,10 @@ def judge_times(what: str, seconds: Sequence[float], limit: float | None, deaf: 
 
 
 def judge_checks(
-    verdicts: tuple[CheckVerdict, ...], silences: Sequence[Violation], kills: Sequence[tuple[str, float]]
+    verdicts: tuple[CheckVerdict, ...],
+    silences: Sequence[Violation],
+    kills: Sequence[tuple[str, float]],
+    heals: Sequence[float] = (),
 ) -> Finding:
     """Return the verdict of the checks.
 
@@ -182,21 +191,29 @@ def judge_checks(
     kills : Sequence[tuple[str, float]]
         Agents that this program has killed, and when (s of run time): the check of last words names each of them, as
         nothing in the run tells why they are silent, and no others.
+    heals : Sequence[float]
+        Run times (s) at which agents that were parted used each other again. What they held meanwhile is old, so the
+        frequency moves; its check knows changes of switches, loads and inverters alone, and may name it then.
     """
     if not verdicts:
         return Finding("checks", "none fails", "there is no checks.json", "FAIL")
-    words = next((one for one in verdicts if one.check == LAST_WORDS), None)
-    known = (
-        words is not None
-        and words.status == "failed"
-        and words.count == len(silences)
-        and _were_killed(silences, kills)
-    )
-    failed = [one for one in verdicts if one.status == "failed" and not (known and one is words)]
-    text = summary(tuple(one for one in verdicts if not (known and one is words)))
-    if known:
-        text += f"; {LAST_WORDS} names the {len(kills)} kills by agent and time, and nothing else"
-    return Finding("checks", "none fails", text, "FAIL" if failed else "PASS")
+    known: dict[str, str] = {}
+    for one in verdicts:
+        if one.status != "failed":
+            continue
+        if one.check == LAST_WORDS and one.count == len(silences) and _were_killed(silences, kills):
+            known[one.check] = f"{LAST_WORDS} names the {len(kills)} kills by agent and time, and nothing else"
+        if one.check == FREQUENCY and one.count == len(one.violations) and _follow(one.violations, heals):
+            worst = max(it.value or 0.0 for it in one.violations)
+            known[one.check] = f"{FREQUENCY} names {one.count} x up to {worst:.4f} Hz within {SETTLED:g} s of a heal"
+    rest = tuple(one for one in verdicts if one.check not in known)
+    failed = any(one.status == "failed" for one in rest)
+    return Finding("checks", "none fails", "; ".join((summary(rest), *known.values())), "FAIL" if failed else "PASS")
+
+
+def _follow(violations: Sequence[Violation], heals: Sequence[float]) -> bool:
+    """Return whether each violation comes with a heal, or up to `SETTLED` after it."""
+    return all(one.t is not None and any(-NOTICED <= one.t - heal <= SETTLED for heal in heals) for one in violations)
 
 
 def _were_killed(silences: Sequence[Violation], kills: Sequence[tuple[str, float]]) -> bool:

@@ -157,6 +157,21 @@ def test_only_the_silence_of_agents_that_were_killed_is_explained() -> None:
         assert judge_checks(verdicts, [dead], kills).verdict == "FAIL"
 
 
+def test_a_frequency_that_moves_as_agents_find_each_other_again_is_told_and_no_failure() -> None:
+    """Within 2 s of a heal, and at no other time; and only if the verdict shows all that the check has named."""
+
+    def verdict(t: float, count: int = 1) -> CheckVerdict:
+        out = Violation(text="abs(f - 60)", agent="inv7", t=t, value=0.0102, limit=0.01, unit="Hz")
+        return CheckVerdict(check="frequency", status="failed", violations=(out,), count=count)
+
+    found = judge_checks((verdict(863.59),), (), (), [100.0, 863.7])
+    assert found.verdict == "PASS"
+    assert "frequency names 1 x up to 0.0102 Hz within 2 s of a heal" in found.found
+    assert judge_checks((verdict(866.0),), (), (), [100.0, 863.7]).verdict == "FAIL"
+    assert judge_checks((verdict(863.59, 2),), (), (), [100.0, 863.7]).verdict == "FAIL"
+    assert judge_checks((verdict(863.59),), (), ()).verdict == "FAIL"
+
+
 def test_every_kill_of_an_hour_counts_not_only_those_that_a_verdict_shows() -> None:
     """A hundred kills, of which a verdict keeps twenty: one silence of another agent beyond these fails."""
     kills = [(f"inv{3 + i % 7}", 30.0 * i) for i in range(100)]
