@@ -26,6 +26,8 @@ class PlantSearch:
     def __init__(self, where: RunAddress, session: Session) -> None:
         self._where, self._session = where, session
         self._told: set[str] = set()
+        self._strangers: list[str] = []
+        """Lines on links to ends without access. The session gives each once; the error at the end needs them too."""
 
     def refused(self) -> str:
         """Return why no link will come, if every endpoint refuses one; else the empty string."""
@@ -50,12 +52,12 @@ class PlantSearch:
         credentials = self._where.credentials
         if credentials is None:
             return []
-        strangers = list(self._session.take_lines())
+        self._strangers += self._session.take_lines()
         if runs or not self._session.vouches(PLANT):
-            return strangers
+            return [*self._strangers]
         own = credentials.own
         return [
-            *strangers,
+            *self._strangers,
             f"the plant at {self._at} takes the link, but nothing passes on it: it is still being built, or its "
             f"members.json revokes or lacks the certificate of {own.name}, which its output says; gridpeers keys issue "
             f"{own.name} --role {own.role}, where the site was made, gives {own.name} a new one",
@@ -73,12 +75,14 @@ class PlantSearch:
         """
         if not self._session.peers():
             return self.refused() or self._no_link(wait)
+        there = f"runs there: {', '.join(sorted(others))}" if others else ""
         if faults := self._faults(runs):
-            return f"no plant of {self._where} within {wait:g} s: {'; '.join(faults)}"
+            beside = f" ({there})" if there else ""
+            return f"no plant of {self._where} within {wait:g} s{beside}: {'; '.join(faults)}"
         start = command_line("plant", "SCENARIO", "--run", self._where.run, *self._where.access.words)
-        there = f"runs there: {', '.join(sorted(others))}" if others else "no other run is there either"
         return (
-            f"no plant of {self._where} within {wait:g} s ({there}); start one ({start}), or give another name by --run"
+            f"no plant of {self._where} within {wait:g} s ({there or 'no other run is there either'}); start one "
+            f"({start}), or give another name by --run"
         )
 
     @property

@@ -42,9 +42,15 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
     """Waits for the plant of run lab and gives what was told, each with its time, the last without if all ended ill."""
 
     def wait(
-        comes: dict[float, str], longest: float, credentials: Credentials | None = None, links: int = 1
+        comes: dict[float, str],
+        longest: float,
+        credentials: Credentials | None = None,
+        links: int = 1,
+        strangers: tuple[str, ...] = (),
+        *,
+        hears: bool = True,
     ) -> list[str]:
-        clock, told = Clock(comes), list[str]()
+        clock, told, lines = Clock(comes), list[str](), [*strangers]
 
         class Session:
             """Stands for Zenoh."""
@@ -53,14 +59,15 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
             subscribe = watch = close = staticmethod(lambda *_: None)
             peers = staticmethod(lambda: links)
             take = staticmethod(clock.take)
-            take_lines = staticmethod(lambda: ())
-            vouches = staticmethod(lambda name: bool(links))
+            take_lines = staticmethod(lambda: tuple(lines.pop(0) for _ in range(len(lines))))
+            vouches = staticmethod(lambda name: bool(links) and not strangers)
 
         monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
         monkeypatch.setattr(client, "monotonic", lambda: clock.now)
         try:
             where = replace(address_of("lab", None), credentials=credentials)
-            RunClient(where).find_plant(longest, lambda line: told.append(f"{clock.now:g}: {line}"))
+            tell = (lambda line: told.append(f"{clock.now:g}: {line}")) if hears else None
+            RunClient(where).find_plant(longest, tell)
         except NobodyError as error:
             told.append(str(error))
         return told
@@ -95,6 +102,22 @@ def test_a_link_on_which_nothing_passes_is_told_once_and_at_the_end(waiting: Wai
     assert told == reminders[1:2]
     assert "revokes or lacks the certificate of inv1" in told[0]
     assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s: {told[0].removeprefix('2: ')}"
+
+
+STRANGER = "a link to tls/127.0.0.1:7447: its certificate is revoked; nothing passes on it"
+"""A line that a session gives once."""
+
+
+@pytest.mark.parametrize("hears", [True, False])
+@pytest.mark.parametrize(("comes", "there"), [({}, ""), ({0.5: "lab2"}, " (runs there: lab2)")])
+def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(
+    waiting: Waiting, comes: dict[float, str], there: str, *, hears: bool
+) -> None:
+    """Whether or not somebody was told of it during the wait; who was, was told once."""
+    *reminders, last = waiting(comes, 10.0, SHOWN, strangers=(STRANGER,), hears=hears)
+
+    assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"] * hears
+    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s{there}: {STRANGER}"
 
 
 def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
