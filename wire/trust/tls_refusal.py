@@ -15,6 +15,9 @@ from wire.trust.credentials import Credentials
 _VERIFY_NOT_YET, _VERIFY_EXPIRED = 9, 10
 """OpenSSL's codes X509_V_ERR_CERT_NOT_YET_VALID and X509_V_ERR_CERT_HAS_EXPIRED."""
 
+_ASKING = ("CERTIFICATE_REQUIRED", "HANDSHAKE_FAILURE")
+"""How OpenSSL's names end of the alerts of an end that was shown no certificate: of TLS 1.3, and of TLS 1.2."""
+
 _FOREIGN = ("UNKNOWN_CA", "DECRYPT_ERROR", "BAD_CERTIFICATE")
 """How OpenSSL's names end of the alerts of an end that has the certificate of another authority: that may have the same
 name and another key."""
@@ -32,7 +35,7 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
     credentials : Credentials or None
         What this end shows, and whom it accepts; None if its links are open.
     timeout : float
-        Longest wait for a connection, and for a word on it (s).
+        Longest wait for a connection, for the handshake on it, and for the alert after that (s each).
 
     Returns
     -------
@@ -63,8 +66,7 @@ def _shaken(context: ssl.SSLContext, raw: socket.socket, credentials: Credential
         return _alert(error, credentials)
     with secured:
         try:
-            while secured.recv(1024):
-                pass
+            secured.recv(1)  # the alert comes with the first read; an end that talks on would hold a second one
         except OSError as error:
             return _alert(error, credentials)
     return ""
@@ -73,18 +75,23 @@ def _shaken(context: ssl.SSLContext, raw: socket.socket, credentials: Credential
 def _unverified(error: ssl.SSLCertVerificationError, credentials: Credentials) -> str:
     """Return why this end does not accept the other's certificate."""
     if error.verify_code == _VERIFY_EXPIRED:
-        return "shows a certificate that has expired; gridpeers keys issue renews it where the site was made"
+        return (  # OpenSSL has one code for both certificates; no member's outlives its authority's
+            "shows a certificate that has expired; gridpeers keys issue renews it where the site was made, unless "
+            f"{credentials.ca} has expired too: then gridpeers keys init makes a new site"
+        )
     if error.verify_code == _VERIFY_NOT_YET:
         return "shows a certificate that is not valid yet by the clock of this host; set the clock"
     return f"shows a certificate that {credentials.ca} has not signed: it is of another site"
 
 
 def _alert(error: OSError, credentials: Credentials | None) -> str:
-    """Return why the other end does not accept this one; empty if the error is no alert."""
+    """Return why the other end does not accept this one; empty if the error tells nothing of certificates."""
     reason = (error.reason or "") if isinstance(error, ssl.SSLError) else ""
     if "ALERT" not in reason:
         return ""
-    if reason.endswith("CERTIFICATE_REQUIRED") or credentials is None:
+    if credentials is None:
+        return "asks for a certificate" if reason.endswith(_ASKING) else ""
+    if reason.endswith("CERTIFICATE_REQUIRED"):
         return "asks for a certificate"
     own = f"does not accept the certificate of {credentials.own.name}"
     if reason.endswith(_FOREIGN):

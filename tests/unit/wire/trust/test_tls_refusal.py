@@ -100,6 +100,60 @@ def test_open_links_are_told_that_a_certificate_is_asked_for(sites: Path) -> Non
         assert tls_refusal("127.0.0.1", port, None, PATIENCE) == "asks for a certificate"
 
 
+@pytest.mark.parametrize(
+    ("alert", "said"), [(40, "asks for a certificate"), (116, "asks for a certificate"), (70, ""), (80, ""), (112, "")]
+)
+def test_of_an_alert_to_open_links_only_those_that_ask_for_a_certificate_are_told(alert: int, said: str) -> None:
+    """A version of TLS (70), an error (80) or a name (112) that does not suit is no matter of --keys."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def refuse() -> None:
+            raw, _ = listening.accept()
+            with raw, suppress(OSError):
+                raw.recv(65536)
+                raw.sendall(bytes((21, 3, 3, 0, 2, 2, alert)))
+                raw.recv(1)  # until the other end closes
+
+        thread = threading.Thread(target=refuse)
+        thread.start()
+        told = tls_refusal("127.0.0.1", listening.getsockname()[1], None, PATIENCE)
+        thread.join(PATIENCE)
+
+    assert told == said
+
+
+def test_an_end_that_talks_on_does_not_hold_the_command(sites: Path) -> None:
+    """Of 64 MB that it sends the first byte is enough: the connection is closed, and the rest has no reader."""
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER)
+    context.load_cert_chain(sites / "lab" / "plant.pem", sites / "lab" / "plant.key")
+    sent = 0
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+
+        def talk() -> None:
+            nonlocal sent
+            raw, _ = listening.accept()
+            with suppress(OSError), context.wrap_socket(raw, server_side=True) as secured:
+                for _ in range(64):
+                    secured.sendall(bytes(2**20))
+                    sent += 1
+
+        thread = threading.Thread(target=talk)
+        thread.start()
+        told = tls_refusal("127.0.0.1", listening.getsockname()[1], _shown(sites / "lab"), PATIENCE)
+        thread.join(PATIENCE)
+
+    assert (told, sent < 64) == ("", True)
+
+
+def test_who_shows_an_expired_certificate_may_have_an_expired_authority(sites: Path) -> None:
+    """OpenSSL does not say which one it is: the advice has both, with the file to look at."""
+    shown = _shown(sites / "lab")
+    with _served(sites / "late") as port:
+        told = tls_refusal("127.0.0.1", port, shown, PATIENCE)
+
+    assert told.endswith(f"unless {shown.ca} has expired too: then gridpeers keys init makes a new site")
+
+
 def test_silence_is_no_refusal(sites: Path) -> None:
     """A frozen plant, or one that is gone, may come back: nothing is said of certificates."""
     with socket.create_server(("127.0.0.1", 0)) as frozen:
