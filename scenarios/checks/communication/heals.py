@@ -25,6 +25,10 @@ CUTS = ("cut", "partition")
 LOSSES = (*CUTS, "loss", "flap")
 """Faults during which a link that was cut does not count as whole again."""
 
+STANDSTILL, PERIODS = 0.5, 5.0
+"""Wall-clock time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood
+still. Its numbers have no gap then. Shorter pauses are those of a busy host, and count as work."""
+
 
 @dataclass
 class Heal:
@@ -34,14 +38,16 @@ class Heal:
     t: float
     """When (s)."""
     took: float | None = None
-    """After what time (s) the receiver used something that the sender has sent since; None if it never did. Times in
-    which one of them stood still, as it was paused, do not count."""
+    """After what time (s) the receiver used something that the sender has sent since; None if it never did. It counts
+    from when one of them last stood still (left out ticks; in wall-clock time `STANDSTILL`), if that was later."""
     lost_again: float = inf
     """When (s) the link was next cut, or began to lose messages."""
     at_work_since: float | None = None
-    """Since when (s) both have been at work without a break, if they are, and the sender has spoken since the heal."""
+    """Since when (s) the receiver has been at work without standing still, if the sender was there and has spoken since
+    the heal. In simulated time the sender has left out no tick since, either; in wall-clock time one that stands still
+    is there until its last state."""
     waited: float = 0.0
-    """Longest time (s) for which both were at work without a break, the link was whole and nothing new was used."""
+    """Longest time (s) of that kind in which the link was whole and nothing new was used."""
 
 
 class Heals:
@@ -60,6 +66,8 @@ class Heals:
     def __init__(self, info: RecordInfo, t_end: float, sent: Mapping[str, SentStates]) -> None:
         self._sent = sent
         self._T_c = info.T_c if info.simulated else None
+        self._standstill = inf if info.simulated else max(STANDSTILL, PERIODS * info.T_c)
+        """Time (s) between states of successive numbers in which an agent stood still; simulated time has a gap."""
         self._coming: dict[Link, deque[Heal]] = defaultdict(deque)
         """Heals of each link, in the order of time."""
         self._waiting: dict[str, list[Heal]] = defaultdict(list)
@@ -111,7 +119,10 @@ class Heals:
             sent_at = None if used is None else self._sent[heal.link[0]].window_at(state.t).t(used)
             if used is not None and sent_at is not None and sent_at >= heal.t - 1e-9:
                 src, dst = (self._sent[name].window_at(state.t) for name in heal.link)
-                begins = max(_at_work_since(src, used, heal.t), _at_work_since(dst, state.number, heal.t))
+                begins = max(
+                    _at_work_since(src, used, heal.t, self._standstill),
+                    _at_work_since(dst, state.number, heal.t, self._standstill),
+                )
                 heal.took = max(0.0, state.t - begins)
             else:
                 self._note_work(heal, state)
@@ -121,7 +132,7 @@ class Heals:
         """Note for how long both have been at work, with an own state of the receiver that uses nothing new."""
         src, dst = (self._sent[name] for name in heal.link)
         window, number, T_c = dst.window_at(state.t), state.number, self._T_c
-        goes_on = window.decided(number - 1)
+        goes_on = _goes_on(window, number, self._standstill)
         if T_c is not None:  # numbers are ticks, so that pauses of the sender show, and states that it did not tell
             theirs = src.window_at(state.t)
             speaks, works = theirs.spoke(number - 1), theirs.decided(number - 1)
@@ -164,9 +175,15 @@ class Heals:
             self._coming[heal.link] = deque(sorted(coming, key=lambda one: one.t))
 
 
-def _at_work_since(window: StateWindow, number: int, t: float) -> float:
-    """Return since when (s), from a time on, an agent has decided at every tick up to the one of a number."""
-    while window.decided(number - 1) and (window.t(number - 1) or 0.0) >= t - 1e-9:
+def _goes_on(window: StateWindow, number: int, standstill: float) -> bool:
+    """Return whether an agent decided the state before the one of a number, and did not stand still (s) in between."""
+    before, now = window.t(number - 1), window.t(number)
+    return window.decided(number - 1) and before is not None and (now is None or now - before < standstill)
+
+
+def _at_work_since(window: StateWindow, number: int, t: float, standstill: float) -> float:
+    """Return since when (s), from a time on, an agent has decided without standing still (s) up to a number."""
+    while _goes_on(window, number, standstill) and (window.t(number - 1) or 0.0) >= t - 1e-9:
         number -= 1
     return max(t, window.t(number) or 0.0)
 
