@@ -51,14 +51,15 @@ def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids:
 
 
 MOST_SPANS, PAST = 16, 60.0
-"""Faults of a link above which those are forgotten that ended some time (s of run time) before the last two changes: a
-change is about its own time, which is hardly ever before that of the change that came first."""
+"""Number of faults of a link above which old ones are forgotten: those that ended so long (s of run time) before the
+present change and before the latest one. A change takes effect at its own time, and commands may arrive slightly out of
+order."""
 
 
 class LinkSchedules:
     """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
 
-    They tell of the times of changes to come, so what has ended long ago is forgotten.
+    Only the times of changes to come are looked up, so faults that ended long ago are forgotten.
 
     Parameters
     ----------
@@ -78,7 +79,7 @@ class LinkSchedules:
     def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
         self._netem, self._microgrids = netem, microgrids
         self._latest = -math.inf
-        """Time of the last change (s)."""
+        """Latest time of a change so far (s)."""
 
     @cached_property
     def _schedules(self) -> dict[Link, FaultSchedule]:
@@ -88,7 +89,7 @@ class LinkSchedules:
     def apply(self, change: Change) -> None:
         """Take up a change."""
         over = min(self._latest, change.from_s) - PAST
-        self._latest = change.from_s
+        self._latest = max(self._latest, change.from_s)
         for link, before in self._schedules.items():
             schedule = changed(before, change, link, self._microgrids)
             self._schedules[link] = schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule

@@ -104,6 +104,20 @@ def test_a_run_with_many_commands_says_and_does_the_same_without_the_faults_that
     assert bounded == _effects_and_arrivals(commands)
 
 
+def test_a_change_that_comes_out_of_order_keeps_no_old_fault() -> None:
+    """After one at 1000 s and a late one of 30 s, the next one forgets all that ended before 940 s."""
+    schedules, link = LinkSchedules(Netem(), MICROGRIDS), links_among(MICROGRIDS)[0]
+    on, count = f"{link.src} -> {link.dst}", MOST_SPANS + 4
+    for k in range(count):
+        schedules.apply(Fault(on=on, cut=Cut(), from_s=float(k), to_s=k + 0.5))
+    for t in (1000.0, 30.0):
+        schedules.apply(Fault(on=on, delay=0.1, from_s=t, to_s=t + 1.0))
+    assert len(schedules.of(link).spans) == count + 2
+    schedules.apply(Heal(on=on, from_s=1000.5))
+
+    assert [span.from_s for span in schedules.of(link).spans] == [1000.0]
+
+
 def test_links_of_the_whole_run_keep_a_bounded_number_of_faults_however_long_it_is() -> None:
     """Every process has the schedules of all links: of each some faults stay, and those of the last minute."""
     commands, most = _commands(3600.0), 0
