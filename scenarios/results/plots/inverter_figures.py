@@ -144,7 +144,7 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
     width = widths(len(islands))
     for number, island in enumerate(islands.values()):
         history, nameplates = part_of(drawing.histories[case], drawing.nameplates, island.inverters)
-        colour, dashes = OTHER_STYLES[number % len(OTHER_STYLES)]
+        label, (colour, dashes) = drawing.island_title(island), OTHER_STYLES[number % len(OTHER_STYLES)]
         values = (
             history.P.sum(axis=1) / 1e3,
             history.Q.sum(axis=1) / 1e3,
@@ -152,7 +152,6 @@ def microgrids(drawing: Drawing, case: str) -> Figure:
             metrics.mean_voltage(history, nameplates),
         )
         for panel, y in zip(grid.flat, values, strict=True):
-            label = drawing.island_title(island)
             panel.plot(history.t, y, linestyle=dashes, color=colour, linewidth=width[number], label=label)
     name_panel(grid[0, 0], "Real power", "P in total (kW)")
     name_panel(grid[0, 1], "Reactive power", "Q in total (kvar)")
