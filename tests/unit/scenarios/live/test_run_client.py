@@ -50,7 +50,13 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
         *,
         hears: bool = True,
     ) -> list[str]:
-        clock, told, lines = Clock(comes), list[str](), [*strangers]
+        clock, told, unseen, lines = Clock(comes), list[str](), [*strangers], list[str]()
+
+        def looks(name: str) -> bool:
+            """Look at the links, as a session does that has no certificate of a name yet."""
+            while unseen:
+                lines.append(unseen.pop())
+            return bool(links) and not strangers
 
         class Session:
             """Stands for Zenoh."""
@@ -60,7 +66,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
             peers = staticmethod(lambda: links)
             take = staticmethod(clock.take)
             take_lines = staticmethod(lambda: tuple(lines.pop(0) for _ in range(len(lines))))
-            vouches = staticmethod(lambda name: bool(links) and not strangers)
+            vouches = staticmethod(looks)
 
         monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
         monkeypatch.setattr(client, "monotonic", lambda: clock.now)
@@ -118,6 +124,13 @@ def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(
 
     assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"] * hears
     assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s{there}: {STRANGER}"
+
+
+def test_a_short_wait_has_the_reason_too(waiting: Waiting) -> None:
+    """Its only look at the links is the one at its end."""
+    assert waiting({}, 0.5, SHOWN, strangers=(STRANGER,)) == [
+        f"no plant of run lab at tcp/127.0.0.1:7447 within 0.5 s: {STRANGER}"
+    ]
 
 
 def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
