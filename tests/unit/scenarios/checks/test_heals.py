@@ -45,7 +45,7 @@ def healed(receiver: list[SentState], sender: list[SentState], *, used_at_last: 
 
 @pytest.mark.parametrize(
     ("stops", "waited"),
-    [([], 10.2), ([(10.1, 20.0)], 0.1), ([(9.95, 20.0)], 0.2), ([(12.0, 12.2)], 10.2), ([(12.0, 13.0)], 7.2)],
+    [([], 10.2), ([(10.1, 20.0)], 0.2), ([(9.95, 20.0)], 0.2), ([(12.0, 12.2)], 10.2), ([(12.0, 13.0)], 7.2)],
     ids=["none", "after the heal", "around the heal", "shorter than a standstill", "in between"],
 )
 def test_a_stopped_receiver_waits_for_nothing(stops: Stops, waited: float) -> None:

@@ -120,7 +120,7 @@ def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(
     waiting: Waiting, comes: dict[float, str], there: str, *, hears: bool
 ) -> None:
     """Whether or not somebody was told of it during the wait; who was, was told once."""
-    *reminders, last = waiting(comes, 10.0, SHOWN, strangers=(STRANGER,), hears=hears)
+    *reminders, last = waiting({**comes}, 10.0, SHOWN, strangers=(STRANGER,), hears=hears)
 
     assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"] * hears
     assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s{there}: {STRANGER}"
