@@ -75,7 +75,11 @@ session.close()
 
 
 def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_of_a_second_not_five() -> None:
-    """A message that may not be dropped waits so long for a full link; then the link is closed, and made anew."""
+    """A message that may not be dropped waits so long for a full link; then the link is closed.
+
+    Zenoh makes it anew within 10 s, or much later on a busy machine: a node therefore renews a session that brings
+    nothing (`wire.timing.session_deadline`), which this bare one does not.
+    """
     endpoint = free_endpoint()
     sender = Session("a", listen=(endpoint,), clock="wall", rendezvous=True)
     holder = subprocess.Popen([sys.executable, "-c", HOLDER, endpoint], stdin=subprocess.PIPE)
@@ -90,8 +94,6 @@ def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_o
             longest = max(longest, monotonic() - began)
             gone = any(event[:2] == ("vanished", "gridpeers/t/alive/b") for event in sender.inbox.take(1, 0.0))
         assert 0.1 < longest < 5.0, "of the fifth of a second a busy machine makes more, and never Zenoh's five"
-        holder.send_signal(signal.SIGCONT)
-        assert take_one(sender) == ("appeared", "gridpeers/t/alive/b", b"")
     finally:
         holder.kill()
         holder.communicate()
