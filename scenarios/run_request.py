@@ -1,4 +1,4 @@
-"""What is asked of a run: its scenario and folder, with the options of the command."""
+"""A request for a run: scenario, folder and options."""
 
 from __future__ import annotations
 

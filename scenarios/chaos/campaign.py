@@ -59,7 +59,7 @@ class Failure:
 
     @property
     def sentence(self) -> str:
-        """What the simplest run violates; what the found one does if that one no longer does."""
+        """Sentence of the check on the simplest run; on the run as found if the simplest one passes the next time."""
         return self.simplest.violated.get(self.violated, self.row.violated[self.violated])
 
 

@@ -184,7 +184,7 @@ class ArrivalAccounts:
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
         self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
         self._dropped: dict[Link, deque[DroppedStates]] = defaultdict(lambda: deque(maxlen=WAIT))
-        """What receivers say that they dropped, until all states are known that it may be."""
+        """Numbers of dropped states that receivers told, kept until every state that they may mean is known."""
         self._links_of: dict[str, list[Link]] = defaultdict(list)
         self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=3))
         """The last accounts of each link: what comes later than others did is still missing there."""

@@ -104,7 +104,7 @@ def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
     options = [_options(mark, inches_per_s) for mark in ordered]
     first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
     best: list[_Standing] = [_Standing(-inf, 0.0, None)]
-    """What may still become the best, by the right edge of the last text: further right is cheaper."""
+    """Partial placements that no other beats in both right edge and cost: sorted by edge, the cost falls."""
     for each, leftmost in zip(options, first, strict=True):
         found: dict[float, _Standing] = {}
         for standing in best:

@@ -33,7 +33,7 @@ LOST = range(50, 60)
 def violations(
     folder: Path, happens: Callable[[FakeClockRun], None], end: float = 3.0, record: RecordLevel = "all"
 ) -> list[str]:
-    """What the check says of a run of the toy plant on such a wire."""
+    """Return the verdict of the check on a run of the toy plant over such a wire."""
 
     def delay(src: str, dst: str, key: str, number: int) -> float | None:
         return None if (key, dst) == ("state/inv1", "inv2") and number in LOST else 0.001
