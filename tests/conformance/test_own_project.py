@@ -1,7 +1,6 @@
 """A project of a user's own adds a metric, a link fault, a graph and a claim, and touches nothing of ours."""
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -71,13 +70,11 @@ loss = 0.1
 
 
 @pytest.fixture
-def project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def project(tmp_path: Path) -> Path:
     """A folder with a module and a scenario; Python knows nothing of it."""
     (tmp_path / "my_study.py").write_text(MODULE, encoding="utf-8")
     (tmp_path / "jammed.toml").write_text(SCENARIO, encoding="utf-8")
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    yield tmp_path
-    sys.modules.pop("my_study", None)
+    return tmp_path
 
 
 def test_a_users_own_module_is_measured_and_judged_alike_in_one_process_and_in_ten(project: Path) -> None:

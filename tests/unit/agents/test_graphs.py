@@ -1,7 +1,5 @@
 """A rule of the communication graph of somebody's own: what it may be, and what becomes of one that fails."""
 
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -42,12 +40,10 @@ class Wrong:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def folder(tmp_path: Path) -> str:
     """A folder with somebody's module `my_graphs`."""
     (tmp_path / "my_graphs.py").write_text(MODULE, encoding="utf-8")
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    yield str(tmp_path)
-    sys.modules.pop("my_graphs", None)
+    return str(tmp_path)
 
 
 def control(use: str, folder: str, **parameters: int) -> Control:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator
 from pathlib import Path
 
 import msgspec
@@ -69,12 +67,10 @@ LINK = Link("inv1", "inv2")
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+def folder(tmp_path: Path) -> str:
     """A folder with somebody's module `my_faults`."""
     (tmp_path / "my_faults.py").write_text(MODULE, encoding="utf-8")
-    monkeypatch.setattr(sys, "path", [*sys.path])
-    yield str(tmp_path)
-    sys.modules.pop("my_faults", None)
+    return str(tmp_path)
 
 
 def fault(folder: str, name: str, **values: object) -> Fault:

@@ -80,7 +80,7 @@ def test_a_record_that_is_cut_off_says_so(whole: Path, tmp_path: Path) -> None:
 
     assert (news.growth, 0.0 < news.t_end < 1.0) == ("cut", True)
     assert news.text == "The record has no end: the run was killed, or is frozen."
-    assert "The file is cut off within a chunk" in news.notes[0]
+    assert "The file is cut off within a " in news.notes[0]
     assert run.view().frame(news.t_end).inverters[0].P is not None
 
 
