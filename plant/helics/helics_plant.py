@@ -16,6 +16,7 @@ from plant.helics.topics import ACT, Value, number
 from plant.plant_config import PlantConfig
 from wire.bounds import NAME
 from wire.messages import LoadSetting, PlantEvent
+from wire.printable import printable
 from wire.schema.suggestion import first_of
 from wire.timing.clock import time_of
 
@@ -188,4 +189,5 @@ class HelicsPlant:
             return msgspec.json.decode(text, type=tuple[PlantEvent, ...])
         except msgspec.DecodeError as error:
             key = topics.events(self._helics.prefix).key
-            return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {error}"),)
+            reason = printable(str(error), 200)
+            return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {reason}"),)

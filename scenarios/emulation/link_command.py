@@ -11,6 +11,7 @@ from netem.schema.change import Change, Heal
 from netem.schema.fault import LONGEST_RUN, Fault
 from netem.schema.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words
+from wire.printable import printable
 from wire.schema.plausible import Plausible
 from wire.schema.suggestion import first_of
 from wire.schema.table_schema import Problem
@@ -108,7 +109,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         try:
             command = msgspec.convert(tree, type=cls)
         except msgspec.ValidationError as error:
-            raise ValueError(f"no command to links: {error}") from None
+            raise ValueError(f"no command to links: {printable(str(error), 200)}") from None
         if command.fault is not None and command.fault.own:  # else anybody who reaches the run could import any module
             raise ValueError("no command to links: a fault of your own is written in the scenario before the run")
         command.on  # noqa: B018  checks that it is one of the two

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from netem.ledger import LinkTrace
+from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import data_of, decode_statuses
 from scenarios.live.feeder_map import read_feeder_map
 from scenarios.record.journal_reader import entries_of, values_of
@@ -16,6 +17,8 @@ from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
 from wire.bounds import LONGEST_MESSAGE, MOST_COUNT
 from wire.messages import LinkReport
+from wire.trust.key_folder import KeysError, read_list
+from wire.trust.site_authority import issue, make_site
 
 NO_UTF8 = b"\x81\xa4typ\xe5\x01"
 """A map with a key whose text ends within a character."""
@@ -81,3 +84,27 @@ def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -
 
     with pytest.raises(KeysError, match=r"inv1\.pem: is no certificate in PEM"):
         open_credentials(folder, ("agent",), "inv1")
+
+
+@pytest.mark.parametrize(
+    ("whole", "broken"),
+    [(b'"generation"', b'"generatio\\u001b"'), (b'"site"', b'"\\u001b[2J"')],
+)
+def test_a_list_of_members_cannot_write_on_a_terminal(whole: bytes, broken: bytes, tmp_path: Path) -> None:
+    """Msgspec repeats the name of a field that it does not know, as it stands in the file."""
+    make_site(tmp_path / "lab")
+    issue(tmp_path / "lab", "inv1")
+    listed = tmp_path / "lab" / "members.json"
+    data = listed.read_bytes()
+    assert whole in data
+    listed.write_bytes(data.replace(whole, broken, 1))
+
+    with pytest.raises(KeysError) as caught:
+        read_list(tmp_path / "lab")
+    assert str(caught.value).isprintable()
+
+
+def test_a_command_to_links_cannot_write_on_a_terminal() -> None:
+    """Its refusal repeats a name as well, and goes back to the client and into the log."""
+    with pytest.raises(ValueError, match=r"unknown field `\\x1b\[2J`"):
+        LinkCommand.of_tree({"\x1b[2J": 1})

@@ -132,8 +132,9 @@ def read_list(folder: Path) -> MemberList:
     try:
         signed = msgspec.json.decode(data, type=SignedList)
         signature = base64.b64decode(signed.signature, validate=True)
-    except ValueError as error:
-        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
+    except (ValueError, RecursionError) as error:
+        reason = printable(str(error), 200)
+        raise KeysError(f"{folder / LIST}: cannot be read: {reason}; copy it anew from the site") from None
     try:
         assert isinstance(public, ec.EllipticCurvePublicKey)
         public.verify(signature, msgspec.json.encode(signed.list), ec.ECDSA(hashes.SHA256()))
