@@ -148,5 +148,5 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
             if (without := without_agent(scenario, case))
         },
         messages_saved={case: record.messages_saved for case, record in cases.items()},
-        own=own_measures(scenario, feeder, cases),
+        own=own_measures(scenario, feeder, cases, islands),
     )

@@ -22,7 +22,7 @@ from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.event_windows import CaseRecord
-from scenarios.results.findings import find
+from scenarios.results.findings import SHARED, Findings, find
 from scenarios.results.history import History
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.record import Recorder
@@ -103,10 +103,8 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     with np.errstate(all="ignore"):  # a value that is no number is None
         found = find(scenario, feeder, {case: record})
     measures: dict[str, float | None] = {}
-    for label, steady in found.results[case].items():
-        numbers = asdict(steady) | asdict(found.settled[case][label])
-        reasons = numbers.pop("reasons")
-        measures |= flat(label, numbers | {"steady": float(not reasons)})
+    for label in found.results[case]:
+        measures |= flat(label, _indexes(found, case, label))
     own = found.own.get(case, {})
     for label, metrics in own.items():
         measures |= flat(label, dict(metrics.values))
@@ -122,6 +120,18 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         measures=measures | _accounts(links),
     )
     return done, record.history
+
+
+def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:
+    """Return the indexes of a window; where it ends with several islands, what is shared is each island's."""
+    whole = found.results[case][label]
+    islands = found.islands.get(case, {}).get(label, {})
+    numbers = asdict(whole) | asdict(found.settled[case][label])
+    if islands:
+        numbers |= dict.fromkeys((*SHARED, "t_share_s"))
+        numbers["islands"] = {name: {key: getattr(island, key) for key in SHARED} for name, island in islands.items()}
+    del numbers["reasons"]
+    return numbers | {"steady": float(not any(one.reasons for one in islands.values() or (whole,)))}
 
 
 def _accounts(links: LinkRecord) -> dict[str, float | None]:

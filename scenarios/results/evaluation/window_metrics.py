@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -44,6 +44,8 @@ class WindowData(History):
     """Control period (s)."""
     messages_saved: float = 0.0
     """Share of states that the laws did not send in the window."""
+    islands: Mapping[str, Steady] = field(default_factory=dict)
+    """Steady values of each island at the end of the window, by its first inverter; empty where there is but one."""
 
     @classmethod
     def cut(cls, whole: History, window: Window, **about: Any) -> WindowData:
@@ -96,11 +98,16 @@ class WindowData(History):
         return settling(self.whole, self.nameplates, self.window, self.f_nom)
 
 
-def _built_in(value: Callable[[WindowData], Any], text: str) -> Callable[[WindowData], Any]:
-    """Return a metric of gridpeers with the sentence that `gridpeers doc metrics` prints."""
+def _built_in(
+    value: Callable[[WindowData], Any], text: str, *, of_sharing: bool = False
+) -> Callable[[WindowData], Any]:
+    """Return a metric of gridpeers with the sentence that `gridpeers doc metrics` prints.
+
+    One of sharing has no value where there are several islands: each shares for itself.
+    """
 
     def metric(window: WindowData) -> Any:
-        return value(window)
+        return None if of_sharing and window.islands else value(window)
 
     metric.__doc__ = text
     return metric
@@ -110,11 +117,17 @@ f_error_Hz = _built_in(
     lambda window: window.steady.f_error_Hz,
     "abs(f - f_nom), mean over the grid-forming inverters, at the end of the window (Hz).",
 )
-MPSI = _built_in(lambda window: window.steady.MPSI, "Mean power sharing index, (16), at the end of the window.")
+MPSI = _built_in(
+    lambda window: window.steady.MPSI, "Mean power sharing index, (16), at the end of the window.", of_sharing=True
+)
 V_error = _built_in(lambda window: window.steady.V_error, "Mean of abs(V - 1) at the end of the window (pu).")
-MQSI = _built_in(lambda window: window.steady.MQSI, "Mean var sharing index, (17), at the end of the window.")
+MQSI = _built_in(
+    lambda window: window.steady.MQSI, "Mean var sharing index, (17), at the end of the window.", of_sharing=True
+)
 t_restore_s = _built_in(
-    lambda window: window.steady.t_restore_s, "Time until frequency and power sharing are restored for good (s)."
+    lambda window: window.steady.t_restore_s,
+    "Time until frequency and power sharing are restored for good (s).",
+    of_sharing=True,
 )
 t_load_s = _built_in(
     lambda window: window.steady.t_load_s,
@@ -124,7 +137,9 @@ p = _built_in(
     lambda window: window.steady.p, "Real power of each inverter at the end of the window (pu of its rating)."
 )
 t_f_s = _built_in(lambda window: window.settled.t_f_s, "Time until the frequency is restored for good (s).")
-t_share_s = _built_in(lambda window: window.settled.t_share_s, "Time until power is shared equally for good (s).")
+t_share_s = _built_in(
+    lambda window: window.settled.t_share_s, "Time until power is shared equally for good (s).", of_sharing=True
+)
 f_swing_Hz = _built_in(
     lambda window: window.settled.f_swing_Hz,
     "Highest minus lowest frequency of a grid-forming inverter at the end of the window (Hz).",
@@ -153,7 +168,10 @@ V_max_pu = _built_in(
 
 
 def own_measures(
-    scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord]
+    scenario: ScenarioModel,
+    feeder: Feeder,
+    cases: Mapping[str, CaseRecord],
+    islands: Mapping[str, Mapping[str, Mapping[str, Steady]]],
 ) -> dict[str, dict[str, Measured]]:
     """Return the values of the scenario's own metrics, by case and window; empty if it has none.
 
@@ -163,6 +181,8 @@ def own_measures(
         As run.
     cases : Mapping[str, CaseRecord]
         Recorded cases with their windows.
+    islands : Mapping[str, Mapping[str, Mapping[str, Steady]]]
+        Steady values by case, window and island, where there are several.
     """
     metrics = make_metrics(metrics_of(scenario))
     if not metrics:
@@ -181,7 +201,13 @@ def own_measures(
             values[case] = {
                 window.label: measured(
                     metrics,
-                    WindowData.cut(whole, window, messages_saved=record.messages_saved.get(window.label, 0.0), **about),
+                    WindowData.cut(
+                        whole,
+                        window,
+                        messages_saved=record.messages_saved.get(window.label, 0.0),
+                        islands=islands[case].get(window.label, {}),
+                        **about,
+                    ),
                 )
                 for window in record.windows
             }

@@ -259,3 +259,28 @@ def test_a_damaged_line_of_the_journal_is_named(sweep_file: Write, tmp_path: Pat
 
     with pytest.raises(FolderError, match=r"runs\.jsonl:1: this line is damaged"):
         done(path, tmp_path / "here")
+
+
+def test_what_several_islands_share_is_a_column_of_each(sweep_file: Write, tmp_path: Path) -> None:
+    """Over all inverters it would mean nothing, also as a metric that the scenario asks for."""
+    path = sweep_file(
+        """
+scenario = "islanding"
+cases = ["IV"]
+[set]
+paper = ""
+metrics = ["MPSI", "t_share_s"]
+"time.end_s" = 0.3
+event = [{ label = "event1", t_s = 0.1, open = ["13-152", "sw1_2"] }]
+[grid]
+"gains.k_p" = [0.0005]
+"""
+    )
+
+    done(path, tmp_path / "new")
+
+    (row,) = pq.read_table(tmp_path / "new" / "results.parquet").to_pylist()
+    assert [row.get(f"event1.{name}") for name in ("MPSI", "MQSI", "t_restore_s", "t_share_s")] == [None] * 4
+    assert 0.0 < row["event1.islands.inv4.MPSI"] < 1.0
+    assert "event1.islands.inv1.MQSI" in row
+    assert row["event1.t_f_s"] is None or row["event1.t_f_s"] > 0.0
