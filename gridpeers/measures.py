@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from scenarios.results import metrics
 from scenarios.results.event_windows import Window
 from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage, settling
+from scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage
 from scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
@@ -29,6 +30,23 @@ __all__ = [
     "nameplates_of",
     "settling",
 ]
+
+
+def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
+    """Measure how a case settles in a window.
+
+    Parameters
+    ----------
+    history : History
+        The case as recorded (`Result.record`).
+    nameplates : Nameplates
+        Nameplates in the order of its columns.
+    window : Window
+        From an event to the next, or to the end of the run.
+    f_nom : float
+        Nominal frequency (Hz).
+    """
+    return metrics.settling(window.cut(history), nameplates, window, f_nom)
 
 
 def nameplates_of(spec: ScenarioModel, feeder: Feeder, case: str = "") -> Nameplates:

@@ -33,6 +33,10 @@ class Window:
         rows: Flags = (t > self.start + tolerance) & (t < self.end + (tolerance if last else -tolerance))
         return rows
 
+    def cut(self, history: History) -> History:
+        """Return the rows of a history that are of this window."""
+        return history.rows(self.rows(history.t))
+
 
 def windows(events: Sequence[tuple[str, float]], end: float) -> tuple[Window, ...]:
     """Return the windows of events given as (label, time in s).

@@ -122,8 +122,7 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
         within = record.history.until(scenario.time.end_s)
         for window in record.windows:
             history = within if window.end <= scenario.time.end_s else record.history
-            # cut once for all measures; they take whole cases too and cut again, which costs little of these few rows
-            inside = history.rows(window.rows(history.t))
+            inside = window.cut(history)
             results[case][window.label] = measure(inside, nameplates, window, feeder.f_nom)
             settled[case][window.label] = settling(inside, nameplates, window, feeder.f_nom)
             at_end = islands_at_end(intervals, window)

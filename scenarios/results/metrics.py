@@ -110,7 +110,7 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
     Parameters
     ----------
     history : History
-        The case as recorded.
+        The rows of its window (`Window.cut`).
     nameplates : Nameplates
         Nameplates in the order of its columns.
     window : Window
@@ -119,7 +119,7 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
         Nominal frequency (Hz).
     """
     assert nameplates.names == history.inverters
-    history = history.rows(window.rows(history.t))  # the other ones cost time: a live run of hours has many windows
+    assert window.rows(history.t).all()
     f_error = mean_over(np.abs(history.f[:, nameplates.GFM] - f_nom), history.present[:, nameplates.GFM])
     sharing = MPSI(history, nameplates)
     ends = ends_of(history.t, window.start, window.end)
@@ -196,7 +196,7 @@ def for_good(t: Floats, holds: NDArray[np.bool_], start: float) -> float | None:
 
 def settling(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Settling:
     """Measure the settling after one event of one case; the parameters are those of `measure`."""
-    history = history.rows(window.rows(history.t))
+    assert window.rows(history.t).all()
     end = history.t >= window.end - min(SWING, 0.5 * (window.end - window.start)) - 1e-9
     forming, f = history.present[:, nameplates.GFM], history.f[:, nameplates.GFM]
     shared: Flags = np.less(MPSI(history, nameplates), MPSI_BAND)

@@ -59,7 +59,9 @@ def test_metrics_are_finite_where_there_is_power_and_absent_where_there_is_none(
     history, outcome = blackout
     scenario, feeder = load_scenario("blackout")
     every = windows(as_they_came(scenario, outcome.events), scenario.time.end_s)
-    found = {window.label: measure(history, Nameplates.of(feeder.inverters), window, 60.0) for window in every}
+    found = {
+        window.label: measure(window.cut(history), Nameplates.of(feeder.inverters), window, 60.0) for window in every
+    }
 
     for label in ("islanding", "return"):
         steady = found[label]

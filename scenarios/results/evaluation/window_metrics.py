@@ -50,9 +50,9 @@ class WindowData(History):
     @classmethod
     def cut(cls, whole: History, window: Window, **about: Any) -> WindowData:
         """Return the rows of a window; `about` has the other fields."""
-        inside = window.rows(whole.t)
-        columns = {field.name: getattr(whole, field.name)[inside] for field in fields(History)[1:]}
-        return read_only(cls(inverters=whole.inverters, whole=whole, window=window, **columns, **about))
+        inside = window.cut(whole)
+        columns = {field.name: getattr(inside, field.name) for field in fields(History)}
+        return read_only(cls(whole=whole, window=window, **columns, **about))
 
     @property
     def label(self) -> str:
@@ -90,12 +90,12 @@ class WindowData(History):
     @cached_property
     def steady(self) -> Steady:
         """Measures that every run has in metrics.json, with the reason of each that is no steady value."""
-        return measure(self.whole, self.nameplates, self.window, self.f_nom)
+        return measure(self, self.nameplates, self.window, self.f_nom)
 
     @cached_property
     def settled(self) -> Settling:
         """Settling of frequency and sharing, and remaining swings."""
-        return settling(self.whole, self.nameplates, self.window, self.f_nom)
+        return settling(self, self.nameplates, self.window, self.f_nom)
 
 
 def _built_in(

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.results.event_windows import Window
-from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import settling
+from gridpeers.measures import History, Nameplates, Window, settling
 
 PLATES = Nameplates(
     names=("leader", "follower"),

@@ -40,6 +40,12 @@ def history(t: list[float], f: list[float], p: list[list[float]], v: float = 1.0
     return History.of(PLATES.names, rows)
 
 
+def measured(case: History, start: float, end: float, plates: Nameplates = PLATES) -> metrics.Steady:
+    """The measures of a window from one time to another (s)."""
+    window = Window(label="event1", start=start, end=end)
+    return metrics.measure(window.cut(case), plates, window, F_NOM)
+
+
 powers = st.lists(st.floats(min_value=0.01, max_value=1.0), min_size=3, max_size=3)
 droops = st.lists(st.floats(min_value=0.001, max_value=0.1), min_size=3, max_size=3)
 
@@ -94,7 +100,7 @@ def test_a_steady_value_is_the_mean_of_the_last_fifth_of_a_second() -> None:
     f = [59.0] * 28 + [59.9, 59.8] + [58.0] * 11
     case = history(t, f, [[0.5] * 3] * 41)
 
-    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=3.0), F_NOM)
+    steady = measured(case, 1.0, 3.0)
 
     assert steady.f_error_Hz == pytest.approx((0.1 + 0.2) / 2)
 
@@ -103,7 +109,7 @@ def test_the_row_at_the_end_of_the_run_counts() -> None:
     """The last window ends with the run, whose last row belongs to it."""
     case = history([0.0, 1.0, 2.0], [60.0, 60.0, 59.7], [[0.5] * 3] * 3)
 
-    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=2.0), F_NOM)
+    steady = measured(case, 1.0, 2.0)
 
     assert steady.f_error_Hz == pytest.approx(0.3)
 
@@ -112,7 +118,7 @@ def test_voltage_error_is_the_mean_distance_from_nominal() -> None:
     """V_error of 0.98 pu everywhere is 0.02 (section 2)."""
     case = history([0.0, 1.0, 2.0], [60.0] * 3, [[0.5] * 3] * 3, v=0.98)
 
-    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=2.0), F_NOM)
+    steady = measured(case, 1.0, 2.0)
 
     assert steady.V_error == pytest.approx(0.02)
     assert steady.p == pytest.approx({"inv1": 0.5, "inv2": 0.5, "inv3": 0.5})
@@ -138,7 +144,7 @@ def test_restored_means_frequency_and_sharing_both_and_for_good(
     """Time counts from the event to the first row from which both hold to the end of the window."""
     case = history([1.0, 1.1, 1.2, 1.3, 1.4], [60.0, *f], [EQUAL, *p])
 
-    steady = metrics.measure(case, PLATES, Window(label="e", start=1.0, end=1.4), F_NOM)
+    steady = measured(case, 1.0, 1.4)
 
     assert steady.t_restore_s == expected
 
@@ -157,7 +163,7 @@ def test_every_GFM_must_be_restored() -> None:
     case.f[:, 0] += 0.05
     case.f[:, 1] -= 0.05
 
-    steady = metrics.measure(case, both, Window(label="e", start=1.0, end=2.0), F_NOM)
+    steady = measured(case, 1.0, 2.0, both)
 
     assert steady.t_restore_s is None
     assert steady.f_error_Hz == pytest.approx(0.05)
@@ -170,7 +176,7 @@ def test_who_is_off_the_network_is_not_counted() -> None:
     case.Q[1:, 2] = 0.0
     case.V[1:, 2] = 0.0
 
-    steady = metrics.measure(case, PLATES, Window(label="leave", start=1.0, end=1.2), F_NOM)
+    steady = measured(case, 1.0, 1.2)
 
     assert case.present.tolist() == [[True] * 3, [True, True, False], [True, True, False]]
     assert metrics.MPSI(case, PLATES) == pytest.approx([0.0] * 3, abs=1e-12)
@@ -197,10 +203,10 @@ def test_a_GFM_that_is_off_does_not_hold_back_the_frequency() -> None:
     case.f[:, 1] = 55.0
     case.P[:, 1] = case.Q[:, 1] = 0.0
 
-    assert metrics.measure(case, both, Window(label="e", start=0.0, end=2.0), F_NOM).t_restore_s == 1.0
+    assert measured(case, 0.0, 2.0, both).t_restore_s == 1.0
     case.P[:, 0] = case.Q[:, 0] = 0.0
     assert np.isnan(metrics.mean_frequency(case, both)).all()
-    assert metrics.measure(case, both, Window(label="e", start=0.0, end=2.0), F_NOM).t_restore_s is None
+    assert measured(case, 0.0, 2.0, both).t_restore_s is None
 
 
 def test_the_load_is_carried_once_the_total_stays_at_its_steady_value() -> None:
@@ -209,6 +215,6 @@ def test_the_load_is_carried_once_the_total_stays_at_its_steady_value() -> None:
     case.P[1:, 2] = 0.0
     case.P[2:, 0] += case.P[0, 2]
 
-    steady = metrics.measure(case, PLATES, Window(label="leave", start=1.0, end=1.4), F_NOM)
+    steady = measured(case, 1.0, 1.4)
 
     assert steady.t_load_s == pytest.approx(0.2)

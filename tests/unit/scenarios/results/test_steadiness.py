@@ -50,8 +50,9 @@ def history(
 
 def reasons(of: History, start: float = 1.0, end: float = 3.0) -> dict[str, str]:
     """Why measures of a window are no steady values."""
+    window = Window(label="event1", start=start, end=end)
     with np.errstate(all="ignore"):
-        return dict(measure(of, PLATES, Window(label="event1", start=start, end=end), 60.0).reasons)
+        return dict(measure(window.cut(of), PLATES, window, 60.0).reasons)
 
 
 def test_what_stands_still_is_steady() -> None:
