@@ -24,7 +24,7 @@ from scenarios.results.record import Recorded
 from scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
 from scenarios.run_case import run_case
 from scenarios.run_request import BrokenRunError, Progress, Request
-from scenarios.schema.plugin_keys import checks_of, checks_off, claims_of
+from scenarios.schema.plugin_keys import claims_of
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.versions import version_of, versions
 from wire.driver.open_files import too_few_files
@@ -32,10 +32,7 @@ from wire.driver.output import OutputLostError
 from wire.messages import Pacing
 
 if TYPE_CHECKING:
-    from scenarios.checks.check_verdict import CheckVerdict
-    from scenarios.checks.judging import JudgingStop
     from scenarios.live.numbers.departures import Departures
-    from scenarios.results.event_windows import CaseRecord
     from scenarios.results.report import RunReport
 
 _SHOWN = 3
@@ -113,8 +110,9 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
+    from scenarios.checks.checked_case import CheckedCase
     from scenarios.checks.checks_file import FILE, verdicts_json
-    from scenarios.checks.judging import JudgingStop
+    from scenarios.checks.judging import JudgingStop, judge_case
     from scenarios.results.evaluation.claims import judge, judged
     from scenarios.results.findings import find
     from scenarios.results.report import RunReport, plain
@@ -134,7 +132,10 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
-    checks = {case: verdicts_on(request, case, record, stop) for case, record in cases.items()}
+    checks = {
+        case: judge_case(CheckedCase.of(scenario, request.feeder, case, record, folder / case), stop)
+        for case, record in cases.items()
+    }
     write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
         if request.lasting and stop.raised is None:
@@ -163,18 +164,6 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     ended_early = {case: record.record_failure for case, record in recorded.items() if record.record_failure}
     set_complete(folder, (f"case {case}: {why}" for case, why in ended_early.items()))
     return report
-
-
-def verdicts_on(
-    request: Request, case: str, record: CaseRecord, stop: JudgingStop | None = None
-) -> tuple[CheckVerdict, ...]:
-    """Return the verdicts of the checks on a case; see `judge_case`."""
-    from scenarios.checks.checked_case import CheckedCase
-    from scenarios.checks.judging import judge_case
-
-    scenario, folder = request.scenario, request.folder / case
-    checked = CheckedCase.of(scenario, request.feeder, case, record.history, record.windows, record.events, folder)
-    return judge_case(checked, checks_of(scenario), stop, checks_off(scenario))
 
 
 def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:

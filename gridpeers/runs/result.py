@@ -28,7 +28,7 @@ from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
 from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.schema import scenario_model as model
-from scenarios.schema.plugin_keys import checks_of, checks_off, claims_of
+from scenarios.schema.plugin_keys import claims_of
 from wire.messages import PlantEvent
 from wire.schema.suggestion import suggestion
 
@@ -79,7 +79,6 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         super().__init__(folder, spec, feeder)
-        self._cases = self.numbers["cases"]
         self._results = {case: Result(folder, spec, feeder, self, case) for case in spec.cases}
         self._checks: dict[str, tuple[CheckVerdict, ...]] | None = None
 
@@ -107,7 +106,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
             file = self.folder / checks_file.FILE
             self._checks = self._folder.read(file.name, checks_file.read_verdicts) if file.exists() else {}
         if case not in self._checks:
-            self._checks[case] = judge_case(self[case].checked_case, checks_of(self._spec), off=checks_off(self._spec))
+            self._checks[case] = judge_case(self[case].checked_case)
         return self._checks[case]
 
     @property
@@ -169,17 +168,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         """
         if self.driver == "live":
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
-        cases = {}
-        for case, result in self.items():
-            events = _plant_events(result)
-            came = windows(as_they_came(self._spec, events), self._spec.time.end_s)
-            saved = {
-                label: of["messages_saved"]
-                for label, of in frames.windows_of(self._cases[case]).items()
-                if of.get("messages_saved")
-            }
-            cases[case] = CaseRecord(history=result.record, windows=came, events=events, messages_saved=saved)
-        return find(self._spec, self._feeder, cases)
+        return find(self._spec, self._feeder, {case: _case_record(result) for case, result in self.items()})
 
     @property
     def verdicts(self) -> tuple[Verdict, ...]:
@@ -294,9 +283,7 @@ class Result(_FromFolder):
     @cached_property
     def checked_case(self) -> CheckedCase:
         """The case as checks see it: what a check of one's own is called with."""
-        events = _plant_events(self)
-        came = windows(as_they_came(self.spec, events), self.spec.time.end_s)
-        return CheckedCase.of(self.spec, self._feeder, self.case, self.record, came, events, self.folder / self.case)
+        return CheckedCase.of(self.spec, self._feeder, self.case, _case_record(self), self.folder / self.case)
 
     @property
     def check_verdicts(self) -> tuple[CheckVerdict, ...]:
@@ -343,6 +330,15 @@ class Result(_FromFolder):
 
     def __repr__(self) -> str:
         return f"<Result {self.spec.name} {self.case}: {self.driver}; history {self.sha256[:12]}>"
+
+
+def _case_record(result: Result) -> CaseRecord:
+    """Return a case with the windows of its scenario's events, as metrics and checks take it."""
+    events = _plant_events(result)
+    came = windows(as_they_came(result.spec, events), result.spec.time.end_s)
+    measured = frames.windows_of(result.numbers["cases"][result.case])
+    saved = {label: of["messages_saved"] for label, of in measured.items() if of.get("messages_saved")}
+    return CaseRecord(history=result.record, windows=came, events=events, messages_saved=saved)
 
 
 def _plant_events(result: Result) -> list[PlantEvent]:

@@ -16,10 +16,11 @@ from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.machine_error import MachineError, machine_error, unwritten
 from scenarios.checks.check_verdict import CheckVerdict
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.judging import judge_case
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.record import Recorded
 from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
-from scenarios.run import verdicts_on
 from scenarios.run_case import run_case
 from scenarios.run_request import BrokenRunError, Driver, Request
 from scenarios.schema.scenario_model import ScenarioModel
@@ -230,7 +231,7 @@ def _judged(
             if recorded.record_failure:  # its checks could not judge it
                 raise unwritten(recorded.record_failure, disk)
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
-            verdicts = verdicts_on(request, base.case, record)
+            verdicts = judge_case(CheckedCase.of(scenario, base.feeder, base.case, record, folder / base.case))
         except MachineError:
             raise
         except Exception as error:

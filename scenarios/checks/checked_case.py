@@ -12,7 +12,7 @@ import numpy as np
 
 from plant.equipment import Feeder
 from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.results.event_windows import Window
+from scenarios.results.event_windows import CaseRecord, Window
 from scenarios.results.history import Flags, History, Nameplates, read_only
 from scenarios.results.island_membership import island_intervals, islands_at_end, part_of
 from scenarios.results.switch_positions import switch_events
@@ -74,19 +74,17 @@ class CheckedCase:
         scenario: ScenarioModel,
         feeder: Feeder,
         case: str,
-        history: History,
-        windows: Sequence[Window],
-        events: Sequence[PlantEvent],
+        record: CaseRecord,
         folder: Path | None = None,
     ) -> CheckedCase:
-        """Return a case whose arrays refuse writes."""
+        """Return a recorded case, in its folder if it has one; its arrays refuse writes."""
         return cls(
             scenario=scenario,
             feeder=feeder,
             case=case,
-            history=read_only(history),
-            windows=windows,
-            events=tuple(events),
+            history=read_only(record.history),
+            windows=record.windows,
+            events=tuple(record.events),
             folder=folder,
         )
 
@@ -155,7 +153,7 @@ class CheckedCase:
         intervals = island_intervals(self.scenario, self.feeder, self.history.inverters, self.events)
         found = []
         for window in self.windows:
-            rows = self.history.rows(window.rows(self.history.t))
+            rows = window.cut(self.history)
             if not rows.t.size:
                 continue
             at_end = islands_at_end(intervals, window)

@@ -23,6 +23,7 @@ from scenarios.checks.check_verdict import (
     Violation,
 )
 from scenarios.checks.checked_case import CheckedCase
+from scenarios.schema.plugin_keys import checks_of, checks_off
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, made
 from wire.plugins.registry import PluginError
@@ -53,28 +54,39 @@ class JudgingStop:
             raise self.raised
 
 
-def judge_case(
-    case: CheckedCase, checks: Mapping[str, Plugin], stop: JudgingStop | None = None, off: Iterable[str] = ()
+def judge_case(case: CheckedCase, stop: JudgingStop | None = None) -> tuple[CheckVerdict, ...]:
+    """Return the verdict of each check of the scenario on a case; those that it switches off come last.
+
+    Parameters
+    ----------
+    case : CheckedCase
+        The case.
+    stop : JudgingStop, optional
+        As for `judge_by`.
+    """
+    off = (CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in checks_off(case.scenario))
+    return *judge_by(checks_of(case.scenario), case, stop), *off
+
+
+def judge_by(
+    checks: Mapping[str, Plugin], case: CheckedCase, stop: JudgingStop | None = None
 ) -> tuple[CheckVerdict, ...]:
-    """Return the verdict of each check on a case; those that are off come last.
+    """Return the verdict of each of some checks on a case.
 
     A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged. What it
     has yielded before counts, whatever it raises then, also `NotJudgedError`.
 
     Parameters
     ----------
-    case : CheckedCase
-        The case.
     checks : Mapping[str, Plugin]
         The checks by their names in the verdict (`check_registry.chosen_checks`).
+    case : CheckedCase
+        The case.
     stop : JudgingStop, optional
         Takes a request to end: this check and all further ones are not judged. Without it the request goes through.
-    off : Iterable[str], optional
-        Names of checks that the scenario switches off (`check_registry.switched_off`).
     """
     with np.errstate(all="ignore"):  # a value that is no number is within no limit, or has its own reason
-        judged = [_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items()]
-    return *judged, *(CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in off)
+        return tuple(_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items())
 
 
 def _unless_stopped(name: str, plugin: Plugin, case: CheckedCase, stop: JudgingStop | None) -> CheckVerdict:

@@ -23,7 +23,6 @@ from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
-from scenarios.schema.plugin_keys import checks_of, checks_off
 from wire.driver.drive import StoppedError
 from wire.messages import Pacing
 
@@ -54,11 +53,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     record = CaseRecord.of(scenario, feeder, case, recorded, departures.windows.measured)
     record = replace(record, history=taken_part(scenario, feeder, record.history))
     findings = find(scenario, feeder, {case: record})
-    checked = CheckedCase.of(
-        scenario, feeder, case, record.history, record.windows, record.events, metrics.folder / case
-    )
     stop = JudgingStop(StoppedError, KeyboardInterrupt)
-    checks = {case: judge_case(checked, checks_of(scenario), stop, checks_off(scenario))}
+    checks = {case: judge_case(CheckedCase.of(scenario, feeder, case, record, metrics.folder / case), stop)}
     report = RunReport(
         scenario=scenario.name,
         titles={case: scenario.cases[case].title},

@@ -15,7 +15,7 @@ from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import SummaryPass
 from scenarios.checks.communication.record_content import RecordContent
-from scenarios.checks.judging import judge_case
+from scenarios.checks.judging import judge_by
 from scenarios.results.history import History
 
 
@@ -70,5 +70,5 @@ def with_content(case: CheckedCase, content: RecordContent, *, late: float = 0.0
 def verdict(case: CheckedCase, check: str, **limits: Any) -> CheckVerdict:
     """The verdict of one check on a case."""
     entries: Sequence[dict[str, Any]] = [{"use": check, **limits}]
-    (found,) = judge_case(case, {check: chosen_checks(entries)[check]})
+    (found,) = judge_by({check: chosen_checks(entries)[check]}, case)
     return found

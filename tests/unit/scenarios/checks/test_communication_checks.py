@@ -20,7 +20,7 @@ from scenarios.checks.communication.record_content import RecordContent
 from scenarios.checks.communication.record_pass import SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.checks.communication.state_window import StateWindow
-from scenarios.checks.judging import judge_case
+from scenarios.checks.judging import judge_by
 from scenarios.record.record_file import RecordFile
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
 from wire.journal import Decision
@@ -81,11 +81,11 @@ def test_in_wall_clock_time_a_time_of_flight_longer_than_the_run_is_not_judged(i
     )
     limits = (("in_flight_s", in_flight_s),)
     case: Any = SimpleNamespace(communication=found, case="IV")
-    (judged,) = judge_case(case, {"message_account": Plugin(use="message_account", parameters=limits)})
+    (judged,) = judge_by({"message_account": Plugin(use="message_account", parameters=limits)}, case)
 
     assert judged.status == status
     found.simulated, found.unheard = True, {("inv1", "inv2"): Missing()}
-    (judged,) = judge_case(case, {"message_account": Plugin(use="message_account", parameters=limits)})
+    (judged,) = judge_by({"message_account": Plugin(use="message_account", parameters=limits)}, case)
     assert judged.status == "passed"
 
 

@@ -18,7 +18,7 @@ from scenarios.checks.check_registry import ALWAYS, CHECKS
 from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import read_verdicts, verdicts_json
-from scenarios.checks.judging import JudgingStop, judge_case
+from scenarios.checks.judging import JudgingStop, judge_by
 from scenarios.record.record_reader import RunRecord
 from scenarios.run import run
 from scenarios.run_request import Request
@@ -47,7 +47,7 @@ class Nadir:
 def judged(check: Callable[[Any], Any], monkeypatch: pytest.MonkeyPatch) -> CheckVerdict:
     """The verdict of a function on a sound case."""
     monkeypatch.setitem(vars(CHECKS)["_added"], "mine", check)
-    (found,) = judge_case(ran().checked_case, {"mine": Plugin(use="mine")})
+    (found,) = judge_by({"mine": Plugin(use="mine")}, ran().checked_case)
     return found
 
 
@@ -158,7 +158,7 @@ def test_of_a_check_of_ones_own_the_module_is_named(
     case = ran().checked_case
     monkeypatch.setattr(judging, "PATIENCE", 0.0)
     monkeypatch.setattr(judging, "tell", lambda text, real=judging.tell: (real(text), NAMED.set()))
-    judge_case(case, {"slow": Plugin(use=f"{HERE}:waits_to_be_named")})
+    judge_by({"slow": Plugin(use=f"{HERE}:waits_to_be_named")}, case)
 
     assert capsys.readouterr().err == (
         f"check slow of {HERE} has been judging case IV for 0 s; Ctrl-C ends the run, and keeps what is recorded\n"
@@ -181,7 +181,7 @@ def test_a_request_to_end_leaves_the_rest_not_judged() -> None:
     checks = {"frequency": Plugin(use="frequency"), "mine": Plugin(use=f"{HERE}:interrupted")}
     checks["steady"] = Plugin(use="steady")
     stop = JudgingStop()
-    found = judge_case(ran().checked_case, checks, stop)
+    found = judge_by(checks, ran().checked_case, stop)
 
     assert [verdict.sentence for verdict in found] == [
         "frequency passed", "mine not judged: interrupted", "steady not judged: interrupted",
@@ -191,7 +191,7 @@ def test_a_request_to_end_leaves_the_rest_not_judged() -> None:
     with pytest.raises(KeyboardInterrupt):
         stop.end()
     with pytest.raises(KeyboardInterrupt):
-        judge_case(ran().checked_case, checks)
+        judge_by(checks, ran().checked_case)
 
 
 def test_ctrl_c_while_a_check_judges_ends_the_run_with_record_and_verdicts(tmp_path: Path) -> None:
