@@ -173,7 +173,7 @@ def _tell_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> None:
 
 def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
     """Write the table in the order of the runs, and the report."""
-    folder.sort()
+    folder.write_table()
     summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
     (folder.path / "report.txt").write_text("\n".join(summary.lines()) + "\n", encoding="utf-8")
     return summary

@@ -15,12 +15,13 @@ from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.numbered_run import seed_of
 from scenarios.results.run_files import FolderError, shown, write_whole
+from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from scenarios.run_request import Driver
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line
 
-SCENARIO, SEED, JOURNAL = "scenario.toml", "seed.txt", "runs.jsonl"
-"""Files of which a campaign goes on: the journal has a line for each run, written as it ends, the latest counts."""
+SCENARIO, SEED = "scenario.toml", "seed.txt"
+"""Files from which a campaign goes on, beside its journal."""
 
 TABLE, FAILURES = "chaos.csv", "failures"
 
@@ -60,21 +61,18 @@ class ChaosFolder:
         """Results by the number of their run."""
         write_whole(path / SCENARIO, base.text)
         write_whole(path / SEED, f"{seed}\n")
-        write_whole(path / JOURNAL, [_journal_line(row) for row in self.rows.values()])
-        self._write_table()
+        open_journal(path).close()
+        self.write_table()
 
     def add(self, row: ChaosRow) -> None:
         """Keep the result of a run, in the order in which they come."""
         self.rows[row.number] = row
-        for name, text in ((JOURNAL, _journal_line(row)), (TABLE, self._cells(row))):
-            with (self.path / name).open("a", encoding="utf-8", newline="\n") as file:
-                file.write(text)
+        for name, line in ((JOURNAL, journal_line(row)), (TABLE, self._cells(row).encode())):
+            with (self.path / name).open("ab") as file:
+                file.write(line)
 
-    def sort(self) -> None:
+    def write_table(self) -> None:
         """Write the table in the order of the runs."""
-        self._write_table()
-
-    def _write_table(self) -> None:
         rows = (self.rows[number] for number in sorted(self.rows))
         write_whole(self.path / TABLE, [_line(COLUMNS), *map(self._cells, rows)])
 
@@ -141,7 +139,7 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
     try:
         text = (folder / SCENARIO).read_text(encoding="utf-8")
         theirs = int((folder / SEED).read_text(encoding="ascii"))
-        lines = (folder / JOURNAL).read_bytes().split(b"\n")[:-1]  # behind the last line feed: cut off by a kill -9
+        rows = rows_in(folder, ChaosRow)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise FolderError(
@@ -151,15 +149,6 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
         raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to be disturbed; begin a new folder")
     if theirs != seed:
         raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
-    rows: dict[int, ChaosRow] = {}
-    for place, line in enumerate(lines, 1):
-        try:
-            row = msgspec.json.decode(line, type=ChaosRow)
-        except msgspec.MsgspecError as error:
-            raise FolderError(
-                f"{where}: line {place} of {JOURNAL} is damaged ({error}); remove it, and its run is done again"
-            ) from None
-        rows[row.number] = row
     if rows and (last := max(rows)) >= runs:
         raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
     here = {SAME_IN_PROCESSES} if driver == "processes" else set()
@@ -174,10 +163,6 @@ def again(file: Path) -> str:
 def _status(row: ChaosRow) -> str:
     """Return the status of a run in a word: what it violates comes before what a collapse excuses."""
     return "violated" if row.violated else "collapse" if row.collapse else "passed"
-
-
-def _journal_line(row: ChaosRow) -> str:
-    return msgspec.json.encode(row).decode() + "\n"
 
 
 def _line(cells: Iterable[object]) -> str:

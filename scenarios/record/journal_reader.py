@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import msgpack
@@ -19,6 +19,9 @@ _HEAD = b"\xdd"
 
 _LENGTHS = {kind.__struct_config__.tag: 1 + len(kind.__struct_fields__) for kind in ENTRIES}
 """Number of values of an entry of each kind, with the kind itself."""
+
+_END = object()
+"""Behind the last value."""
 
 _decoder = msgspec.msgpack.Decoder(list[AnyEntry])
 
@@ -40,8 +43,16 @@ def whole_entries(data: bytes) -> Sequence[Entry] | None:
     return entries
 
 
-def entries_of(data: bytes) -> Iterator[Entry]:
+def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = None) -> Iterator[Entry]:
     """Yield the entries in the data of a `Journal`; those of unknown kinds are left out.
+
+    Parameters
+    ----------
+    data : bytes
+        The data.
+    note_damage : Callable[[ValueError], None], optional
+        Takes the error of each damaged entry; those behind it are read as far as they can be. When left out, the first
+        such error is raised.
 
     Raises
     ------
@@ -51,8 +62,19 @@ def entries_of(data: bytes) -> Iterator[Entry]:
     if (entries := whole_entries(data)) is not None:
         yield from entries
         return
-    for raw in raw_entries(data):
-        if (entry := entry_of(raw)) is not None:
+    values = raw_entries(data)
+    while True:
+        try:
+            raw = next(values, _END)
+            entry = None if raw is _END else entry_of(raw)
+        except ValueError as error:  # if the bytes end here, `values` does too
+            if note_damage is None:
+                raise
+            note_damage(error)
+            continue
+        if raw is _END:
+            return
+        if entry is not None:
             yield entry
 
 

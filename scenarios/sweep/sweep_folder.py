@@ -1,7 +1,6 @@
 """The folder of a sweep: its files, its owner, and the runs that are done already.
 
-`runs.jsonl` is a journal: a line per finished run, written and flushed to the disk before the next. A line that was
-cut off by a kill has no line feed; it is removed when the sweep goes on, and its run is done again.
+Each line of its journal is flushed to the disk before the next run is kept.
 """
 
 from __future__ import annotations
@@ -13,16 +12,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-import msgspec
-
 from scenarios.results.folder_lock import LOCK, locked
 from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
+from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import SweepRow
 from scenarios.versions import versions
 
-MANIFEST, JOURNAL = "sweep.json", "runs.jsonl"
+MANIFEST = "sweep.json"
 
 
 def folder_of(out: Path | None, name: str) -> Path:
@@ -60,8 +58,8 @@ class SweepFolder:
                 write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
                 write_whole(folder / MANIFEST, json.dumps(whole, indent=2) + "\n")
             set_status(folder, "running")
-            self.done = _read(folder / JOURNAL, len(plan.runs))
-            self._journal = (folder / JOURNAL).open("ab")
+            self.done = self._kept_rows()
+            self._journal = open_journal(folder)
         except OSError as error:
             raise FolderError(
                 f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
@@ -80,14 +78,22 @@ class SweepFolder:
     @property
     def kept(self) -> int:
         """Number of finished runs that will be found again; Ctrl-C can come between keeping a run and counting it."""
-        return len(_read(self.path / JOURNAL, self._size))
+        return len(self._kept_rows())
 
     def add(self, done: SweepRow) -> None:
         """Keep a finished run."""
-        self._journal.write(msgspec.json.encode(done) + b"\n")
+        self._journal.write(journal_line(done))
         self._journal.flush()
         os.fsync(self._journal.fileno())
         self.done[done.number] = done
+
+    def _kept_rows(self) -> dict[int, SweepRow]:
+        """Return the finished runs in the journal."""
+        journal = self.path / JOURNAL
+        found = rows_in(self.path, SweepRow) if journal.exists() else {}
+        if beyond := [number for number in found if not 0 <= number < self._size]:
+            raise FolderError(f"{shown(journal)}: there is no run {beyond[0]} in this sweep; remove its line")
+        return found
 
 
 def _check(folder: Path, whole: Mapping[str, object]) -> bool:
@@ -124,31 +130,6 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
             "the same versions, or begin in another folder by --out"
         )
     return True
-
-
-def _read(journal: Path, runs: int) -> dict[int, SweepRow]:
-    """Return the finished runs; an unfinished last line is cut off."""
-    if not journal.exists():
-        return {}
-    text = journal.read_bytes()
-    whole = text[: text.rfind(b"\n") + 1]
-    if len(whole) < len(text):
-        with journal.open("r+b") as file:
-            file.truncate(len(whole))
-    found = {}
-    for number, line in enumerate(whole.splitlines(), start=1):
-        try:
-            done = msgspec.json.decode(line, type=SweepRow)
-        except msgspec.MsgspecError:
-            raise FolderError(
-                f"{shown(journal)}:{number}: this line is damaged; remove it, and its run is done again"
-            ) from None
-        if not 0 <= done.number < runs:
-            raise FolderError(
-                f"{shown(journal)}:{number}: there is no run {done.number} in this sweep; remove the line"
-            )
-        found[done.number] = done
-    return found
 
 
 def _versions() -> dict[str, str]:

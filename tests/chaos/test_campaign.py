@@ -151,10 +151,11 @@ def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeyp
     def full(folder: ChaosFolder, *rest: Any) -> None:
         if len(rest) == 1:
             folder.rows[rest[0].number] = replace(rest[0], violated={"frequency": "too low"})
-        raise OSError(errno.ENOSPC, "No space left on device", str(folder.path / "chaos.csv"))
+        if folder.rows:
+            raise OSError(errno.ENOSPC, "No space left on device", str(folder.path / "chaos.csv"))
 
     _small(elsewhere)
-    for method in ("add", "sort", "write_failure"):
+    for method in ("add", "write_table", "write_failure"):
         monkeypatch.setattr(ChaosFolder, method, full)
     code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
 
@@ -248,7 +249,7 @@ def test_a_run_whose_record_ends_early_is_not_judged(elsewhere: Path, monkeypatc
 
 
 def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What a run lacks while a failure is shrunk ends that, and is not taken for the failure."""
+    """A machine without room ends the shrinking of a failure, and does not count as the failure."""
     base = base_in(_small(elsewhere))
     monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
 
@@ -429,7 +430,7 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
         ),
         (("--resume", "old", "--runs", "1"), "--resume old: it has run 1 already; give --runs 2 or more"),
         (("--resume", "other"), "--resume other: its scenario.toml is not the scenario and case to be disturbed"),
-        (("--resume", "bad"), "--resume bad: line 1 of runs.jsonl is damaged ("),
+        (("--resume", "bad"), "bad/runs.jsonl:1: this line is damaged ("),
         (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
     ],
 )

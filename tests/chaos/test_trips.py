@@ -127,7 +127,7 @@ LASTS = JudgedRun(ROW, collapses=(COLLAPSED,), off=WEST)
 def test_only_a_collapse_that_comes_and_lasts_without_faults_excuses(
     faulty: JudgedRun, plain: JudgedRun, excused: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What control restores is not asked of inverters that a change alone makes trip, and keeps off."""
+    """Inverters that a change alone makes trip, and keeps off, violate no check of what control restores."""
     row = _run(monkeypatch, faulty, plain, "inv1", "inv2")
 
     assert row.violated.keys() == ({"links"} if excused else {"frequency", "links"})

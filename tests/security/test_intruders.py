@@ -62,7 +62,7 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
 
 
 def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: Path) -> None:
-    """Who refuses whom, from one handshake with the plant; a member of its site has nothing to learn."""
+    """One handshake with the plant tells which side refuses the other's certificate; a member is refused nothing."""
     from wire.trust.site_authority import issue, make_site
 
     make_site(other := tmp_path / "lab")

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
     from scenarios.chaos.campaign import Campaign, Summary, Tell
     from scenarios.chaos.chaos_folder import ChaosFolder
+    from scenarios.chaos.chaos_run import ChaosRow
     from scenarios.schema import ScenarioModel
+
+_Begun: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
+"""Runs that a campaign has already, and a function that returns its folder, made and locked."""
 
 _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
@@ -61,39 +65,31 @@ def chaos(
     spec = chosen(spec, case or list(spec.cases)[-1], None)
     _refuse_unless_possible(scenario, spec, case, driver)
     require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
-    from datetime import datetime
-
     from rich.console import Console
 
     from scenarios.chaos.campaign import Campaign
-    from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
+    from scenarios.chaos.chaos_folder import ChaosFolder
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import RUNS, FolderError, new_folder, require_folder, set_status, shown
+    from scenarios.results.run_files import RUNS, FolderError, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
     if out is not None and resume is not None:
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     base = ChaosBase(spec, feeder)
+    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     try:
-        if resume is not None and resume.is_dir():
-            _lock(context, resume, "--resume")
-        rows = {} if resume is None else kept_rows(resume, base, seed, driver, runs)
-        if resume is None:
-            require_folder(out, f"{spec.name}-chaos")
+        rows, opened = _new(context, out, campaign) if resume is None else _known(context, resume, campaign)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except OSError as error:
         fail([f"--out {out or RUNS}: {error.strerror}; give another folder"], BAD_INPUT)
-    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     console = Console()
     with _kept_if_ended(campaign, rows, resume):
         _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     try:
-        path = resume or new_folder(out, f"{spec.name}-chaos", datetime.now().astimezone())
-        if resume is None:
-            _lock(context, path, "--out")
+        path = opened()
         set_status(path, "running")
         folder = ChaosFolder(path, base, seed, command_line(*words), rows)
     except (FolderError, OSError) as error:
@@ -103,6 +99,32 @@ def chaos(
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
     raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
+
+
+def _new(context: typer.Context, out: Path | None, campaign: Campaign) -> _Begun:
+    """Begin a campaign in a new folder, which is made only once the scenario has passed without disturbances."""
+    from datetime import datetime
+
+    from scenarios.results.run_files import new_folder, require_folder
+
+    name = f"{campaign.base.scenario.name}-chaos"
+    require_folder(out, name)
+
+    def opened() -> Path:
+        path = new_folder(out, name, datetime.now().astimezone())
+        _lock(context, path, "--out")
+        return path
+
+    return {}, opened
+
+
+def _known(context: typer.Context, folder: Path, campaign: Campaign) -> _Begun:
+    """Begin a campaign that goes on in its folder."""
+    from scenarios.chaos.chaos_folder import kept_rows
+
+    if folder.is_dir():
+        _lock(context, folder, "--resume")
+    return kept_rows(folder, campaign.base, campaign.seed, campaign.driver, campaign.runs), lambda: folder
 
 
 def _lock(context: typer.Context, folder: Path, option: str) -> None:

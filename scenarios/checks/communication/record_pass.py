@@ -6,7 +6,7 @@ sent, heard and used which number. So this reads the entries of the journals as 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
@@ -20,7 +20,7 @@ from scenarios.checks.communication.dropped_states import OF_SENDER, DroppedStat
 from scenarios.emulation.link_reports import data_of
 from scenarios.record.decision_entries import is_periodic
 from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage
-from scenarios.record.journal_reader import entry_of, raw_entries, values_of, whole_entries
+from scenarios.record.journal_reader import entries_of, values_of
 from scenarios.record.record_file import RecordFile
 from wire.bounds import MOST_COUNT
 from wire.codec import sound
@@ -164,7 +164,7 @@ class _Pass:
         """Take a part of a journal, as far as it can be read; in simulated time what is not whole is lost."""
         before, ticks = self._unreadable, list[int]()
         self._drop_times.note(journal)
-        for entry in self._entries(journal):
+        for entry in entries_of(journal.data, self._count_damage):
             if isinstance(entry, Decision | Exchange):
                 if not self._is_timely(journal, time_of(entry.tick, self._T_c) if self._simulated else journal.t):
                     self._unreadable += 1
@@ -174,23 +174,9 @@ class _Pass:
         if self._simulated and self._unreadable == before:  # in wall-clock time each entry tells all by itself
             self._cover(journal, ticks)
 
-    def _entries(self, journal: Journal) -> Iterator[Entry]:
-        """Yield the entries that are ours; count each other one, and the end of what can be read."""
-        if (entries := whole_entries(journal.data)) is not None:
-            yield from entries
-            return
-        values = raw_entries(journal.data)
-        while True:
-            try:
-                raw = next(values, _END)
-                entry = None if raw is _END else entry_of(raw)
-            except ValueError:  # if the bytes end here, `values` does too
-                self._unreadable += 1
-                continue
-            if raw is _END:
-                return
-            if entry is not None:
-                yield entry
+    def _count_damage(self, error: ValueError) -> None:
+        """Count a damaged entry, or the end of what can be read."""
+        self._unreadable += 1
 
     def _is_timely(self, journal: Journal, t: float) -> bool:
         """Return whether an entry of a journal may be about a run time (s): nobody tells of what is yet to come.
@@ -294,9 +280,6 @@ _VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")
 
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
-
-_END = object()
-"""Behind the last entry of a part."""
 
 _NOT_SOUND = ("corrupt", "garbled")
 """Kinds of rejected messages whose numbers are not those that were sent."""

@@ -80,7 +80,7 @@ def test_show_says_which_certificates_have_expired(elsewhere: Path) -> None:
 
 
 def test_show_warns_of_every_key_that_others_may_read(elsewhere: Path) -> None:
-    """That of the authority above all: with it anybody can be anybody. Files as they were made give no warning."""
+    """Each such file gives a warning, that of the authority first; files with the mode of `keys init` give none."""
     assert invoke("keys", "init", "lab")[0] == 0
     sound = invoke("keys", "show", "--keys", "lab")[1]
     (elsewhere / "lab" / "ca.key").chmod(0o644)

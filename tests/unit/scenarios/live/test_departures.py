@@ -205,7 +205,7 @@ def test_a_live_switch_opens_a_window_as_the_scenarios_events_do(
 
 
 def test_each_live_event_says_what_people_did() -> None:
-    """What they operate in one step is one event, with a label of its own."""
+    """Switches that people operate at one time are one event, with a label of its own."""
     compared = compare(
         *one_case("islanding"), [switch(2.5), switch(2.5, name="sw9 (18-135)"), switch(5, "closed")], 7.0
     )

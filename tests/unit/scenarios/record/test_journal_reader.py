@@ -85,3 +85,13 @@ def test_what_can_be_read_of_a_part_with_an_entry_of_a_later_version_is_read() -
     data = PARTS[1] + msgspec.msgpack.encode(["later", 1]) + PARTS[2]
 
     assert list(entries_of(data)) == [ENTRIES[1], ENTRIES[2]]
+
+
+def test_behind_a_damaged_entry_the_others_are_read_if_its_error_is_taken() -> None:
+    """A value of another form is told and left out; the bytes that end within an entry are told at last."""
+    data = PARTS[1] + msgspec.msgpack.encode(["token", "no time"]) + PARTS[2] + PARTS[3][:-1]
+    damage: list[ValueError] = []
+
+    assert list(entries_of(data, damage.append)) == [ENTRIES[1], ENTRIES[2]]
+    assert len(damage) == 2
+    assert "within the entry" in str(damage[-1])

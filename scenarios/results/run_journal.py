@@ -1,0 +1,71 @@
+"""The journal of a study of many runs: a line for each run as it ends, so that the study goes on where it was ended.
+
+A kill can cut the last line off before its line feed: that run counts as not done.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import BinaryIO, Protocol, TypeVar
+
+import msgspec
+
+from scenarios.results.run_files import FolderError, shown
+
+JOURNAL = "runs.jsonl"
+"""Name of its file."""
+
+
+class JournalRow(Protocol):
+    """The result of a run, as a struct of msgspec."""
+
+    @property
+    def number(self) -> int:
+        """Number of the run, from 0."""
+        ...
+
+
+Row = TypeVar("Row", bound=JournalRow)
+
+
+def journal_line(row: JournalRow) -> bytes:
+    """Return the line of a run."""
+    return msgspec.json.encode(row) + b"\n"
+
+
+def rows_in(folder: Path, kind: type[Row]) -> dict[int, Row]:
+    """Return the runs in the journal of a folder, by their numbers; of two lines of one run the later one counts.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the study.
+    kind : type[Row]
+        Type of its rows.
+
+    Raises
+    ------
+    OSError
+        If the journal cannot be read.
+    FolderError
+        If a line is damaged.
+    """
+    rows = {}
+    for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):
+        try:
+            row = msgspec.json.decode(line, type=kind)
+        except msgspec.MsgspecError as error:
+            where = f"{shown(folder / JOURNAL)}:{place}"
+            raise FolderError(
+                f"{where}: this line is damaged ({error}); remove it, and its run is done again"
+            ) from None
+        rows[row.number] = row
+    return rows
+
+
+def open_journal(folder: Path) -> BinaryIO:
+    """Open the journal of a folder, a new one if there is none, to add lines; the one that a kill cut off goes."""
+    journal = (folder / JOURNAL).open("a+b")
+    journal.seek(0)
+    journal.truncate(journal.read().rfind(b"\n") + 1)
+    return journal
