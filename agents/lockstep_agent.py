@@ -351,6 +351,8 @@ class LockstepAgent(AgentNode):
         if not self._ready:
             raise RejectedError("unexpected", "no roster has this process on it")
         if self._tick is None:
+            if abs(message.t - time_of(message.seq, self._config.T_c)) > self._config.T_c / 2:
+                raise RejectedError("implausible", f"tick {message.seq} at t = {message.t:g} s")
             self._tick = message.seq
             self._early = {name: early for name, early in self._early.items() if early[0].seq == message.seq}
         if message.seq != self._tick or self._grant is not None:

@@ -78,10 +78,11 @@ class Lab:
         roster, ids = tuple(processes), tuple(processes.values())
         self.hear(KEYS.control, Prepare(sender="plant", epoch=1, seq=number, t=0.0, roster=roster, instances=ids))
 
-    def measure(self, k: int) -> None:
-        """The grant of tick k."""
+    def measure(self, k: int, t: float | None = None) -> None:
+        """The grant of tick k, at its time or another (s)."""
+        t = round(0.02 * k, 9) if t is None else t
         message = Measurement(
-            sender="plant", epoch=1, seq=k, t=round(0.02 * k, 9), to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
+            sender="plant", epoch=1, seq=k, t=t, to="inv1", P=5e4, Q=0.0, V=277.0, f=59.9,
             P_set=5e4, V_set=277.0, grid_connected=False, island="inv1",
         )  # fmt: skip
         self.hear(KEYS.measurement("inv1"), message)

@@ -266,6 +266,18 @@ def test_a_measurement_of_another_tick_is_refused(k: int, kind: str) -> None:
     assert lab.node.rejects.counts == {kind: 1}
 
 
+def test_a_first_measurement_whose_time_is_not_that_of_its_tick_is_refused() -> None:
+    """The agent would take its own times from the tick, and send messages of later than any message may be."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(0, "inv2")
+
+    lab.measure(2**50, t=0.5)
+    assert lab.node.rejects.counts == {"implausible": 1}
+    lab.measure(25, t=0.5)
+    assert [state.seq for state in lab.decided] == [25]
+
+
 def test_a_second_measurement_of_a_tick_is_refused() -> None:
     """A tick is granted once."""
     lab = ticking("inv2", tick=5)
