@@ -10,7 +10,7 @@ from typing import Self
 
 from bench.harness import GRIDPEERS
 from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.live.run_address import RunAddress
+from scenarios.live.client.run_address import RunAddress
 
 BUILD = 300.0
 """Longest wait (s) for a run to begin: the plant may be compiled first."""

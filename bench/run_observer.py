@@ -14,9 +14,9 @@ from msgspec.structs import replace
 
 from plant.equipment import F_NOM
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.live.live_options import LiveOptions, configure
-from scenarios.live.run_address import RunAddress
-from scenarios.live.run_client import RunClient
+from scenarios.live.client.run_address import RunAddress
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.launch.live_options import LiveOptions, configure
 from scenarios.results.metrics import F_BAND, MPSI_BAND
 from scenarios.results.sharing_index import sharing_index
 from scenarios.schema import load_scenario

@@ -16,8 +16,8 @@ import pytest
 
 from bench.live_processes import BUILD, END, LiveProcesses
 from bench.scale import write_scenario
-from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import ask, plant_status
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.requests.run_requests import ask, plant_status
 from scenarios.schema import load_scenario
 from tests.processes.realtime.browsers import chromium
 from wire.codec import decode

@@ -215,4 +215,4 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     credentials: Credentials | None = None
     """Certificate of this process and members of its site; None: links are open."""
     feeder_map: dict[str, Any] = {}
-    """Wall-clock: the one-line diagram (`scenarios.live.feeder_map`), as a tree, for clients that draw it."""
+    """Wall-clock: the one-line diagram (`scenarios.live.show.feeder_map`), as a tree, for clients that draw it."""

@@ -41,7 +41,7 @@ from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
 from bench.soak.stop_request import StopRequest, stop_request
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
-from scenarios.live.run_client import NobodyError
+from scenarios.live.client.run_client import NobodyError
 from scenarios.schema import load_scenario
 from wire.messages import PLANT
 

@@ -29,7 +29,7 @@ from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.checks.checks_file import FILE as CHECKS
 from scenarios.checks.checks_file import read_verdicts
 from scenarios.checks.communication.last_words_check import LastWords
-from scenarios.live.run_client import RunClient
+from scenarios.live.client.run_client import RunClient
 from scenarios.live.show.watching import RunSubscriber
 from scenarios.record.record_info import FILE as RECORD
 from wire.messages import PLANT

@@ -21,7 +21,7 @@ HERE, PORT = "127.0.0.1", 8123
 def page_socket(port: int | None) -> socket.socket:
     """Return a socket for the page; or end with a clear line, before anything is started."""
     require_page()
-    from scenarios.live.run_address import UsageError
+    from scenarios.live.client.run_address import UsageError
     from scenarios.view.page_address import listen
 
     try:

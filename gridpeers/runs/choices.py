@@ -8,9 +8,9 @@ from typing import TypedDict, get_args
 
 import msgspec
 
-from scenarios.live.run_speed import SPEEDS
 from scenarios.results.metrics_file import Clock
 from scenarios.run_request import Driver
+from scenarios.run_speed import SPEEDS
 from scenarios.schema import ScenarioError
 from scenarios.schema import scenario_model as model
 from wire.schema.suggestion import suggestion

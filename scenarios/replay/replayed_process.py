@@ -17,7 +17,7 @@ from plant.plant_interface import LivePlant
 from plant.realtime.realtime_plant import RealtimePlant
 from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.emulation.emulated_links import links_of
-from scenarios.live.live_processes import RECORDER_WAIT
+from scenarios.live.launch.live_processes import RECORDER_WAIT
 from scenarios.record.record_info import RecordInfo
 from scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
 from scenarios.replay.replay_error import ReplayError

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from scenarios.live.run_address import RunAddress
+from scenarios.live.client.run_address import RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, command_line
 from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from typing import IO
 
-from scenarios.live.run_address import RunAddress, UsageError, check_name
+from scenarios.live.client.run_address import RunAddress, UsageError, check_name
 from scenarios.view.page_actions import address_options
 
 LEAVING = 5.0

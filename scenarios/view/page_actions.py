@@ -13,11 +13,11 @@ from netem.models.loss import Bernoulli
 from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.live.link_requests import check_link_command, command_links, links_of_run
-from scenarios.live.load_request import load_setting
-from scenarios.live.run_address import ENDPOINT, RUN, RunAddress, UsageError, check_name
-from scenarios.live.run_client import NobodyError, RunClient
-from scenarios.live.run_requests import ask
+from scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress, UsageError, check_name
+from scenarios.live.client.run_client import NobodyError, RunClient
+from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
+from scenarios.live.requests.load_request import load_setting
+from scenarios.live.requests.run_requests import ask
 from wire.bounds import Text
 from wire.driver.command_line import command_line as typed_command
 

@@ -11,9 +11,9 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from scenarios.emulation.link_reports import decode_statuses
-from scenarios.live.feeder_map import read_feeder_map
-from scenarios.live.run_client import RunClient
-from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.requests.plant_status import PlantStatus
+from scenarios.live.show.feeder_map import read_feeder_map
 from scenarios.live.show.watching import RunSubscriber
 from scenarios.view.run_view import Cursor, Frame, RunView
 from wire.codec import encode

@@ -13,8 +13,9 @@ import msgspec
 
 from agents.agent_config import AgentConfig
 from scenarios.emulation.link_reports import LinkStatus
-from scenarios.live.feeder_map import FeederMap
-from scenarios.live.show.run_monitor import SILENT, PlantStatus, RunMonitor
+from scenarios.live.requests.plant_status import PlantStatus
+from scenarios.live.show.feeder_map import FeederMap
+from scenarios.live.show.run_monitor import SILENT, RunMonitor
 from scenarios.live.show.snapshot import InverterStatus
 from scenarios.view.link_states import AGE_STEP, LinkStates, LinkView
 from scenarios.view.liveness import Liveness, LivenessView

@@ -31,10 +31,10 @@ from scenarios.drivers.telemetry_stream import TelemetryStream
 from scenarios.emulation.emulated_links import links_of
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_reports import data_of, decode_statuses
-from scenarios.live.feeder_map import read_feeder_map
-from scenarios.live.run_client import RunClient
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.requests.plant_status import PlantStatus
+from scenarios.live.show.feeder_map import read_feeder_map
 from scenarios.live.show.link_table import links_text
-from scenarios.live.show.run_monitor import PlantStatus
 from scenarios.record.journal_reader import entries_of, values_of
 from scenarios.results.record import Recorder, RecordError
 from scenarios.view.run_view import Cursor, RunView

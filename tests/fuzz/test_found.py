@@ -11,7 +11,7 @@ import pytest
 from netem.ledger import LinkTrace
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import data_of, decode_statuses
-from scenarios.live.feeder_map import read_feeder_map
+from scenarios.live.show.feeder_map import read_feeder_map
 from scenarios.record.journal_reader import entries_of, values_of
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed

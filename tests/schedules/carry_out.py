@@ -13,7 +13,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from plant.build import build_plant
-from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.launch.live_options import LiveOptions, configure
 from scenarios.results.record import QUANTITIES
 from scenarios.schema import load_scenario
 from tests.schedules.schedule import HEAL, Action, draw

@@ -9,7 +9,7 @@ import typer
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-from scenarios.live.access import Access
+from scenarios.live.client.access import Access
 
 if TYPE_CHECKING:
     from agents.agent_config import AgentConfig
@@ -64,7 +64,7 @@ def set_(
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
         fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
         if not fault and not profile:
-            from scenarios.live.run_address import UsageError
+            from scenarios.live.client.run_address import UsageError
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
@@ -148,7 +148,7 @@ def show(
     Example:  gridpeers link show
     """
     with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
-        from scenarios.live.link_requests import link_states
+        from scenarios.live.requests.link_requests import link_states
         from scenarios.live.show.link_table import links_text
 
         t, states, silent = link_states(client)
@@ -159,7 +159,7 @@ def show(
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     from netem.models.delay import DELAY, LONGEST_DELAY, Uniform
-    from scenarios.live.run_address import UsageError
+    from scenarios.live.client.run_address import UsageError
     from wire.schema.plausible import Plausible
 
     if jitter is None:
@@ -177,7 +177,7 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 def _pattern(links: list[str], arrow: str) -> str:
     from scenarios.emulation.link_command import EVERYTHING
-    from scenarios.live.run_address import UsageError
+    from scenarios.live.client.run_address import UsageError
 
     if not links:
         return EVERYTHING
@@ -208,8 +208,8 @@ def _give(
     from netem.schema.fault import Fault
     from netem.schema.pattern import parse
     from scenarios.emulation.link_command import LinkCommand
-    from scenarios.live.link_requests import check_link_command, command_links, links_of_run
-    from scenarios.live.run_address import UsageError
+    from scenarios.live.client.run_address import UsageError
+    from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
     try:

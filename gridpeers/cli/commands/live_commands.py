@@ -24,12 +24,12 @@ from gridpeers.cli.commands.options import (
     usage_errors,
 )
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
-from scenarios.live.access import Access
+from scenarios.live.client.access import Access
 from wire.driver.command_line import command_line
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
-    from scenarios.live.live_processes import ProcessOutcome
+    from scenarios.live.launch.live_processes import ProcessOutcome
 
 _Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
 _Listen = Annotated[
@@ -77,9 +77,9 @@ def _start(
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
-        from scenarios.live.access import objection, with_protocol
-        from scenarios.live.run_address import UsageError, check_endpoint, check_name
-        from scenarios.live.run_client import check_alone, endpoint_for_run
+        from scenarios.live.client.access import objection, with_protocol
+        from scenarios.live.client.run_address import UsageError, check_endpoint, check_name
+        from scenarios.live.launch.plant_endpoint import check_alone, endpoint_for_run
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_name("--run", run)
@@ -93,10 +93,10 @@ def _start(
         check_alone(run, beyond, credentials)
     spec, feeder = load(scenario)
     with usage_errors():
-        from scenarios.live.link_log import LinkLog, check_new
-        from scenarios.live.live_folders import LIVE, folders, live_record
-        from scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
-        from scenarios.live.live_processes import all_here, plant_here, say
+        from scenarios.live.launch.link_log import LinkLog, check_new
+        from scenarios.live.launch.live_folders import LIVE, folders, live_record
+        from scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
+        from scenarios.live.launch.live_processes import all_here, plant_here, say
         from scenarios.live.numbers.live_report import conclude
         from scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from scenarios.results.metrics_file import RunMetrics
@@ -209,9 +209,9 @@ def agent(
     require({"zenoh": "an agent"})
     with usage_errors():
         from scenarios.drivers.free_endpoint import free_endpoint
-        from scenarios.live.access import objection
-        from scenarios.live.live_processes import agent_here
-        from scenarios.live.run_address import UsageError, check_endpoint, check_inverters, check_wait
+        from scenarios.live.client.access import objection
+        from scenarios.live.client.run_address import UsageError, check_endpoint, check_inverters, check_wait
+        from scenarios.live.launch.live_processes import agent_here
 
         check_inverters(inverters)
         if keys is not None and len(inverters) > 1:
@@ -263,7 +263,7 @@ def watch(
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
     with usage_errors():
-        from scenarios.live.run_address import check_duration
+        from scenarios.live.client.run_address import check_duration
 
         check_duration(duration)
     with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
@@ -292,7 +292,7 @@ def stop(
     Example:  gridpeers stop inv2
     """
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from scenarios.live.run_requests import LEAVING, ask, has_left
+        from scenarios.live.requests.run_requests import LEAVING, ask, has_left
 
         typer.echo(ask(client, "stop", inverter))
         if not has_left(client, inverter):
@@ -323,7 +323,7 @@ def event(
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from scenarios.live.run_requests import ask
+        from scenarios.live.requests.run_requests import ask
 
         closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
         typer.echo(ask(client, "open" if action == "open" else closing, switch))
@@ -344,7 +344,7 @@ def down(
     Example:  gridpeers down --run lab
     """
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from scenarios.live.run_requests import LEAVING, ask, has_ended
+        from scenarios.live.requests.run_requests import LEAVING, ask, has_ended
 
         typer.echo(ask(client, "down"))
         if not has_ended(client):

@@ -13,7 +13,7 @@ import typer
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.page_beside import HERE, PORT
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
-from scenarios.live.access import Access
+from scenarios.live.client.access import Access
 from wire.driver.output import watch_readers
 
 if TYPE_CHECKING:

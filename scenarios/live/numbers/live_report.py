@@ -10,8 +10,8 @@ from rich.console import Console
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import FILE, verdicts_json
 from scenarios.checks.judging import JudgingStop, judge_case
-from scenarios.live.live_folders import Folders
-from scenarios.live.live_processes import ProcessOutcome
+from scenarios.live.launch.live_folders import Folders
+from scenarios.live.launch.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Departures, compare, few
 from scenarios.live.numbers.live_figures import live_drawing
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection
 
-import msgspec
-
 from agents.agent_config import AgentConfig
+from scenarios.live.requests.plant_status import PlantStatus
 from scenarios.live.show.snapshot import OLD, V_HIGH, V_LOW, InverterStatus, Snapshot, line_of
 from scenarios.short_names import in_order, short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
@@ -23,28 +22,6 @@ _PER_INVERTER = 6
 
 _KEPT = 100
 """Most events that are kept."""
-
-
-class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """The plant's answer to "status", as far as it is shown; see `plant.realtime.run_commands`."""
-
-    phase: str
-    """gathering, running or closing."""
-    t: float
-    """Run time (s)."""
-    speed: float
-    """Run time per wall time (s/s)."""
-    pacing: Pacing
-    agents: tuple[str, ...] = ()
-    """Agents that take part."""
-    events: tuple[PlantEvent, ...] = ()
-    """The latest, oldest first."""
-    impaired: tuple[str, ...] = ()
-    """Agents whose link to or from the plant has an emulated fault."""
-    switches: dict[str, bool] = {}
-    """Position of each switch, by its name: whether it is closed."""
-    loads: dict[str, tuple[float, float]] = {}
-    """Real (W) and reactive power (var) at nominal voltage of each load that was set during the run."""
 
 
 class RunMonitor:

@@ -14,8 +14,9 @@ from rich.console import Console
 from rich.live import Live
 
 from agents.agent_config import AgentConfig
-from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import plant_status, read_config
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.requests.agent_configs import read_config
+from scenarios.live.requests.run_requests import plant_status
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import Snapshot

@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 from plant.equipment import Feeder
 from plant.tables import FeederError, read_feeder
-from scenarios.live.feeder_map import FeederMap, MapInverter
+from scenarios.live.show.feeder_map import FeederMap, MapInverter
 from scenarios.record.record_info import RecordInfo
 
 

@@ -14,8 +14,8 @@ from msgspec.structs import replace
 
 from plant.equipment.load_powers import set_power
 from scenarios.explanation.explanation import explain
-from scenarios.live.feeder_map import FeederMap, feeder_map
-from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.live.requests.plant_status import PlantStatus
+from scenarios.live.show.feeder_map import FeederMap, feeder_map
 from scenarios.live.show.snapshot import InverterStatus
 from scenarios.record.record_reader import RunRecord
 from scenarios.view.link_states import LinkView

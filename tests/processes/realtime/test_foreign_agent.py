@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.launch.live_options import LiveOptions, configure
 from scenarios.results.sharing_index import sharing_index
 from scenarios.schema import load_scenario
 from tests.toy.mixed import Mixed

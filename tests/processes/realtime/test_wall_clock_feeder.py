@@ -14,7 +14,7 @@ from msgspec.structs import replace
 from scenarios.drivers.children import Child
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.launch.live_options import LiveOptions, configure
 from scenarios.schema import load_scenario
 from tests.toy.toy_runs import ProcessRun
 

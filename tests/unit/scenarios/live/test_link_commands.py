@@ -28,7 +28,7 @@ from scenarios.emulation.emulated_links import EmulatedLinks
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.emulation.link_reports import decode_statuses
-from scenarios.live.link_log import replay_of
+from scenarios.live.launch.link_log import replay_of
 from scenarios.schema import load_scenario
 from scenarios.schema.netem_tables import netem_of, setup_of
 from scenarios.schema.scenario_writing import to_toml

@@ -7,7 +7,7 @@ import pytest
 
 from plant.plant_config import ScheduledAction
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.launch.live_options import LiveOptions, configure
 from scenarios.results.event_windows import as_they_came, late_moves
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs

@@ -16,7 +16,7 @@ import pytest
 from netem.schema.netem import Netem
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.live.run_address import ENDPOINT, RUN, RunAddress
+from scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, Verb, command_line
 from tests.command_line import invoke
@@ -85,7 +85,7 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[Command]:
     told: list[Command] = []
     monkeypatch.setattr(Plant, "commands", told, raising=False)
     monkeypatch.setattr("scenarios.view.page_actions.RunClient", Plant)
-    monkeypatch.setattr("scenarios.live.run_client.RunClient", Plant)
+    monkeypatch.setattr("scenarios.live.client.run_client.RunClient", Plant)
     return told
 
 

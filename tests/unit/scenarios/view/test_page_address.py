@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenarios.live.run_address import UsageError
+from scenarios.live.client.run_address import UsageError
 from scenarios.view.page_address import access
 
 

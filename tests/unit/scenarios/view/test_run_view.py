@@ -9,7 +9,7 @@ import pytest
 
 from netem.ledger import LinkCounts
 from scenarios.emulation.link_reports import LinkStatus
-from scenarios.live.show.run_monitor import PlantStatus
+from scenarios.live.requests.plant_status import PlantStatus
 from scenarios.view.liveness import FROZEN
 from scenarios.view.run_view import Cursor, RunView
 from scenarios.view.strips import LENGTH, STEP

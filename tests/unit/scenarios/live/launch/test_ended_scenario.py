@@ -14,9 +14,9 @@ from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault
 from netem.schema.partition import Partition
 from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.ended_scenario import ended_scenario
-from scenarios.live.live_folders import folders
-from scenarios.live.live_processes import ProcessOutcome
+from scenarios.live.launch.ended_scenario import ended_scenario
+from scenarios.live.launch.live_folders import folders
+from scenarios.live.launch.live_processes import ProcessOutcome
 from scenarios.live.numbers import live_report
 from scenarios.results.metrics_file import RunMetrics
 from scenarios.results.record import Recorded

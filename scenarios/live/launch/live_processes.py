@@ -23,11 +23,11 @@ from scenarios.drivers.supervisor import Supervisor
 from scenarios.drivers.telemetry_client import RECORDER
 from scenarios.drivers.warm_servers import release
 from scenarios.emulation.emulated_links import links_of
-from scenarios.live.link_log import LinkLog
-from scenarios.live.live_recorder import LiveRecorder
-from scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
-from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import check_free, configuration, own_code
+from scenarios.live.client.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.launch.link_log import LinkLog
+from scenarios.live.launch.live_recorder import LiveRecorder
+from scenarios.live.requests.agent_configs import check_free, configuration, own_code
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded
 from scenarios.short_names import short

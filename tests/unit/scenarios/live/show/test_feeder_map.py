@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 
 from plant.equipment.named_loads import named_loads
-from scenarios.live.feeder_map import FeederMap, feeder_map, read_feeder_map
-from scenarios.live.live_options import LiveOptions, configure
+from scenarios.live.launch.live_options import LiveOptions, configure
+from scenarios.live.show.feeder_map import FeederMap, feeder_map, read_feeder_map
 from scenarios.schema import load_scenario
 
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from scenarios.drivers.free_endpoint import parse_endpoint
-from scenarios.live.access import Access, is_loopback_host
+from scenarios.live.client.access import Access, is_loopback_host
 from wire.keys import check_name as check_key_part
 from wire.trust.credentials import Credentials
 
@@ -99,7 +99,7 @@ def check_inverters(names: Sequence[str]) -> None:
     >>> check_inverters(["inv1", "inv2", "inv1"])
     Traceback (most recent call last):
         ...
-    scenarios.live.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an inverter
+    scenarios.live.client.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an inverter
     """
     for name in names:
         check_name("INVERTER", name)

@@ -6,26 +6,13 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.drivers.free_endpoint import ListenError, free_endpoint
-from scenarios.live.access import Access
-from scenarios.live.plant_search import PlantSearch
-from scenarios.live.run_address import (
-    ENDPOINT,
-    RUN,
-    RunAddress,
-    UsageError,
-    accepting,
-    check_endpoint,
-    loopback_of,
-    next_port,
-)
-from scenarios.live.run_tokens import RunTokens
+from scenarios.live.client.plant_search import PlantSearch
+from scenarios.live.client.run_address import RunAddress
+from scenarios.live.client.run_tokens import RunTokens
 from wire.codec import RejectedError, decode
-from wire.driver.command_line import command_line
 from wire.driver.session import Session
 from wire.keys import ANY_ALIVE_PLANT, Keys
 from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
-from wire.trust.credentials import Credentials
 
 VISITOR = "visitor"
 
@@ -37,9 +24,6 @@ RENEWAL = 2.0
 
 FIRST_LOOK = 1.0
 """Time (s) after which it is checked first: a link takes some 50 ms, on a busy machine more."""
-
-LOOKING = 1.5
-"""Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
 
 
 class NobodyError(ValueError):
@@ -212,7 +196,7 @@ class RunClient:
                 strangers.update(self._others)
                 lines.append(f"no plant yet of {self.where} (runs there: {', '.join(sorted(strangers))}); waits on")
             if now - began >= wait:
-                raise NobodyError(search.in_vain(wait, self.runs, self._others))
+                raise NobodyError(search.failure(wait, self.runs, self._others))
             if now >= look:
                 look = now + RENEWAL
                 if refused := search.refused():
@@ -232,70 +216,3 @@ class RunClient:
     def _others(self) -> set[str]:
         """Other runs whose plants are there."""
         return self.runs - {self.where.run}
-
-
-def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
-    """Return the endpoint where a plant will be able to listen, a free port for port 0.
-
-    Parameters
-    ----------
-    listen : str
-        The endpoint.
-    credentials : Credentials or None, optional
-        The plant's, to ask another run that is there for its name.
-    access : Access or None, optional
-        The options that gave them, for the commands that the error names.
-
-    Raises
-    ------
-    UsageError
-        If it is no endpoint, or another run is there, which the message names.
-    ListenError
-        If it cannot be listened on.
-    """
-    try:
-        return free_endpoint(check_endpoint("--listen", listen), option="--listen")
-    except ListenError as error:
-        where = loopback_of(listen)
-        there = runs_at(where, credentials) if error.in_use and accepting((where,)) else []
-        if not there:
-            raise
-        first = () if (there[0], where) == (RUN, ENDPOINT) else ("--run", there[0], "--connect", where)
-        first = (*first, *(access or Access()).words)
-        status, down = command_line("status", *first), command_line("down", *first)
-        beside = next_port(listen)
-        other = loopback_of(beside)
-        raise UsageError(
-            f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
-            f"{status} shows it, {down} ends it; to have both, give this one a name and "
-            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {other})"
-        ) from None
-
-
-def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
-    """Return the names of the runs whose plants are at an endpoint, as far as they show within `LOOKING` seconds."""
-    with RunClient(RunAddress(run=RUN, connect=(endpoint,), credentials=credentials)) as client:
-        client.until(lambda: bool(client.runs), LOOKING)
-        return sorted(client.runs)
-
-
-def check_alone(run: str, beyond: tuple[str, ...], credentials: Credentials | None = None) -> None:
-    """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
-
-    Parameters
-    ----------
-    run : str
-        Name of the run.
-    beyond : tuple[str, ...]
-        Endpoints that the plant will connect to; without any, it cannot meet another plant.
-    credentials : Credentials or None, optional
-        The plant's.
-    """
-    if not beyond:
-        return
-    with RunClient(RunAddress(run=run, connect=beyond, credentials=credentials)) as client:
-        if client.until(lambda: client.plant, LOOKING):
-            raise UsageError(
-                f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
-                f"({command_line('down', '--run', run, '--connect', beyond[0])}), or give this run another name"
-            )

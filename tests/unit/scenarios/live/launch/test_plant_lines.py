@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from plant.start_words import COMPILING, LISTENING
-from scenarios.live.live_processes import meaning
+from scenarios.live.launch.live_processes import meaning
 from tests.toy.toy_configs import toy_configs
 
 

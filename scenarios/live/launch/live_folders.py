@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
-from scenarios.live.ended_scenario import ended_scenario
+from scenarios.live.launch.ended_scenario import ended_scenario
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
 from scenarios.schema import ScenarioModel

@@ -8,8 +8,8 @@ from typing import Any, cast
 
 import pytest
 
-from scenarios.live.live_processes import _follow
-from scenarios.live.live_recorder import LiveRecorder
+from scenarios.live.launch.live_processes import _follow
+from scenarios.live.launch.live_recorder import LiveRecorder
 from wire.driver.drive import StoppedError
 from wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
 

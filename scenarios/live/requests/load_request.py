@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite
 
 from plant.equipment.named_loads import FACTOR
-from scenarios.live.run_address import UsageError
+from scenarios.live.client.run_address import UsageError
 from wire.messages import LoadSetting
 
 MOST = 1e8

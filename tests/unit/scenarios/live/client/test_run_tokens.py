@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from scenarios.live import run_client as client
-from scenarios.live.run_address import address_of
-from scenarios.live.run_client import RunClient
-from scenarios.live.run_tokens import RunTokens
+from scenarios.live.client import run_client as client
+from scenarios.live.client.run_address import address_of
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.client.run_tokens import RunTokens
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.watching import RunSubscriber
 from tests.toy.toy_configs import agent_config

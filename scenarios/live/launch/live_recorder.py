@@ -10,7 +10,7 @@ from time import monotonic
 
 from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from scenarios.drivers.telemetry_stream import Recordable
-from scenarios.live.link_log import LinkLog
+from scenarios.live.launch.link_log import LinkLog
 from scenarios.live.show.snapshot import line_of
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError

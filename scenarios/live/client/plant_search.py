@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from scenarios.drivers.free_endpoint import parse_endpoint
-from scenarios.live.run_address import PROBE, RunAddress, accepting
+from scenarios.live.client.run_address import PROBE, RunAddress, accepting
 from wire.driver.command_line import command_line
 from wire.driver.session import Session
 from wire.messages import PLANT
@@ -64,7 +64,7 @@ class PlantSearch:
             f"{own.name} --role {own.role}, where the site was made, gives {own.name} a new one",
         ]
 
-    def in_vain(self, wait: float, runs: Collection[str], others: Collection[str]) -> str:
+    def failure(self, wait: float, runs: Collection[str], others: Collection[str]) -> str:
         """Return why no plant was found.
 
         Parameters

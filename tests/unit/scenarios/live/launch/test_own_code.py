@@ -11,9 +11,9 @@ from agents.agent_config import Control, LawChoice
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live import live_processes
-from scenarios.live.run_address import RunAddress, UsageError
-from scenarios.live.run_requests import own_code
+from scenarios.live.client.run_address import RunAddress, UsageError
+from scenarios.live.launch import live_processes
+from scenarios.live.requests.agent_configs import own_code
 from tests.toy.toy_configs import agent_config
 from wire.plugins.plugin import Plugin
 

@@ -4,7 +4,7 @@ import socket
 
 import pytest
 
-from scenarios.live.run_address import UsageError, accepting, address_of, check_endpoint, return_path
+from scenarios.live.client.run_address import UsageError, accepting, address_of, check_endpoint, return_path
 
 
 def test_without_options_there_is_one_run_on_this_machine() -> None:

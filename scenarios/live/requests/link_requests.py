@@ -12,9 +12,10 @@ from agents.agent_config import AgentConfig
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import LinkStatus, decode_statuses
-from scenarios.live.run_address import UsageError
-from scenarios.live.run_client import NobodyError, RunClient
-from scenarios.live.run_requests import configurations, data_of, request
+from scenarios.live.client.run_address import UsageError
+from scenarios.live.client.run_client import NobodyError, RunClient
+from scenarios.live.requests.agent_configs import configurations
+from scenarios.live.requests.run_requests import data_of, request
 from wire.messages import PLANT, Answer, LinkAcknowledgement
 from wire.schema.table_schema import Problem
 

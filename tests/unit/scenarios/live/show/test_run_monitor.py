@@ -11,10 +11,10 @@ from msgspec.structs import replace
 
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.emulation.link_reports import LinkReportData, encode_data
-from scenarios.live import run_client as client
-from scenarios.live.run_address import address_of
-from scenarios.live.run_client import RunClient
-from scenarios.live.run_requests import read_config
+from scenarios.live.client import run_client as client
+from scenarios.live.client.run_address import address_of
+from scenarios.live.client.run_client import RunClient
+from scenarios.live.requests.agent_configs import read_config
 from scenarios.live.show.render import plain
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.watching import RunSubscriber

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import pytest
 
-from scenarios.live import plant_search
-from scenarios.live import run_client as client
-from scenarios.live.run_address import address_of
-from scenarios.live.run_client import NobodyError, RunClient
+from scenarios.live.client import plant_search
+from scenarios.live.client import run_client as client
+from scenarios.live.client.run_address import address_of
+from scenarios.live.client.run_client import NobodyError, RunClient
 from wire.driver.inbox import Inbox
 from wire.keys import Keys
 from wire.trust.credentials import Credentials

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from scenarios.live.link_requests import link_states
-from scenarios.live.run_client import NobodyError
-from scenarios.live.run_requests import plant_status, request
+from scenarios.live.client.run_client import NobodyError
+from scenarios.live.requests.link_requests import link_states
+from scenarios.live.requests.run_requests import plant_status, request
 from wire.codec import decode
 from wire.keys import Keys
 from wire.messages import Answer, AnyMessage, Command, LinkAcknowledgement

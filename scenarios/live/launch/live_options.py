@@ -9,9 +9,9 @@ import msgspec
 from agents.agent_config import AgentConfig
 from plant.equipment import Feeder
 from plant.plant_config import PlantConfig
-from scenarios.live.feeder_map import feeder_map
-from scenarios.live.run_address import LONGEST_TIME, UsageError, check_duration, check_wait
-from scenarios.live.run_speed import SPEEDS
+from scenarios.live.client.run_address import LONGEST_TIME, UsageError, check_duration, check_wait
+from scenarios.live.show.feeder_map import feeder_map
+from scenarios.run_speed import SPEEDS
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
 from scenarios.schema.netem_tables import netem_of, setup_of
