@@ -93,13 +93,13 @@ def open_credentials(
                 f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
             )
         if tuple(roles) == COMMANDING and (viewer := _present(folder, known, ("viewer",))) is not None:
-            raise KeysError(_only_looks(folder, known, viewer))
+            raise KeysError(_viewer_refusal(folder, known, viewer))
         raise KeysError(
             f"{folder}: has no key of a member with role {_or(roles)}; copy NAME.pem and NAME.key of one, or issue one "
             "with gridpeers keys issue"
         )
     if member.role == "viewer" and tuple(roles) == COMMANDING:
-        raise KeysError(_only_looks(folder, known, member))
+        raise KeysError(_viewer_refusal(folder, known, member))
     if member.role not in roles:
         raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {_or(roles)}")
     if member.revoked:
@@ -182,7 +182,7 @@ def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member |
     return next((member for role in roles for member in there if member.role == role), None)
 
 
-def _only_looks(folder: Path, known: MemberList, viewer: Member) -> str:
+def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
     """Return why a viewer cannot give a command, and who can."""
     who = [each for each in known.members if each.role in COMMANDING and not each.revoked]
     here = next((each.name for each in who if (folder / f"{each.name}.key").is_file()), "")

@@ -50,12 +50,12 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
             context.load_verify_locations(credentials.ca)
             context.verify_mode = ssl.CERT_REQUIRED
         with socket.create_connection((host, port), timeout) as raw:
-            return _shaken(context, raw, credentials)
+            return _handshake_refusal(context, raw, credentials)
     except OSError:  # nobody is there, or files of ours have gone; ssl.SSLError is one, too
         return ""
 
 
-def _shaken(context: ssl.SSLContext, raw: socket.socket, credentials: Credentials | None) -> str:
+def _handshake_refusal(context: ssl.SSLContext, raw: socket.socket, credentials: Credentials | None) -> str:
     """Return the refusal of a handshake on a connection."""
     try:
         secured = context.wrap_socket(raw)

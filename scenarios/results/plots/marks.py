@@ -42,7 +42,7 @@ FRAME = 0.78
 """Part of a column of panels that is the frame of one; the rest are its axis and margins."""
 
 
-class Placed(NamedTuple):
+class EventText(NamedTuple):
     """A text above the frame."""
 
     text: str
@@ -68,7 +68,7 @@ def mark_events(
     """
     width = _width(axes)
     end = max(float(history.t[-1]) for history in drawing.histories.values())
-    texts = placed(drawing.events, width / max(end, 1e-9))
+    texts = place_texts(drawing.events, width / max(end, 1e-9))
     crowded = len(drawing.events) > MOST * width
     for mark in (one.mark for one in texts) if crowded else drawing.events:
         axes.axvline(mark.t, color=colours.get(mark, BLACK), linewidth=0.7, linestyle=(0, (1, 2)), zorder=1)
@@ -91,50 +91,50 @@ def finish(grid: Panels, drawing: Drawing) -> None:
                 panel.set_xlabel("")
 
 
-def placed(marks: Sequence[Mark], inches_per_s: float) -> list[Placed]:
+def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
     r"""Place texts so that none covers another: beside its line where need be, shorter, and at last left out.
 
     Examples
     --------
-    >>> found = placed([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
+    >>> found = place_texts([Mark("event1", 1.0, "13-152 opens"), Mark("leave", 1.1)], inches_per_s=1.0)
     >>> [(text, side) for text, _, side in found]
     [('event1\n13-152 opens', 'right'), ('leave', 'left')]
     """
     ordered = sorted(marks, key=lambda mark: mark.t)
     options = [_options(mark, inches_per_s) for mark in ordered]
     first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
-    best: list[_Standing] = [_Standing(-inf, 0.0, None)]
+    best: list[_PartialPlacement] = [_PartialPlacement(-inf, 0.0, None)]
     """Partial placements that no other beats in both right edge and cost: sorted by edge, the cost falls."""
     for each, leftmost in zip(options, first, strict=True):
-        found: dict[float, _Standing] = {}
-        for standing in best:
-            edge = max(standing.edge, leftmost - GAP)  # nothing stands further left any more, so these are alike
+        found: dict[float, _PartialPlacement] = {}
+        for partial in best:
+            edge = max(partial.edge, leftmost - GAP)  # nothing stands further left any more, so these are alike
             for option in each:
-                if option.placed is not None and option.start < edge + GAP - ROUNDING:
+                if option.text is not None and option.start < edge + GAP - ROUNDING:
                     continue
-                end, cost = max(edge, option.end), standing.cost + option.price
+                end, cost = max(edge, option.end), partial.cost + option.price
                 if end not in found or cost < found[end].cost:
-                    texts = standing.texts if option.placed is None else (standing.texts, option.placed)
-                    found[end] = _Standing(end, cost, texts)
+                    texts = partial.texts if option.text is None else (partial.texts, option.text)
+                    found[end] = _PartialPlacement(end, cost, texts)
         best, least = [], inf
-        for _, standing in sorted(found.items()):
-            if standing.cost < least:
-                best.append(standing)
-                least = standing.cost
-    chosen, texts = list[Placed](), best[-1].texts
+        for _, partial in sorted(found.items()):
+            if partial.cost < least:
+                best.append(partial)
+                least = partial.cost
+    chosen, texts = list[EventText](), best[-1].texts
     while texts is not None:
         texts, last = texts
         chosen.append(last)
     return chosen[::-1]
 
 
-class _Standing(NamedTuple):
-    """Texts that stand so far."""
+class _PartialPlacement(NamedTuple):
+    """A placement of the texts at the first marks."""
 
     edge: float
     """Right edge of the last of them (inches)."""
     cost: float
-    texts: tuple[Any, Placed] | None
+    texts: tuple[Any, EventText] | None
     """Those before the last, in the same form, and the last; None if there is none."""
 
 
@@ -142,7 +142,7 @@ class _Option(NamedTuple):
     """One way to write at a mark, or to leave it out."""
 
     price: float
-    placed: Placed | None
+    text: EventText | None
     start: float
     """Left edge (inches); infinite if nothing is written."""
     end: float
@@ -158,7 +158,7 @@ def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
             continue
         width = LETTER * max(map(len, text.split("\n")))
         start = mark.t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
-        found.append(_Option(price, Placed(text, mark, side), start, start + width))
+        found.append(_Option(price, EventText(text, mark, side), start, start + width))
     return found
 
 

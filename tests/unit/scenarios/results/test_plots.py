@@ -13,7 +13,7 @@ from plant.tables import read_feeder
 from scenarios.results.history import History, Nameplates
 from scenarios.results.island_membership import Island, IslandInterval
 from scenarios.results.plots.drawing import Drawing, Mark
-from scenarios.results.plots.marks import GAP, LETTER, placed
+from scenarios.results.plots.marks import GAP, LETTER, place_texts
 from scenarios.results.plots.run_figures import draw, draw_all
 from scenarios.results.plots.style import CASE_STYLES, SHARING, Format, case_style, from_zero, save
 from scenarios.schema import catalogue, load_scenario
@@ -153,7 +153,7 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
         Mark("", 3.2),
         Mark("live", 3.3, "sw1_2 opens"),
     ]
-    found = [edges(text, mark.t, side, inches_per_s) for text, mark, side in placed(marks, inches_per_s)]
+    found = [edges(text, mark.t, side, inches_per_s) for text, mark, side in place_texts(marks, inches_per_s)]
 
     assert all(right[0] >= left[1] + GAP - 1e-9 for left, right in pairwise(found))
     assert found
@@ -163,7 +163,7 @@ def test_words_on_events_never_cover_each_other(inches_per_s: float) -> None:
 def test_words_that_have_room_are_written_wherever_they_are() -> None:
     """Two events side by side: both have their words at any time, whatever the last bit of their edges."""
     for t in np.arange(1.0, 3.0, 0.01):
-        found = placed([Mark("a", t, "xx"), Mark("b", t + 0.1, "yy")], 1.0)
+        found = place_texts([Mark("a", t, "xx"), Mark("b", t + 0.1, "yy")], 1.0)
 
         assert [(text, side) for text, _, side in found] == [("a\nxx", "right"), ("b\nyy", "left")]
 
