@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from scenarios.checks.communication.link_accounts import ArrivalAccounts
+import pytest
+
+from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts
 from scenarios.checks.communication.record_pass import SentState
 
 LINK = ("inv1", "inv2")
@@ -102,3 +104,18 @@ def test_a_new_process_that_never_hears_its_neighbour_is_missed() -> None:
         return 1 if k < 10 else 2
 
     assert missing(always, restarted, range(10, 100)) == [round(0.1 * k, 9) for k in range(81, 90)]
+
+
+def test_what_never_arrives_is_counted_where_it_is_too_much_to_keep() -> None:
+    """The first and the number of them stay; the last ones stay one by one, as they may still arrive."""
+    accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
+    accounts.heard(("inv1", "inv2"), 1, 0)
+    for number in range(MOST_WAITING + 1000):
+        for name in ("inv1", "inv2", "inv3"):
+            accounts.state(name, SentState(number, 0.02 * number, 1, idle=False, quiet=False))
+    accounts.flush(1e9)
+    (account,) = accounts.accounts["inv1", "inv2"]
+
+    assert (account.early.count, account.early.first, len(account.late)) == (999, pytest.approx(0.02), MOST_WAITING)
+    accounts.heard(("inv1", "inv2"), 1, MOST_WAITING + 500)
+    assert len(account.late) == MOST_WAITING - 1

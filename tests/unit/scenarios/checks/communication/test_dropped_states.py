@@ -23,7 +23,7 @@ from scenarios.checks.communication.record_pass import SentState
 from scenarios.record.record_info import FILE
 from tests.fuzz.journals import judged
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
-from tests.unit.scenarios.checks.test_untrusted_journals import packed, sent
+from tests.unit.scenarios.checks.communication.test_untrusted_journals import packed, sent
 from wire.journal import RecordLevel
 
 LOST = range(50, 60)

@@ -1,0 +1,14 @@
+"""The sound run that faults are planted in."""
+
+from __future__ import annotations
+
+import pytest
+
+from scenarios.checks.checked_case import CheckedCase
+from tests.unit.scenarios.checks.cases import ran
+
+
+@pytest.fixture(scope="module")
+def sound() -> CheckedCase:
+    """Islanding under full coordination."""
+    return ran().checked_case

@@ -1,0 +1,119 @@
+"""All checks of messages and agents: sound runs pass, and records of any size and order are judged."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from scenarios.checks.check_verdict import NotJudgedError
+from scenarios.checks.checked_case import CheckedCase
+from scenarios.checks.communication import record_content
+from scenarios.checks.communication.communication_summary import SummaryPass
+from scenarios.checks.communication.record_pass import SentState
+from scenarios.record.record_file import RecordFile
+from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
+from tests.unit.scenarios.checks.communication.records import CUT, LOSSY, QUIET
+from wire.journal import Decision
+
+COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
+EVENT = [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]
+NAMES = ("inv1", "inv2", "inv3")
+
+Changes = tuple[tuple[str, str], ...]
+
+
+@pytest.mark.parametrize("check", ["message_account", "stale_values", "last_words"])
+def test_a_sound_run_passes(sound: CheckedCase, check: str) -> None:
+    """Without faults of links everything is heard in time."""
+    assert verdict(sound, check).sentence == f"{check} passed"
+
+
+@pytest.mark.parametrize("check", ["message_account", "stale_values", "last_words"])
+def test_a_run_on_lossy_links_is_accounted_for(check: str) -> None:
+    """Losses and delays of emulated links are on the account."""
+    assert verdict(ran_with(LOSSY).checked_case, check).sentence == f"{check} passed"
+
+
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_without_decisions_in_the_record_nothing_is_judged(check: str) -> None:
+    """Record = "physics" has rows and events alone: the verdict says so, and is not "passed"."""
+    found = verdict(
+        ran_with((("record", repr("physics")), ("time.end_s", "1.5"), ("event", repr(EVENT)))).checked_case, check
+    )
+
+    assert (found.status, 'record = "physics"' in found.reason) == ("not judged", True)
+
+
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_without_a_record_nothing_is_judged(sound: CheckedCase, check: str) -> None:
+    """A run in memory has no messages to look at."""
+    found = verdict(replace(sound, folder=None), check)
+
+    assert (found.status, found.reason) == ("not judged", "the run has no record run.mcap")
+
+
+def test_the_pass_over_a_record_agrees_with_its_reader() -> None:
+    """States and decisions are those that `RunRecord` has, which makes each again."""
+    result = ran_with(LOSSY)
+    content, record = result.checked_case.content, result.run_record
+
+    for agent in ("inv1", "inv5"):
+        sent = [message.number for message in record.messages(agent, kind="State")]
+        assert [state.number for state in content.of_agent(agent)] == sent
+    assert dict(content.counts) == record.link_counts()
+
+
+@pytest.mark.parametrize("changes", [LOSSY, CUT, QUIET], ids=["loss", "cut", "quiet"])
+@pytest.mark.parametrize("check", COMMUNICATION)
+def test_journals_that_come_late_change_no_verdict(check: str, changes: Changes) -> None:
+    """Decisions and verdicts of links come into a record a while after the states that they are about."""
+    case = ran_with(changes).checked_case
+    at_once, late = (with_content(case, case.content, late=late) for late in (0.0, 2.0))
+
+    assert verdict(at_once, check) == verdict(late, check) == verdict(case, check)
+
+
+def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is too much for the memory of a check of one's own is no reason not to judge a run."""
+    monkeypatch.setattr(record_content, "MOST_BYTES", 1000)
+    large = replace(sound)
+
+    assert verdict(large, "message_account").status == "passed"
+    with pytest.raises(NotJudgedError, match="more than the 0 MB that are taken into memory"):
+        _ = large.content
+
+
+def test_one_time_that_cannot_be_puts_no_account_off(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing in the file is trusted: its record ends when the run was to end, for every check."""
+    monkeypatch.setattr(RecordFile, "t_end", 1e9)
+    case = replace(sound)
+
+    assert case.communication.t_end == case.content.t_end == case.content.info.plant.end == 7.0
+
+
+@pytest.mark.parametrize("clock", ["simulated", "wall"])
+def test_the_memory_of_a_pass_does_not_grow_with_the_run(sound: CheckedCase, clock: str) -> None:
+    """Three times the run, the same memory: what is done with is forgotten."""
+    info = sound.content.info
+    info = msgspec.structs.replace(info, plant=msgspec.structs.replace(info.plant, clock=clock))
+
+    def memory(ticks: int) -> int:
+        tracemalloc.start()
+        sums = SummaryPass(info, ticks * info.T_c)
+        for number in range(ticks):
+            for agent in NAMES:
+                sums.state(agent, SentState(number, number * info.T_c, 1, idle=False, quiet=number % 3 == 1))
+                said = [2, 1] if clock == "simulated" else [number - 1, number]
+                sums.decision(agent, 1, Decision(number, 0, [n for n in NAMES if n != agent], said, [], []))
+                for other in NAMES:
+                    if other != agent and number % 3 != 1:
+                        sums.heard((other, agent), 1, number, "")
+        size, _ = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        assert sums.finish(0).used
+        return size
+
+    assert memory(4500) < 1.1 * memory(1500)
