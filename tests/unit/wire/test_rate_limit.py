@@ -7,7 +7,7 @@ import re
 
 import pytest
 
-from tests.unit.plant.realtime.test_realtime_plant import running
+from tests.unit.plant.realtime.realtime_lab import running
 from wire.driver.log_limit import limit_log
 from wire.messages import PlantEvent, Telemetry
 from wire.rate_limit import RateLimit

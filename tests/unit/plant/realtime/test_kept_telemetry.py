@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from plant.realtime import kept_telemetry
 from plant.realtime.kept_telemetry import KeptTelemetry
 from scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
-from tests.unit.plant.realtime.test_realtime_plant import KEYS, Lab, running
+from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
 from wire.messages import Answer, Command, LinkReport, Message, Telemetry
 
 

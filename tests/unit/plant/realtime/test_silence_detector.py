@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from plant.realtime.silence_detector import SilenceDetector
-from tests.unit.plant.realtime.test_realtime_plant import KEYS, T_C, Lab, running
+from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
 from wire.messages import AgentStatus
 
 NAMES = ("inv1", "inv2", "inv3")

@@ -36,7 +36,7 @@ from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
-from tests.unit.plant.realtime import test_realtime_plant as plant_side
+from tests.unit.plant.realtime import realtime_lab as plant_side
 from wire.codec import decode
 from wire.links import CommandEffect
 from wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
