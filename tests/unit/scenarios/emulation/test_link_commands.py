@@ -1,9 +1,8 @@
-"""Orders to emulated links, from the plant's core to the agent's, on fake clocks; and what is typed and written."""
+"""Commands to emulated links, from the plant's core to the agent's, on fake clocks."""
 
 from __future__ import annotations
 
 import random
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,28 +10,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from agents.agent_config import MAX_AGE
 from agents.realtime.link_command_receiver import LinkCommandReceiver
 from agents.realtime.realtime_agent import RealtimeAgent
 from netem.schema import change
-from netem.schema.change import Heal, schedule_of
+from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
-from netem.schema.pattern import Link, links_among
+from netem.schema.pattern import links_among
 from plant.realtime.link_command_sender import LinkCommandSender
 from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers import fault_injector
-from scenarios.drivers.fault_injector import FaultInjector
 from scenarios.emulation.emulated_links import EmulatedLinks
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.emulation.link_reports import decode_statuses
-from scenarios.live.launch.link_log import replay_of
-from scenarios.schema import load_scenario
-from scenarios.schema.netem_tables import netem_of, setup_of
-from scenarios.schema.scenario_writing import to_toml
-from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
@@ -42,6 +32,7 @@ from wire.links import CommandEffect
 from wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
 
 SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
+
 CUT = LinkCommand(fault=Fault(on="inv2 -> inv1", cut=True)).to_tree()
 
 
@@ -55,8 +46,8 @@ def agent_lab() -> agent_side.Lab:
     return lab
 
 
-def order(lab: agent_side.Lab, number: int, t: float, tree: dict[str, Any] = CUT, life: int = 1) -> None:
-    """An order of the plant comes in."""
+def link_command(lab: agent_side.Lab, number: int, t: float, tree: dict[str, Any] = CUT, life: int = 1) -> None:
+    """A link command of the plant comes in."""
     message = LinkRequest(sender="plant", epoch=life, seq=number, t=t, link_command=tree, reply_to="z1")
     lab.hear(agent_side.KEYS.link_request("inv1"), message)
 
@@ -67,8 +58,8 @@ def answers(lab: agent_side.Lab) -> list[tuple[int, bool, str]]:
 
 
 @given(st.integers(0, 10_000))
-def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
-    """Every order arrives once, in spite of losses on either way and of restarts of the agent's process."""
+def test_every_agent_takes_every_command_once_and_in_turn(seed: int) -> None:
+    """Every command arrives once, in spite of losses on either way and of restarts of the agent's process."""
     rng, taken, now = random.Random(seed), list[int](), 0.0
     wire: list[LinkRequest] = []
 
@@ -111,7 +102,7 @@ def test_every_agent_takes_every_order_once_and_in_turn(seed: int) -> None:
     assert wire == []
 
 
-def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_measurement() -> None:
+def test_a_command_holds_from_one_control_period_later_on_and_is_sent_before_the_measurement() -> None:
     """The plant tells everybody in the wake in which it hears of it; who joins later hears all before he measures."""
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=2.0)
@@ -125,7 +116,7 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
     answer = lab.ask("link", CUT)
     lab.step()
     kinds = [type(message) for key, message in lab.sent if key.endswith("/inv1")]
-    orders = lab.take(LinkRequest)
+    requests = lab.take(LinkRequest)
     lab.token("inv2", gone=True)
     lab.join("inv2", instance="b", life=2)
     lab.step()
@@ -135,7 +126,7 @@ def test_an_order_holds_from_one_control_period_later_on_and_is_sent_before_the_
     assert answer.text == "inv2 -> inv1: cut"
     assert answer.data == {"number": 1, "t": 0.08, "asked": ["inv1", "inv2"], "receivers": ["inv1"]}
     assert kinds == [LinkRequest, Measurement]
-    assert [(m.seq, m.t, m.link_command) for m in orders] == [(1, 0.08, CUT)] * len(orders) != []
+    assert [(m.seq, m.t, m.link_command) for m in requests] == [(1, 0.08, CUT)] * len(requests) != []
     assert again == [(plant_side.KEYS.link_request("inv2"), 1)]
     assert not lab.ask("link", LinkCommand(fault=Fault(on="inv2 -> inv1", loss=20.0)).to_tree()).ok
     assert [event.text for event in lab.events("link")] == ["link command 1: inv2 -> inv1: cut, from t = 0.08 s on"]
@@ -202,8 +193,8 @@ def test_a_late_heal_looks_at_no_command_of_before_again(monkeypatch: pytest.Mon
     assert max(costs) == len(links_among(SETUP.microgrids))
 
 
-def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() -> None:
-    """A lost message costs a second, not the order."""
+def test_an_unanswered_command_is_sent_again_and_the_answer_goes_to_who_gave_it() -> None:
+    """A lost message costs a second, not the command."""
     lab = plant_side.Lab(2)
     config, _ = toy_configs(2, end=9.0)
     lab.side = RealtimePlant(replace(config, clock="wall"), ToyPlant(config), EmulatedLinks("plant", SETUP))
@@ -221,17 +212,17 @@ def test_an_unanswered_order_is_sent_again_and_the_answer_goes_to_who_gave_it() 
     assert [key for key, m in lab.sent if isinstance(m, LinkRequest)] == [plant_side.KEYS.link_request("inv1")]
 
 
-def test_an_agent_acts_at_its_next_tick_after_the_order_came() -> None:
+def test_an_agent_acts_at_its_next_tick_after_the_command_came() -> None:
     """Messages sent before a cut count, later ones do not; healed, they do again."""
     lab = agent_lab()
     lab.measure(0)
     lab.state("inv2", 0, 0.0, P_set=60e3)
-    order(lab, 1, 0.02)
+    link_command(lab, 1, 0.02)
     lab.measure(1)
     lab.state("inv2", 1, 0.02, P_set=90e3)
     lab.go(0.0)
     before = lab.age("inv2")
-    order(lab, 2, 0.04, LinkCommand(heal=Heal(on="* -> inv1", from_s=0.0)).to_tree())
+    link_command(lab, 2, 0.04, LinkCommand(heal=Heal(on="* -> inv1", from_s=0.0)).to_tree())
     lab.measure(2)
     lab.state("inv2", 2, 0.04, P_set=70e3)
     lab.go(0.02)
@@ -244,7 +235,7 @@ def test_before_the_plant_has_spoken_nothing_of_a_neighbour_is_used() -> None:
     """An agent that is started again might otherwise hear through a link that was cut meanwhile."""
     lab = agent_lab()
     lab.state("inv2", 0, 3.0, P_set=90e3)
-    order(lab, 1, 2.0)
+    link_command(lab, 1, 2.0)
     lab.measure(150)
     lab.state("inv2", 1, 3.0, P_set=90e3)
     lab.go(0.0)
@@ -253,19 +244,19 @@ def test_before_the_plant_has_spoken_nothing_of_a_neighbour_is_used() -> None:
     assert lab.status().impaired == ("inv2",)
 
 
-def test_another_plant_begins_without_the_orders_of_the_former() -> None:
-    """Its run starts at 0: what held from 30 s on would come again; and what its ghost orders is refused."""
+def test_another_plant_begins_without_the_commands_of_the_former() -> None:
+    """Its run starts at 0: what held from 30 s on would come again; and what its ghost commands is refused."""
     lab = agent_lab()
-    order(lab, 1, 0.0)
+    link_command(lab, 1, 0.0)
     lab.measure(0)
     lab.go(0.0)
     first = lab.status().impaired
     lab.token("plant", gone=True)
     lab.token("plant", epoch=2)
     lab.measure(0, epoch=2)
-    order(lab, 2, 0.0, life=1)
+    link_command(lab, 2, 0.0, life=1)
     lab.go(0.5)
-    order(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_tree(), life=2)
+    link_command(lab, 1, 0.0, LinkCommand(fault=Fault(on="inv3 -> inv1", cut=True)).to_tree(), life=2)
     lab.measure(1, epoch=2)
     lab.go(0.5)
 
@@ -273,101 +264,10 @@ def test_another_plant_begins_without_the_orders_of_the_former() -> None:
     assert lab.side.rejects.counts["ghost"] == 1
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["set", "inv1", "inv4"], "nothing is to be set; give one of --delay, --jitter (with --delay), --loss,"),
-        (["set", "inv1 -> inv4", "--loss", "20"], "--loss: a loss is a probability from 0 to 1, got 20; did you"),
-        (["set", "inv1", "inv4", "--delay", "100"], "--delay: 100 s is not plausible for a delay (0 to 10 s); did"),
-        (["set", "inv1", "inv4", "--delay", "0.1", "--jitter", "0.2"], "--jitter: 0.2 s is more than the delay"),
-        (["set", "inv1", "inv4", "--jitter", "0.2"], "--jitter: is around a delay; give --delay too"),
-        (["set", "inv1", "inv4", "--profile", "lt"], '--profile: there is no profile "lt"; did you mean "lte"?'),
-        (["set", "inv1", "inv4", "--loss", "0.1", "--for", "-1"], "--for: a time of the run must be above 0, got -1 s"),
-        (["cut", "inv1"], 'LINKS: "inv1" names no links; write "inv4 <-> inv7"'),
-        (["cut", "inv1", "inv4", "inv7"], 'LINKS: "inv1 inv4 inv7" is neither two names nor one pattern'),
-        (["heal", "inv1", "-"], 'LINKS: the shell took the arrow for a redirection; put the pattern in quotes'),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_meant_is_told_before_a_run_is_sought(words: list[str], said: str) -> None:
-    """Exit code 2, under the option that was typed, with what would be right."""
-    code, text = invoke("link", *words)
-
-    assert code == 2
-    assert said in text
-
-
-def test_the_replayed_scenario_is_one_and_its_links_do_what_was_ordered(tmp_path: Path) -> None:
-    """Written and read again, every link has at every time what scenario and orders gave it."""
-    text = (
-        "[time]\nend_s = 2.0\n[case.IV]\nsecondary = 'all'\ngraph = 'full'\n"
-        "[[case.IV.link]]\non = 'MG1 -> MG2'\ndelay = 0.1\n[[partition]]\nalone = 'inv5'\nfrom_s = 1.0\nto_s = 1.5\n"
-    )
-    (tmp_path / "mine.toml").write_text(text)
-    scenario, feeder = load_scenario(tmp_path / "mine.toml")
-    setup = setup_of(netem_of(scenario, "IV"), scenario, feeder, real_nodes=True)
-    changes = [
-        LinkCommand(fault=Fault(on="* -> inv4", profile="lte", delay=0.3), for_s=1.0).at(0.62),
-        LinkCommand(fault=Fault(on="inv4 <-> plant", cut=True)).at(1.2),
-        LinkCommand(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
-        LinkCommand(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
-    ]
-    (tmp_path / "again.toml").write_text(to_toml(replay_of(scenario, feeder, changes, 7.33), {}))
-    again, _ = load_scenario(tmp_path / "again.toml")
-    netem = netem_of(again, "IV")
-
-    assert (again.name, again.time.end_s) == ("again", 7.36)
-    assert again.cases["IV"].degraded_communication.max_age == MAX_AGE, "which only wall-clock time has by default"
-    for link in links_among([name for name in setup.microgrids if name != "inv10"]):
-        live = schedule_of(link, setup.netem, changes, setup.microgrids)
-        planned = schedule_of(Link(*link), netem, (), setup.microgrids)
-        for t in (0.0, 0.6, 0.62, 1.1, 1.3, 1.45, 1.6, 1.62, 7.32, 7.34, 7.5):
-            was, is_now = ({k: s.model for k, s in one.at(t).active.items()} for one in (live, planned))
-            gates = [{"cut" if kind == "partition" else kind for kind in found} for found in (was, is_now)]
-            assert gates[0] == gates[1], (link, t)
-            assert {k: m for k, m in was.items() if k in ("delay", "loss")} == {
-                k: m for k, m in is_now.items() if k in ("delay", "loss")
-            }
-
-
-def test_process_faults_come_in_turn_and_no_process_stays_paused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """At the run time that telemetry tells, at any speed; who is not there cannot be hurt; at the end all go on."""
-    clock = [100.0]
-    monkeypatch.setattr(fault_injector, "monotonic", lambda: clock[0])
-    nodes = (
-        NodeFault(name="inv1", pause=True, from_s=2.0, to_s=4.0),
-        NodeFault(name="inv2", kill=True, from_s=3.0),
-        NodeFault(name="inv3", pause=True, from_s=5.0, to_s=99.0),
-        NodeFault(name="inv9", kill=True, from_s=1.0),
-    )
-    sent: list[tuple[float, str, str]] = []
-
-    class Victim:
-        def __init__(self, name: str) -> None:
-            self.name = name
-
-        def signal(self, number: Any) -> None:
-            sent.append((clock[0] - 100.0, self.name, number.name))
-
-    children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
-    injector = FaultInjector(replace(SETUP, netem=Netem(nodes=nodes), real_nodes=True).to_tree(), speed=2.0)
-    injector.inject(children)
-    injector.note_time(0.0, 100.0)
-    for _ in range(5):
-        clock[0] += injector.wait
-        injector.inject(children)
-    injector.end(children)
-
-    assert sent == [
-        (1.0, "inv1", "SIGSTOP"), (1.5, "inv2", "SIGKILL"), (2.0, "inv1", "SIGCONT"), (2.5, "inv3", "SIGSTOP"),
-        (2.5, "inv3", "SIGCONT"),
-    ]  # fmt: skip
-    assert injector.killed == {"inv2"}
-
-
 def test_what_links_drop_counts_as_lost() -> None:
     """Whoever watches sees it while it lasts: the numbers of who sent them show only what the wire has lost."""
     lab = agent_lab()
-    order(lab, 1, 0.0)
+    link_command(lab, 1, 0.0)
     for k in range(1, 40):
         lab.measure(k)
         if k != 20:  # that one is lost before it comes to the link
