@@ -11,6 +11,9 @@ from tests.chaos.bases import base_in
 
 CORPUS = Path(__file__).parent / "corpus"
 
+HEAD = "# Violates "
+"""Begins the first line of a limit, before words of the sentence with which its check fails."""
+
 
 @pytest.mark.parametrize("file", sorted((CORPUS / "mended").glob("*.toml")), ids=lambda file: file.stem)
 def test_a_mended_failure_passes(file: Path) -> None:
@@ -20,5 +23,14 @@ def test_a_mended_failure_passes(file: Path) -> None:
 
 @pytest.mark.parametrize("file", sorted((CORPUS / "limits").glob("*.toml")), ids=lambda file: file.stem)
 def test_a_limit_of_the_law_is_still_one(file: Path) -> None:
-    """What docs/chaos.md names as a limit violates the check in its name: a law that does better takes it out."""
-    assert file.stem.partition("-")[0] in run_scenario(base_in(file)).violated
+    """What docs/chaos.md names as a limit violates the check in its name, by the words in its head."""
+    first = file.read_text(encoding="utf-8").partition("\n")[0]
+    assert first.startswith(HEAD)
+
+    check = file.stem.partition("-")[0]
+    sentence = run_scenario(base_in(file)).violated.get(check, "nothing")
+
+    assert first.removeprefix(HEAD) in sentence, (
+        f"{file.stem} does not show its limit any more: it violates {sentence}; "
+        "if the law does better now, take it out of the corpus and of docs/chaos.md"
+    )
