@@ -49,26 +49,26 @@ class LinkLog:
     def __init__(self, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, by_the_way: Path | None) -> None:
         self._scenario, self._feeder = scenario, feeder
         self._replay, self._by_the_way = replay, by_the_way
-        self._orders: dict[int, Change] = {}
+        self._commands: dict[int, Change] = {}
 
     @property
     def changes(self) -> tuple[Change, ...]:
         """Changes by commands, in their order."""
-        return tuple(change for _, change in sorted(self._orders.items()))
+        return tuple(change for _, change in sorted(self._commands.items()))
 
     def __call__(self, message: LinkRequest) -> None:
         """Take a command to links."""
-        self._orders[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
+        self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
         self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
-        file = self._replay or (self._by_the_way if self._orders else None)
+        file = self._replay or (self._by_the_way if self._commands else None)
         return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
 
     def _write_replay(self, t: float) -> None:
-        files = [self._replay, self._by_the_way if self._orders else None]
+        files = [self._replay, self._by_the_way if self._commands else None]
         text = to_toml(
             replay_of(self._scenario, self._feeder, self.changes, t),
             {"driver": LIVE, "python": platform.python_version()},
