@@ -20,6 +20,7 @@ from agents.carriers.process_group import LEAVING, ProcessGroup
 from agents.carriers.time_limit import FIRST
 from agents.laws.call import LawError
 from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
+from wire.foreign_bytes import decode_foreign
 from wire.printable import printable
 
 LONGEST_LINE = 100_000
@@ -131,8 +132,8 @@ class ProgramLaw(Law):
         except BrokenPipeError:
             raise LawError(self._ended(what)) from None
         try:
-            decoded = msgspec.json.decode(reply, type=answer)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+            decoded = decode_foreign(msgspec.json.Decoder(answer).decode, reply)
+        except msgspec.DecodeError:
             shown = printable(reply.decode(errors="replace"), 100)
             raise LawError(f"{self._name} answered the {what} with {shown!r}, which is none; e.g. {EXAMPLE}") from None
         if decoded.error:

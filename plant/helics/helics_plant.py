@@ -15,8 +15,8 @@ from plant.helics.federate import HelicsError, HelicsFederate
 from plant.helics.topics import ACT, Value, number
 from plant.plant_config import PlantConfig
 from wire.bounds import NAME
+from wire.foreign_bytes import decode_foreign
 from wire.messages import LoadSetting, PlantEvent
-from wire.printable import printable
 from wire.schema.suggestion import first_of
 from wire.timing.clock import time_of
 
@@ -186,8 +186,7 @@ class HelicsPlant:
 
     def _decoded(self, text: str, t: float) -> tuple[PlantEvent, ...]:
         try:
-            return msgspec.json.decode(text, type=tuple[PlantEvent, ...])
+            return decode_foreign(msgspec.json.Decoder(tuple[PlantEvent, ...]).decode, text)
         except msgspec.DecodeError as error:
             key = topics.events(self._helics.prefix).key
-            reason = printable(str(error), 200)
-            return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {reason}"),)
+            return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {error}"),)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
-
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace
 from wire.bounds import Name, Text
+from wire.foreign_bytes import decode_foreign
 from wire.messages import LinkReport
 
 
@@ -41,7 +40,7 @@ _statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])
 
 def decode_statuses(data: bytes) -> dict[str, LinkStatus]:
     """Decode them; raise msgspec.DecodeError if the bytes are something else."""
-    return _decoded(_statuses, data)
+    return decode_foreign(_statuses.decode, data)
 
 
 encode_data = msgspec.msgpack.Encoder().encode
@@ -49,20 +48,10 @@ encode_data = msgspec.msgpack.Encoder().encode
 
 _reports = msgspec.msgpack.Decoder(LinkReportData)
 
-T = TypeVar("T")
-
-
-def _decoded(decoder: msgspec.msgpack.Decoder[T], data: bytes) -> T:
-    """Decode bytes of others; raise msgspec.DecodeError for texts that are no UTF-8, and for depths, too."""
-    try:
-        return decoder.decode(data)
-    except (UnicodeDecodeError, RecursionError) as error:
-        raise msgspec.DecodeError(str(error)) from None
-
 
 def data_of(report: LinkReport) -> LinkReportData:
     """Return the data of a report; raise msgspec.DecodeError if they are not its sender's links."""
-    data = _decoded(_reports, report.data)
+    data = decode_foreign(_reports.decode, report.data)
     strangers = {trace.dst for trace in data.traces} - {report.sender}
     if strangers:
         raise msgspec.ValidationError(f"{report.sender} reports of links to {', '.join(sorted(strangers))}")

@@ -25,6 +25,7 @@ from mcap.stream_reader import breakup_chunk
 
 from scenarios.record.record_channels import Topic
 from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo
+from wire.foreign_bytes import decode_foreign
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
@@ -242,7 +243,7 @@ class RecordFile:
                 f"{FORMAT}: install the later gridpeers"
             )
         try:
-            return msgspec.json.decode(metadata.metadata["info"], type=RecordInfo)
+            return decode_foreign(msgspec.json.Decoder(RecordInfo).decode, metadata.metadata["info"])
         except (KeyError, msgspec.MsgspecError) as error:
             raise RecordFileError(
                 f"{self.path}: what it says about its run (written by gridpeers {by[:40]}) cannot be read: {error}"

@@ -11,6 +11,7 @@ from typing import BinaryIO, Protocol, TypeVar
 import msgspec
 
 from scenarios.results.run_files import FolderError, shown
+from wire.foreign_bytes import decode_foreign
 
 JOURNAL = "runs.jsonl"
 """Name of its file."""
@@ -50,11 +51,11 @@ def rows_in(folder: Path, kind: type[Row]) -> dict[int, Row]:
     FolderError
         If a line is damaged.
     """
-    rows = {}
+    rows, decoder = dict[int, Row](), msgspec.json.Decoder(kind)
     for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):
         try:
-            row = msgspec.json.decode(line, type=kind)
-        except msgspec.MsgspecError as error:
+            row = decode_foreign(decoder.decode, line)
+        except msgspec.DecodeError as error:
             where = f"{shown(folder / JOURNAL)}:{place}"
             raise FolderError(
                 f"{where}: this line is damaged ({error}); remove it, and its run is done again"

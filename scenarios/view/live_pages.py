@@ -17,6 +17,7 @@ from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
 from scenarios.view.scenario_form import scenario_form
+from wire.foreign_bytes import decode_foreign
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
@@ -103,7 +104,7 @@ class LivePages:
     def _do(self, text: str) -> dict[str, Any]:
         """Carry out an action; return what the page says of it."""
         try:
-            action = msgspec.json.decode(text, type=PageAction)
+            action = decode_foreign(msgspec.json.Decoder(PageAction).decode, text)
         except msgspec.DecodeError as error:
             return {"ok": False, "text": f"no action: {error}"}
         command = command_line(action.words(), self._where)

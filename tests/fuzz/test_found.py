@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import base64
+import subprocess
+import sys
 from pathlib import Path
 
 import msgspec
@@ -11,8 +13,12 @@ import pytest
 from netem.ledger import LinkTrace
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.emulation.link_reports import data_of, decode_statuses
+from scenarios.live.requests.agent_configs import read_config
 from scenarios.live.show.feeder_map import read_feeder_map
 from scenarios.record.journal_reader import entries_of, values_of
+from scenarios.results.run_files import FolderError
+from scenarios.results.run_journal import JOURNAL, rows_in
+from scenarios.sweep.sweep_case import SweepRow
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
 from wire.bounds import LONGEST_MESSAGE, MOST_COUNT
@@ -108,3 +114,18 @@ def test_a_command_to_links_cannot_write_on_a_terminal() -> None:
     """Its refusal repeats a name as well, and goes back to the client and into the log."""
     with pytest.raises(ValueError, match=r"unknown field `\\x1b\[2J`"):
         LinkCommand.of_tree({"\x1b[2J": 1})
+
+
+DEEP = b'{"x": ' + b"[" * 2000
+"""Brackets so deep that msgspec raises a RecursionError, in a field that nobody knows and that is passed over."""
+
+
+def test_brackets_a_thousand_deep_are_refused_like_anything_else(tmp_path: Path) -> None:
+    """In the journal of a study, in what an agent or a plant answers, in what a process reads of its configuration."""
+    (tmp_path / JOURNAL).write_bytes(DEEP + b"\n")
+    with pytest.raises(FolderError, match=r"runs\.jsonl:1: this line is damaged"):
+        rows_in(tmp_path, SweepRow)
+    assert read_config(DEEP) is None
+    assert read_feeder_map(DEEP) is None
+    done = subprocess.run([sys.executable, "-m", "agents"], input=DEEP, capture_output=True, check=False)
+    assert (done.returncode, b"Traceback" in done.stderr) == (2, False), done.stderr

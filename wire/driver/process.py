@@ -24,6 +24,7 @@ from wire.driver.open_files import raise_limit
 from wire.driver.output import watch_readers
 from wire.driver.session import SessionError
 from wire.driver.stop_signal import stop_at_signals
+from wire.foreign_bytes import decode_foreign
 from wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
@@ -111,14 +112,14 @@ def _main(module: str, what: str, config_type: type[C] | UnionType, run: Callabl
     stop_at_signals(StoppedOnLeashError if options else StoppedError)
     try:
         text = _read_line() if options else sys.stdin.buffer.read()
-        config = msgspec.json.decode(text, type=config_type)
+        config = decode_foreign(msgspec.json.Decoder(config_type).decode, text)
         if options:
             threading.Thread(target=_end_with_parent, daemon=True).start()
         broke = run(config)
     except (StoppedError, KeyboardInterrupt) as stop:
         log.info("asked to leave: %s", stop)
         return OK
-    except (ConfigurationError, SessionError, msgspec.DecodeError, UnicodeDecodeError) as error:
+    except (ConfigurationError, SessionError, msgspec.DecodeError) as error:
         log.error("configuration: %s", error)
         return BAD_CONFIG
     if broke:

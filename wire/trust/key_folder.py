@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from wire.bounds import is_name
+from wire.foreign_bytes import decode_foreign
 from wire.printable import printable
 from wire.trust.credentials import Credentials
 from wire.trust.member import Member, Role
@@ -130,11 +131,10 @@ def read_list(folder: Path) -> MemberList:
     public = _certificate(folder / CA).public_key()
     data = _bytes(folder / LIST)
     try:
-        signed = msgspec.json.decode(data, type=SignedList)
+        signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, data)
         signature = base64.b64decode(signed.signature, validate=True)
-    except (ValueError, RecursionError) as error:
-        reason = printable(str(error), 200)
-        raise KeysError(f"{folder / LIST}: cannot be read: {reason}; copy it anew from the site") from None
+    except ValueError as error:
+        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
     try:
         assert isinstance(public, ec.EllipticCurvePublicKey)
         public.verify(signature, msgspec.json.encode(signed.list), ec.ECDSA(hashes.SHA256()))

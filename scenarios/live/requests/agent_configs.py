@@ -14,6 +14,7 @@ from scenarios.live.client.run_client import NobodyError, RunClient
 from scenarios.live.requests.run_requests import plant_status
 from scenarios.short_names import in_order
 from wire.driver.command_line import command_line
+from wire.foreign_bytes import decode_foreign
 
 HANDOUT = 10.0
 """Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds, or a busy second."""
@@ -57,7 +58,7 @@ def read_config(payload: bytes) -> AgentConfig | None:
     if not payload.startswith(b"{"):
         return None
     try:
-        config = msgspec.json.decode(payload, type=AgentConfig)
+        config = decode_foreign(msgspec.json.Decoder(AgentConfig).decode, payload)
         check_nameplate(config)
     except (msgspec.DecodeError, ValueError):
         return None

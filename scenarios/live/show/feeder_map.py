@@ -7,6 +7,7 @@ import msgspec
 from plant.equipment import Feeder
 from plant.equipment.named_loads import named_loads
 from scenarios.results.plots.feeder_places import has_coordinates, places
+from wire.foreign_bytes import decode_foreign
 
 
 class MapSwitch(msgspec.Struct, frozen=True):
@@ -99,8 +100,8 @@ def feeder_map(feeder: Feeder) -> FeederMap:
 def read_feeder_map(payload: bytes) -> FeederMap | None:
     """Return the map in a plant's answer; None if the bytes are something else, or name a bus that is not there."""
     try:
-        found = msgspec.json.decode(payload, type=FeederMap)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        found = decode_foreign(msgspec.json.Decoder(FeederMap).decode, payload)
+    except msgspec.DecodeError:
         return None
     numbers = [
         *(end for a, b, _ in found.branches for end in (a, b)),

@@ -19,6 +19,7 @@ from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.recorded.recorded_run import RecordedRun
 from wire.bounds import Text
 from wire.driver.command_line import command_line
+from wire.foreign_bytes import decode_foreign
 from wire.plugins.anybody import ANYTHING, named
 
 if TYPE_CHECKING:
@@ -105,7 +106,7 @@ class RecordPages:
     async def _receive(self, socket: WebSocket, page: RecordPage) -> None:
         async for text in texts(socket):
             with contextlib.suppress(msgspec.DecodeError):
-                await page.questions.put(msgspec.json.decode(text, type=RecordQuestion))
+                await page.questions.put(decode_foreign(msgspec.json.Decoder(RecordQuestion).decode, text))
 
     # ---------------------------------------------------------------- in the thread that reads
 
