@@ -95,7 +95,7 @@ def require(modules: dict[str, str], install: str = INSTALL) -> None:
     packages = {"zenoh": "eclipse-zenoh"}
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        lines = [f"{packages.get(name, name)} is not installed; {modules[name]} cannot do without" for name in missing]
+        lines = [f"{packages.get(name, name)} is not installed; it is needed for {modules[name]}" for name in missing]
         fail([*lines, install], BAD_INPUT)
 
 

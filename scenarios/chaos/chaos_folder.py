@@ -23,6 +23,9 @@ from wire.driver.command_line import command_line
 SCENARIO, SEED = "scenario.toml", "seed.txt"
 """Files from which a campaign goes on, beside its journal."""
 
+ASKED, RUNS = "runs_asked.txt", 100
+"""File with the number of runs that a campaign was asked for, and that number if nobody says one."""
+
 TABLE, FAILURES = "chaos.csv", "failures"
 
 COLUMNS = (
@@ -46,6 +49,8 @@ class ChaosFolder:
         The command that makes it again.
     rows : Mapping[int, ChaosRow], optional
         Results that it has, by the number of their run (`kept_rows`); none of a new folder.
+    runs : int, optional
+        Number of runs that it was asked for.
     """
 
     def __init__(
@@ -55,12 +60,14 @@ class ChaosFolder:
         seed: int,
         command: str,
         rows: Mapping[int, ChaosRow] = MappingProxyType({}),
+        runs: int = RUNS,
     ) -> None:
         self.path, self._base, self._seed, self._command = path, base, seed, command
         self.rows = dict(rows)
         """Results by the number of their run."""
         write_whole(path / SCENARIO, base.text)
         write_whole(path / SEED, f"{seed}\n")
+        write_whole(path / ASKED, f"{runs}\n")
         open_journal(path).close()
         self.write_table()
 
@@ -118,6 +125,11 @@ class ChaosFolder:
         return _line(cells)
 
 
+def asked_of(folder: Path) -> tuple[int | None, int | None]:
+    """Return the seed with which a campaign was begun, and its number of runs; None where the folder does not say."""
+    return _number(folder / SEED), _number(folder / ASKED)
+
+
 def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: int) -> dict[int, ChaosRow]:
     """Return the runs that a campaign has in its folder, for one that goes on there.
 
@@ -163,6 +175,13 @@ def again(file: Path) -> str:
 def _status(row: ChaosRow) -> str:
     """Return the status of a run in a word: what it violates comes before what a collapse excuses."""
     return "violated" if row.violated else "collapse" if row.collapse else "passed"
+
+
+def _number(file: Path) -> int | None:
+    try:
+        return int(file.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return None
 
 
 def _line(cells: Iterable[object]) -> str:

@@ -3,12 +3,14 @@
     @gridpeers.check("nadir")
     def nadir(case):
         '''No grid-forming inverter falls below 59.3 Hz.'''
-        f = case.history.f[:, case.nameplates.GFM]
-        for row, column in zip(*(f < 59.3).nonzero()):
+        f, forming = case.history.f, case.history.present & case.nameplates.GFM
+        for row, column in zip(*(forming & (f < 59.3)).nonzero()):
             yield gridpeers.Violation(
                 text="low frequency", t=case.history.t[row], agent=case.nameplates.names[column],
                 value=f[row, column], unit="Hz", limit=59.3,
             )
+
+Judge f and V only where `history.present` is true: an inverter that is off the network may have 0 Hz.
 
 A check is a function of a recorded case that returns its violations, none for a run that passes; it raises
 `gridpeers.NotJudgedError` where the record has no data for it. A class with parameters (annotated attributes,

@@ -128,6 +128,12 @@ def read_list(folder: Path) -> MemberList:
     from cryptography.hazmat.primitives.asymmetric import ec
 
     _require_folder(folder)
+    if not (folder / CA).exists() and not (folder / LIST).exists():
+        here = "the present folder" if folder == Path() else str(folder)
+        raise KeysError(
+            f"{here} has no certificates: neither {CA} nor {LIST} is there; name by --keys DIR the folder that "
+            "gridpeers keys init has made"
+        )
     public = _certificate(folder / CA).public_key()
     data = _bytes(folder / LIST)
     try:
@@ -189,7 +195,10 @@ def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
     if here:
         way = f"--as {here} takes the certificate of one"
     elif who:
-        way = f"{', '.join(each.name for each in who)} can give it, or copy the files of one to {folder}"
+        way = (
+            f"give the command where the certificate of {' or '.join(each.name for each in who)} is, or copy its files "
+            f"to {folder}"
+        )
     else:
         way = f"gridpeers keys issue NAME --role {COMMANDING[0]} makes one, where the site was made"
     return (

@@ -29,12 +29,20 @@ _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 def chaos(
     context: typer.Context,
     scenario: ScenarioName,
-    runs: Annotated[int, typer.Option(min=1, metavar="N", help="Number of runs.")] = 100,
+    runs: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Number of runs, 100 if left out; with --resume as many as at first."),
+    ] = None,
     driver: Annotated[
         Literal["inprocess", "processes"],
         typer.Option(help="inprocess: each run in one process; processes: one per agent, beside the same in one."),
     ] = "inprocess",
-    seed: Annotated[int, typer.Option(min=0, max=10**9, metavar="S", help="Seed of all that is drawn.")] = 1,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=10**9, metavar="S", help="Seed of all that is drawn, 1 if left out; with --resume the first one."
+        ),
+    ] = None,
     case: Annotated[
         str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
     ] = None,
@@ -57,7 +65,8 @@ def chaos(
     Exit code: 0 no run violated anything, 1 some did, 2 bad usage or a bad file, 3 the workers went, or the machine
     lacks what a run needs, such as room in TMPDIR, 130 Ctrl-C, 143 SIGTERM: what came until then is written.
 
-    A campaign that was interrupted goes on with --resume, and the same scenario and seed.
+    A campaign that was interrupted goes on with --resume, and the same scenario and case; with more --runs it
+    becomes longer.
 
     Example:  gridpeers chaos islanding --runs 200
     """
@@ -68,33 +77,37 @@ def chaos(
     from rich.console import Console
 
     from scenarios.chaos.campaign import Campaign
-    from scenarios.chaos.chaos_folder import ChaosFolder
+    from scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
     from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import RUNS, FolderError, set_status, shown
+    from scenarios.results.run_files import RUNS as RUNS_FOLDER
+    from scenarios.results.run_files import FolderError, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
     if out is not None and resume is not None:
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     base = ChaosBase(spec, feeder)
+    first_seed, first_runs = (None, None) if resume is None else asked_of(resume)
+    seed = next(it for it in (seed, first_seed, 1) if it is not None)
+    runs = runs or first_runs or RUNS
     campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     try:
         rows, opened = _new(context, out, campaign) if resume is None else _known(context, resume, campaign)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except OSError as error:
-        fail([f"--out {out or RUNS}: {error.strerror}; give another folder"], BAD_INPUT)
+        fail([f"--out {out or RUNS_FOLDER}: {error.strerror}; give another folder"], BAD_INPUT)
     console = Console()
-    with _kept_if_ended(campaign, rows, resume):
+    with _kept_if_ended(campaign, rows, resume, scenario):
         _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
     try:
         path = opened()
         set_status(path, "running")
-        folder = ChaosFolder(path, base, seed, command_line(*words), rows)
+        folder = ChaosFolder(path, base, seed, command_line(*words), rows, runs)
     except (FolderError, OSError) as error:
         fail([str(error)], BAD_INPUT)
-    summary = _carry_out(console, campaign, folder)
+    summary = _carry_out(console, campaign, folder, scenario)
     for line in summary.lines():
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
@@ -150,13 +163,16 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     """Say what begins; end with a line for each check that the scenario violates by itself."""
     from gridpeers.cli.progress import TRYING, explained_work
     from scenarios.chaos.campaign import undisturbed
+    from scenarios.checks.check_registry import ALWAYS
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
     with explained_work(lambda: console.print(TRYING, highlight=False, soft_wrap=True)):
         row = undisturbed(campaign)
     if row.violated:
-        advice = "choose another case, or switch these checks off in the scenario (docs/checks.md)"
+        off = ", ".join(f'{{ use = "{check}", off = true }}' for check in row.violated if check in ALWAYS)
+        entry = f": checks = [{off}] at its top" if off else ""
+        advice = f"choose another case (--case), or switch these checks off in the scenario{entry} (docs/checks.md)"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail([*lines, advice], BAD_INPUT)
     typer.echo(f"{name}: it violates nothing; next {_work(campaign)} ...")
@@ -174,28 +190,32 @@ def _work(campaign: Campaign) -> str:
     return f"{runs}, {campaign.jobs} at a time, once {counted(campaign.jobs, 'worker')} have started"
 
 
-def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder) -> Summary:
+def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenario: str) -> Summary:
     """Do the campaign, showing how far it is; whatever ends it early ends the command."""
     from scenarios.chaos.campaign import run_campaign
 
-    with _kept_if_ended(campaign, folder.rows, folder.path), _stages(console) as tell:
+    with _kept_if_ended(campaign, folder.rows, folder.path, scenario), _stages(console) as tell:
         return run_campaign(campaign, folder, tell)
 
 
 @contextmanager
-def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None) -> Iterator[None]:
-    """End the command with what went wrong, and how many runs are kept, if what is inside is ended early."""
+def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
+    """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
     from gridpeers.cli.interruption import exit_code, interruptible
     from scenarios.chaos.machine_error import MachineError
     from scenarios.results.run_files import refusal, shown
     from scenarios.sweep.workers import WorkersError
+    from wire.driver.command_line import command_line
     from wire.driver.open_files import too_few_files
 
     try:
         with interruptible():
             yield
     except (KeyboardInterrupt, OSError, MachineError, WorkersError) as error:
-        where = f"in {shown(folder)}/" if folder else "and no folder was made"
+        where = "and no folder was made"
+        if folder:
+            words = ["chaos", scenario, "--case", campaign.base.case, "--driver", campaign.driver]
+            where = f"in {shown(folder)}/; go on with: {command_line(*words, '--resume', shown(folder))}"
         kept = f"{len(rows)} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {kept}"], exit_code(error))

@@ -100,11 +100,11 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from wire.trust.key_folder import CA_KEY, exposed_keys, read_list
+        from wire.trust.key_folder import CA_KEY, LIST, exposed_keys, read_list
 
         known = read_list(keys)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
-        typer.echo(f"site {known.site}, list {known.version}{authority}")
+        typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
             ended = member.expires < f"{datetime.now(UTC):%Y-%m-%d}"

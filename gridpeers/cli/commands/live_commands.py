@@ -78,7 +78,7 @@ def _start(
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
         from scenarios.live.client.access import objection, with_protocol
-        from scenarios.live.client.run_address import UsageError, check_endpoint, check_name
+        from scenarios.live.client.run_address import RunAddress, UsageError, check_endpoint, check_name
         from scenarios.live.launch.plant_endpoint import check_alone, endpoint_for_run
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
@@ -134,7 +134,8 @@ def _start(
             link_log = LinkLog(spec, feeder, record, replay)
             info = live_record(spec, config, everyone, tuple(row.name for row in (*feeder.inverters, *feeder.spares)))
             if agents:
-                watch, down = command_line("watch", *access.words), command_line("down", *access.words)
+                found_by = RunAddress(run=run, connect=(endpoint,), access=access).words
+                watch, down = command_line("watch", *found_by), command_line("down", *found_by)
                 say(f"{watch}, in another terminal, shows it; Ctrl-C here, or {down} there, ends it")
                 outcome = all_here(config, everyone, kept.logs, kept.record, link_log, info)
             else:

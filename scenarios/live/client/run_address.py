@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from scenarios.drivers.free_endpoint import parse_endpoint
-from scenarios.live.client.access import Access, is_loopback_host
+from scenarios.live.client.access import Access, is_loopback_host, with_protocol
 from wire.keys import check_name as check_key_part
 from wire.trust.credentials import Credentials
 
@@ -44,6 +44,23 @@ class RunAddress:
     """Own certificate and members of the site; None if links are open."""
     access: Access = field(default_factory=Access)
     """The options that gave them, for commands that start others."""
+
+    @property
+    def words(self) -> list[str]:
+        """The options by which a command on the same host finds this run, without those that have their defaults.
+
+        Examples
+        --------
+        >>> RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words
+        []
+        >>> RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words
+        ['--run', 'demo', '--connect', 'tcp/127.0.0.1:7500']
+        """
+        near = tuple(map(loopback_of, self.connect))
+        default = with_protocol(ENDPOINT, keys=self.access.keys is not None, default=ENDPOINT)
+        run = [] if self.run == RUN else ["--run", self.run]
+        connect = [] if near == (default,) else [word for each in near for word in ("--connect", each)]
+        return [*run, *connect, *self.access.words]
 
     def __str__(self) -> str:
         """Return it as messages name it.

@@ -40,7 +40,7 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
     code, shown = invoke("keys", "show", "--keys", "lab")
     assert code == 0, shown
     rows = shown.splitlines()
-    assert rows[0] == "site lab, list 6; ca.key is here: certificates are issued in this folder"
+    assert rows[0] == "site lab, members.json is version 6; ca.key is here: certificates are issued in this folder"
     assert [row.split()[:3] for row in rows[1:3]] == [["agent", "inv1", "until"], ["agent", "inv2", "revoked"]]
     assert rows[1].endswith(", key here")
 
@@ -52,6 +52,7 @@ def test_what_cannot_be_done_with_a_site_is_refused(elsewhere: Path) -> None:
     assert "other: there is no such folder of keys; gridpeers keys init other makes one" in refused(
         "keys", "show", "--keys", "other"
     )
+    assert "the present folder has no certificates: neither ca.pem nor members.json is there" in refused("keys", "show")
     assert "--days: must be more than 0 and at most 3650 days, got 0" in refused("keys", "init", "x", "--days", "0")
     assert 'no certificate was issued to "inv7"' in refused("keys", "revoke", "inv7", "--keys", "lab")
 
@@ -101,7 +102,7 @@ def test_a_viewer_is_told_who_may_command(elsewhere: Path) -> None:
     said = "lab: viewer has the role viewer, which may look at a run (status, watch, view) and not command it; an "
 
     unnamed = refused("down", "--keys", "lab")
-    assert f"{said}operator may: operator can give it, or copy the files of one to lab" in unnamed
+    assert f"{said}operator may: give the command where the certificate of operator is, or copy its files" in unnamed
     assert invoke("keys", "revoke", "operator", "--keys", "lab")[0] == 0
     named = refused("down", "--keys", "lab", "--as", "viewer")
     assert f"{said}operator may: gridpeers keys issue NAME --role operator makes one, where the site was made" in named

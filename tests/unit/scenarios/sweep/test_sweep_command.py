@@ -62,7 +62,7 @@ def test_what_is_missing_is_told_with_what_to_install(monkeypatch: pytest.Monkey
 
     assert invoke("topology", "--dry-run") == (
         2,
-        "gridpeers: pyarrow is not installed; the table cannot do without\n"
+        "gridpeers: pyarrow is not installed; it is needed for the table\n"
         "gridpeers: install what sweeps need: pip install 'gridpeers[sweep]'\n",
     )
     assert invoke("topologi")[1].startswith('gridpeers: no sweep "topologi"; '), "nothing to install for a wrong name"

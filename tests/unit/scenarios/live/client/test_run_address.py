@@ -1,10 +1,19 @@
 """Run names and endpoints of the commands for live runs."""
 
 import socket
+from pathlib import Path
 
 import pytest
 
-from scenarios.live.client.run_address import UsageError, accepting, address_of, check_endpoint, return_path
+from scenarios.live.client.access import Access
+from scenarios.live.client.run_address import (
+    RunAddress,
+    UsageError,
+    accepting,
+    address_of,
+    check_endpoint,
+    return_path,
+)
 
 
 def test_without_options_there_is_one_run_on_this_machine() -> None:
@@ -75,3 +84,17 @@ def test_who_accepts_connections_is_known_though_it_says_nothing() -> None:
 def test_who_connects_to_another_host_can_be_reached_from_there(connect: tuple[str, ...], listen: str) -> None:
     """On the loopback as long as everything is on it, on every address otherwise."""
     assert return_path(connect) == (listen,)
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "words"),
+    [
+        ("tls/127.0.0.1:7447", ["--keys", "lab"]),
+        ("tls/0.0.0.0:7500", ["--connect", "tls/127.0.0.1:7500", "--keys", "lab"]),
+    ],
+)
+def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, words: list[str]) -> None:
+    """`up` names its commands with them; with certificates the default endpoint is tls."""
+    address = RunAddress(run="gridpeers", connect=(endpoint,), access=Access(keys=Path("lab")))
+
+    assert address.words == words
