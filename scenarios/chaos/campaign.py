@@ -130,7 +130,7 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
     except BaseException as error:
-        why = refusal(folder.path, error) if isinstance(error, OSError) else str(error)
+        why = refusal(folder.path, error) if isinstance(error, OSError) else str(error) or type(error).__name__
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
         set_broken(folder.path, f"{why} after {len(folder.rows)} of {campaign.runs} runs")
         with suppress(OSError):  # a full disk may take no more of them; the error above is the one to tell

@@ -14,7 +14,7 @@ from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
 from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.machine_error import MachineError, machine_error, unwritten
+from scenarios.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.judging import judge_case
@@ -227,11 +227,15 @@ def _judged(
         request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=folder, lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
         try:
-            recorded, _ = run_case(request, base.case, "", _ignore, at_start)
+            recorded, outcome = run_case(request, base.case, "", _ignore, at_start)
             if recorded.record_failure:  # its checks could not judge it
                 raise unwritten(recorded.record_failure, disk)
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
             verdicts = judge_case(CheckedCase.of(scenario, base.feeder, base.case, record, folder / base.case))
+            told = [event.text for event in recorded.events if event.kind == "law"]
+            told += [*outcome.notes, *(it.reason for it in verdicts if it.status == "failed")]
+            if lack := machine_lack(told, disk):  # an agent may die, a law or a check fail, and the run goes on
+                raise lack
         except MachineError:
             raise
         except Exception as error:

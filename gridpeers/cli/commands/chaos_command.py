@@ -202,7 +202,7 @@ def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenar
 def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
     """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
     from gridpeers.cli.interruption import exit_code, interruptible
-    from scenarios.chaos.machine_error import MachineError
+    from scenarios.chaos.machine_error import MachineError, machine_lack
     from scenarios.results.run_files import refusal, shown
     from scenarios.sweep.workers import WorkersError
     from wire.driver.command_line import command_line
@@ -211,7 +211,7 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
     try:
         with interruptible():
             yield
-    except (KeyboardInterrupt, OSError, MachineError, WorkersError) as error:
+    except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
         where = "and no folder was made"
         if folder:
             words = ["chaos", scenario, "--case", campaign.base.case, "--driver", campaign.driver]
@@ -219,7 +219,7 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
         kept = f"{len(rows)} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {kept}"], exit_code(error))
-        why = str(error)
+        why = str(machine_lack(["MemoryError"]) if isinstance(error, MemoryError) else error)
         if isinstance(error, OSError):
             why = too_few_files(error) or (refusal(folder, error) if folder else why)
         fail([why, kept], BROKEN)
