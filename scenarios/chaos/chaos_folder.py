@@ -14,6 +14,7 @@ import msgspec
 from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.numbered_run import seed_of
+from scenarios.chaos.told_schedule import told
 from scenarios.results.run_files import FolderError, shown, write_whole
 from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from scenarios.run_request import Driver
@@ -105,7 +106,7 @@ class ChaosFolder:
             f"{self._command}, run {row.number}, seed of the messages {seed}"
             + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
             f"Once more: {again(file)}",
-            *(f"  {disturbance}" for disturbance in sorted(schedule, key=lambda it: it.begins_s)),
+            *(f"  {line}" for line in told(self._base, schedule)),
         ]
         scenario = msgspec.structs.replace(
             self._base.disturbed(schedule, seed, simplest.since_s),

@@ -53,7 +53,7 @@ def check(
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
-    for note in (*supply_notes(spec, feeder), *liar_notes(spec), *robustness_notes(spec, feeder)):
+    for note in (*supply_notes(spec, feeder), *liar_notes(spec, feeder), *robustness_notes(spec, feeder)):
         typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "

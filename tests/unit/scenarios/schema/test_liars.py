@@ -32,11 +32,27 @@ lies = { model = "offset", P_set_W = 1e5 }
 def test_check_lists_each_liar_with_its_time_its_lie_and_its_cases(tmp_path: Path) -> None:
     """A sentence for each, with the cases if it does not lie in all."""
     (tmp_path / "liars.toml").write_text(LIARS, encoding="utf-8")
-    scenario, _ = load_scenario(tmp_path / "liars.toml")
+    scenario, feeder = load_scenario(tmp_path / "liars.toml")
 
-    assert list(liar_notes(scenario)) == [
+    assert list(liar_notes(scenario, feeder)) == [
         "inv3 lies from 1 s to the end: offset, P_set_W 100000",
         "inv2 lies from 0 s to 1.5 s: freeze, in the name of inv5, to the plant too (in II)",
+    ]
+
+
+def test_check_says_of_a_lie_for_an_agent_that_is_away_that_nobody_hears_it(tmp_path: Path) -> None:
+    """It has left before; an agent that returns meanwhile lies."""
+    away = '[[event]]\nlabel = "away"\nt_s = 0.5\nleave = ["inv3"]\n'
+    back = '[[event]]\nlabel = "back"\nt_s = 1.5\njoin = ["inv3"]\n'
+    told = []
+    for more in (away, away + back):
+        (tmp_path / "liars.toml").write_text(LIARS + more, encoding="utf-8")
+        told.append([note for note in liar_notes(*load_scenario(tmp_path / "liars.toml")) if note.startswith("inv3")])
+    lies = "inv3 lies from 1 s to the end: offset, P_set_W 100000"
+
+    assert told == [
+        [f"{lies}; nobody hears it, as inv3 has left at 0.5 s"],
+        [lies],
     ]
 
 
