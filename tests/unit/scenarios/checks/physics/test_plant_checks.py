@@ -143,6 +143,19 @@ def test_a_lasting_oscillation_is_caught(sound: CheckedCase, f: float, damping: 
     assert found.violations[0].value == pytest.approx(100.0 * damping, abs=0.2)
 
 
+def test_a_tail_longer_than_the_run_leaves_an_oscillation_to_be_caught(sound: CheckedCase) -> None:
+    """`tail_s` bounds what is looked at: beyond the run it is the second half of the time since the last event."""
+
+    def fault(of: Arrays) -> None:
+        of["P"][:, 5] += 0.1 * sound.nameplates.s[5] * np.sin(6.2832 * 1.3 * of["t"])
+
+    lasting, longest = changed(sound, fault), verdict(changed(sound, fault), "oscillation", tail_s=3600.0)
+
+    assert longest.status == "failed"
+    assert longest == verdict(lasting, "oscillation", tail_s=1.5), "1.5 of the 3 s since the last event"
+    assert verdict(lasting, "oscillation", tail_s=0.2).status == "not judged"
+
+
 def test_a_swing_that_dies_out_is_no_lasting_oscillation(sound: CheckedCase) -> None:
     """One that is well damped, and one that is too small to matter, pass."""
 
