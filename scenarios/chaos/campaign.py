@@ -37,7 +37,7 @@ Tell = Callable[[str, float, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """What is to be done."""
+    """The task of a campaign."""
 
     base: ChaosBase
     seed: int

@@ -35,7 +35,7 @@ ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "repeats",
     "same_in_processes",
 )
-"""What is asked of every run beside the checks: it reaches its end; no error of the program; no law fails; accounts of
+"""Questions about every run beside the checks: it reaches its end; no error of the program; no law fails; accounts of
 links balance; it repeats to the byte; processes give the bytes of one process."""
 
 ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES)
@@ -52,7 +52,7 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     number: int
     """Its number, from 0."""
     schedule: Schedule
-    """What was done to it."""
+    """Its disturbances."""
     passed: tuple[str, ...] = ()
     """Checks, and what else is asked, that it passed."""
     violated: dict[str, str] = {}

@@ -33,8 +33,8 @@ _WORDS = {
     _FILES: rf"{_numbers(errno.EMFILE, errno.ENFILE)}|may have \d+ files open at once",
     _DISK: _numbers(*_DISK_ERRORS),
 }
-"""What is said of a process that ended as the machine lacked something, by kinds of lack. In simulated time a run sends
-SIGKILL to no process of its own before it has its verdict."""
+"""Words in the last lines, or in the report, of a process that ended for each kind of lack. In simulated time a run
+sends SIGKILL to no process of its own before it has its verdict."""
 
 
 class MachineError(Exception):

@@ -1,4 +1,4 @@
-"""What is told of a schedule: its disturbances in the order of time, and which of them meet an agent that is away.
+"""A schedule in sentences: its disturbances in the order of time, and which of them meet an agent that is away.
 
 A schedule is drawn disturbance by disturbance, so a lie, a pause or a kill may be planned for an agent that has left
 before. A scenario may say that, and nothing happens then.

@@ -147,7 +147,7 @@ def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever cannot be written after it takes nothing away: the first error is the one that is told."""
+    """The command tells the first error, though later files cannot be written either."""
 
     def full(folder: ChaosFolder, *rest: Any) -> None:
         if len(rest) == 1:
@@ -315,7 +315,7 @@ def test_a_folder_that_cannot_be_used_is_refused_before_the_first_run(
 
 
 def test_every_disturbance_is_counted_by_a_noun_of_its_kind() -> None:
-    """Whatever is drawn has its kind in `KINDS`, so that a report reads well whatever comes."""
+    """`KINDS` has a noun for each kind of disturbance that is drawn."""
     base = base_named("plug-n-play")
     schedules = [schedule for batch in range(2) for schedule in schedule_search.drawn(base, 3, batch)]
     kinds = {disturbance.kind for schedule in schedules for disturbance in schedule}

@@ -23,7 +23,7 @@ def test_a_mended_failure_passes(file: Path) -> None:
 
 @pytest.mark.parametrize("file", sorted((CORPUS / "limits").glob("*.toml")), ids=lambda file: file.stem)
 def test_a_limit_of_the_law_is_still_one(file: Path) -> None:
-    """What docs/chaos.md names as a limit violates the check in its name, by the words in its head."""
+    """Each limit of docs/chaos.md violates the check in its file's name, with the words in its first line."""
     first = file.read_text(encoding="utf-8").partition("\n")[0]
     assert first.startswith(HEAD)
 

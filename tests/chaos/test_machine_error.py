@@ -1,4 +1,4 @@
-"""What the machine lacks ends a campaign, wherever a run meets it: here, in a process of its own, in a law."""
+"""A machine without memory, room, files or processes ends a campaign, also if a law or a child process meets it."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def test_a_lack_in_this_process_is_told(
 def test_a_lack_in_a_process_of_a_run_is_told(
     program: str, told: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """What an ended process has left in its log, or the signal that ended it, names the machine, not the scenario."""
+    """The last lines in the log of an ended process, or its signal, tell that the machine is to blame."""
     ended = Event()
     child = Child(
         "inv1", ["-c", program], Disturbance(table="event", entry={}), elsewhere / "log", lambda it: ended.set()

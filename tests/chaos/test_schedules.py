@@ -33,7 +33,7 @@ def _batch(number: int) -> list[Schedule]:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_schedule_is_a_scenario_file_that_loads_and_can_be_fed(name: str, tmp_path: Path) -> None:
-    """Whatever is drawn: its file has no problem, gives the same scenario, and ends after the time to recover."""
+    """The file of each schedule that is drawn has no problem, gives the same scenario, and has time to recover."""
     base = base_named(name)
 
     @settings(max_examples=8, database=None)

@@ -44,7 +44,7 @@ def test_inverters_that_return_are_judged_from_then_on(tmp_path: Path) -> None:
 
 
 def test_inverters_that_never_return_are_named_and_the_file_shows_it_again(tmp_path: Path) -> None:
-    """Who trips three times stays off: the run says who, when and why, and so does the scenario of the failure."""
+    """An inverter that trips three times stays off: the run names it, with time and reason, and so does the failure."""
     base = base_in(_file(tmp_path, 0.975))
     row = run_schedule(base, (), 1)
     failed = ChaosFolder(tmp_path, base, 0, "gridpeers chaos small").write_failure("returns", row, row)
