@@ -21,15 +21,15 @@ _DISK, _FILES, _KILLED, _MEMORY, _PROCESSES = "disk", "files", "killed", "memory
 
 
 def _numbers(*codes: int) -> str:
-    """Return the pattern of errors of the system, as Python and Rust write them."""
+    """Return the pattern of errors of the system, as Python and Rust write them, the latter in a panic, too."""
     either = "|".join(map(str, codes))
-    return rf"\[Errno (?:{either})\]|\(os error (?:{either})\)"
+    return rf"\[Errno (?:{either})\]|\(os error (?:{either})\)|Os \{{ code: (?:{either}),"
 
 
 _WORDS = {
     _MEMORY: rf"MemoryError|{_numbers(errno.ENOMEM)}|memory allocation of \d+ bytes failed",
     _KILLED: "was killed by SIGKILL",
-    _PROCESSES: rf"can't start new thread|{_numbers(errno.EAGAIN)}",
+    _PROCESSES: rf"can't start new thread|Zenoh cannot start its threads|{_numbers(errno.EAGAIN)}",
     _FILES: rf"{_numbers(errno.EMFILE, errno.ENFILE)}|may have \d+ files open at once",
     _DISK: _numbers(*_DISK_ERRORS),
 }
@@ -123,7 +123,7 @@ def _lack(lack: str, reason: str, disk: Path) -> MachineError:
         return MachineError(f"{killed} ({reason}); {fewer} of memory")
     if lack == _MEMORY:
         return MachineError(f"a run has no memory ({reason}); {fewer} (ulimit -v)")
-    return MachineError(f"a run can start no further process or thread ({reason}); {fewer} (ulimit -u)")
+    return MachineError(f"a run can start no further process or thread ({reason}); {fewer} (ulimit -u, ulimit -v)")
 
 
 def _is_in(folder: Path, error: OSError) -> bool:

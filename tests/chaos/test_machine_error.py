@@ -89,6 +89,7 @@ def test_a_lack_in_this_process_is_told(
         ("raise OSError(11, 'No more')", f"{PROCESSES} (BlockingIOError: [Errno 11] No more)"),
         ("raise OSError(28, 'No space')", f"{DISK}{{tmp}} (OSError: [Errno 28] No space)"),
         ("raise OSError(24, 'Too many')", f"{FILES} (OSError: [Errno 24] Too many)"),
+        ("raise SystemExit('Err(Os { code: 12, kind: OutOfMemory })')", f"{MEMORY} (Err(Os {{{{ code: 12, kind: "),
         ("raise SystemExit('cannot open: Too many (os error 24)')", f"{FILES} (cannot open: Too many (os error 24))"),
     ],
 )
@@ -148,3 +149,18 @@ def test_a_command_without_memory_ends_in_one_line(elsewhere: Path, monkeypatch:
 
     assert (code, f"{MEMORY} (MemoryError); " in text) == (3, True), text
     assert "0 of 100 runs are kept in out/" in text
+
+
+def test_zenoh_without_threads_is_told(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its panic as a session opens, in the process of the command, is one line and no verdict."""
+    zenoh = pytest.importorskip("zenoh")
+
+    class PanicException(BaseException):
+        """As that of Rust is named."""
+
+    def opened(config: Any) -> Any:
+        raise PanicException("Failed to init app")
+
+    monkeypatch.setattr(zenoh, "open", opened)
+    with pytest.raises(MachineError, match=rf"{PROCESSES} \(\w+: Zenoh cannot start its threads \(Failed to init"):
+        run_scenario(base_in(_small(elsewhere)), "processes")

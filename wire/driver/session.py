@@ -17,6 +17,7 @@ from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
 from wire.driver.inbox import Inbox, Stamped
 from wire.driver.lingering import do_not_linger
+from wire.driver.open_files import limit
 from wire.keys import LATEST_ONLY, is_token
 from wire.messages import PLANT
 from wire.trust.credentials import Credentials
@@ -207,6 +208,13 @@ class Session:
             return self._zenoh.open(self._config)
         except self._zenoh.ZError as error:
             raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
+        except BaseException as error:
+            if type(error).__name__ != "PanicException":  # of Rust: Zenoh's threads have not come up
+                raise
+            raise SessionError(
+                f"{who}: Zenoh cannot start its threads ({error}); this process may have {limit()} files open: raise "
+                "that limit (ulimit -n), if it is low, or end other programs"
+            ) from None
 
     def _await_router(self) -> None:
         """Wait until the router is there; a signal ends the wait, as it would not end the opening of a client."""
