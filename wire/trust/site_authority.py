@@ -189,7 +189,11 @@ def revoke(folder: Path, name: str) -> Member:
             raise KeysError(f"{name}: its certificate is revoked already")
         revoked = msgspec.structs.replace(member, revoked=True)
         _write_list(folder, _with(known, revoked), ca_key)
-        (folder / f"{name}.key").unlink(missing_ok=True)
+        key = folder / f"{name}.key"
+        try:
+            key.unlink(missing_ok=True)
+        except OSError as error:
+            raise KeysError(f"{name}: is revoked, but {key} cannot be removed: {error.strerror}; remove it") from None
     return revoked
 
 
@@ -216,6 +220,7 @@ def _with(known: MemberList, member: Member) -> MemberList:
 def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurvePrivateKey]:
     """Return the members, and certificate and private key of the authority."""
     from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives.asymmetric import ec
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
@@ -224,7 +229,7 @@ def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurv
         raise KeysError(f"{path}: is missing; certificates are issued and revoked where the site was made")
     try:
         key = load_pem_private_key(path.read_bytes(), None)
-    except (ValueError, TypeError, OSError) as error:
+    except (ValueError, TypeError, OSError, UnsupportedAlgorithm) as error:
         raise KeysError(f"{path}: cannot be read: {printable(str(error), 80)}") from None
     require_private(path)
     ca = x509.load_pem_x509_certificate((folder / CA).read_bytes())

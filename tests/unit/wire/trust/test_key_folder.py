@@ -3,6 +3,8 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime, timedelta
@@ -131,6 +133,56 @@ def rsa_key(path: Path) -> None:
     path.write_bytes(generate_private_key(65537, 2048).private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
 
 
+def sm2_key(path: Path) -> None:
+    """Put a private key of a curve that cryptography does not know in a file: that of SM2, from `openssl genpkey`."""
+    path.write_text(
+        "-----BEGIN PRIVATE KEY-----\n"
+        "MIGHAgEAMBMGByqGSM49AgEGCCqBHM9VAYItBG0wawIBAQQg/3D/O65oYKmkwjwf\n"
+        "DayI/cDeq3twsIksx/fn5SFkkBuhRANCAAQiNKeI5gvYtQIqSY80QBMy2ZX03HyX\n"
+        "r+NozswR9d85/AeofVu+TO1bz5l0vYB8dRMpp8c0mpI/Iprq5fTWKW1I\n"
+        "-----END PRIVATE KEY-----\n",
+        encoding="ascii",
+    )
+
+
+def rsa_authority(path: Path) -> None:
+    """Put the certificate of an authority with another kind of key in a file."""
+    from cryptography import x509
+    from cryptography.hazmat.primitives.asymmetric.rsa import generate_private_key
+    from cryptography.hazmat.primitives.hashes import SHA256
+    from cryptography.hazmat.primitives.serialization import Encoding
+
+    key, name = generate_private_key(65537, 2048), x509.Name([])
+    builder = x509.CertificateBuilder(name, name, key.public_key(), 1, NOW, NOW + timedelta(days=1))
+    path.write_bytes(builder.sign(key, SHA256()).public_bytes(Encoding.PEM))
+
+
+@pytest.mark.parametrize("optimised", [(), ("-O",)])
+def test_an_authority_of_another_kind_is_refused_also_without_asserts(lab: Path, optimised: tuple[str, ...]) -> None:
+    """`python -O` leaves asserts out, so none of them may be what refuses a file."""
+    rsa_authority(lab / "ca.pem")
+    command = [sys.executable, *optimised, "-m", "gridpeers", "keys", "show", "--keys", str(lab)]
+
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+
+    refused = (
+        f"gridpeers: {lab}/members.json: is not signed by ca.pem beside it; copy both from the same site, unchanged"
+    )
+    assert (ended.returncode, ended.stderr.splitlines()) == (2, [refused])
+
+
+def test_a_key_that_cannot_be_removed_keeps_nobody_from_being_revoked(lab: Path) -> None:
+    """The line says that the certificate is revoked, and what is left to do."""
+    (lab / "inv1.key").unlink()
+    (lab / "inv1.key").mkdir()
+
+    with pytest.raises(KeysError, match=r"inv1: is revoked, but .*inv1\.key cannot be removed: .*; remove it$"):
+        revoke(lab, "inv1")
+    member = read_list(lab).of("inv1")
+    assert member is not None
+    assert member.revoked
+
+
 @pytest.mark.parametrize(
     ("change", "pattern"),
     [
@@ -140,6 +192,10 @@ def rsa_key(path: Path) -> None:
         (
             lambda lab: of_another_site(lab, "ca.key"),
             r"ca\.key: is not the key of ca\.pem beside it; copy both from the",
+        ),
+        (
+            lambda lab: sm2_key(lab / "ca.key"),
+            r"ca\.key: cannot be read: Curve 1\.2\.156\.10197\.1\.301 is not supported",
         ),
         (lambda lab: rsa_key(lab / "ca.key"), r"ca\.key: is not the key of ca\.pem beside it; copy both from the"),
     ],
