@@ -27,6 +27,9 @@ SCENARIO, SEED = "scenario.toml", "seed.txt"
 ASKED, RUNS = "runs_asked.txt", 100
 """File with the number of runs that a campaign was asked for, and that number if nobody says one."""
 
+GREATEST_SEED = 10**9
+"""Greatest seed of a campaign: times `SEEDS` of its runs it stays a seed that a scenario may have."""
+
 TABLE, FAILURES = "chaos.csv", "failures"
 
 COLUMNS = (
@@ -128,7 +131,8 @@ class ChaosFolder:
 
 def asked_of(folder: Path) -> tuple[int | None, int | None]:
     """Return the seed with which a campaign was begun, and its number of runs; None where the folder does not say."""
-    return _number(folder / SEED), _number(folder / ASKED)
+    runs = _number(folder / ASKED)
+    return _number(folder / SEED), runs if runs is not None and runs > 0 else None
 
 
 def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: int) -> dict[int, ChaosRow]:
@@ -146,7 +150,7 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
     Raises
     ------
     FolderError
-        If it is no folder of a campaign, or of one with another scenario, another seed or more runs.
+        If it is no folder of a campaign, or of one with another scenario, another seed or more runs, or is damaged.
     """
     where = f"--resume {folder}"
     try:
@@ -160,8 +164,15 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
         ) from None
     if text != base.text:
         raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to be disturbed; begin a new folder")
+    if not 0 <= theirs <= GREATEST_SEED:
+        raise FolderError(
+            f"{where}: its {SEED} is damaged, no campaign has that seed (0 to {GREATEST_SEED}); write the one it was "
+            "begun with, or begin a new folder"
+        )
     if theirs != seed:
         raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
+    if rows and min(rows) < 0:
+        raise FolderError(f"{shown(folder / JOURNAL)}: there is no run {min(rows)} in any campaign; remove its line")
     if rows and (last := max(rows)) >= runs:
         raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
     here = {SAME_IN_PROCESSES} if driver == "processes" else set()

@@ -433,13 +433,16 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
         (("--resume", "old", "--runs", "1"), "--resume old: it has run 1 already; give --runs 2 or more"),
         (("--resume", "other"), "--resume other: its scenario.toml is not the scenario and case to be disturbed"),
         (("--resume", "bad"), "bad/runs.jsonl:1: this line is damaged ("),
+        (("--resume", "before"), "before/runs.jsonl: there is no run -1 in any campaign; remove its line"),
+        (("--resume", "below"), "--resume below: its seed.txt is damaged, no campaign has that seed (0 to 1000000000)"),
+        (("--resume", "shut"), "--resume shut: Is a directory; a campaign goes on where its folder can be written"),
         (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
     ],
 )
 def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[str, ...], why: str) -> None:
     """One line says what does not fit, before anything is run, and the folder stays as it is."""
     base = base_in(_small(elsewhere))
-    for name in ("old", "other", "bad"):
+    for name in ("old", "other", "bad", "before", "below", "shut"):
         (elsewhere / name).mkdir()
         folder = ChaosFolder(elsewhere / name, base, 3, "")
         folder.add(ChaosRow(number=0, schedule=()))
@@ -447,6 +450,9 @@ def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[st
     (elsewhere / "other" / "scenario.toml").write_text("", encoding="utf-8")
     journal = elsewhere / "bad" / "runs.jsonl"
     journal.write_text(journal.read_text(encoding="utf-8").replace('"number":0', '"number":"many"'), encoding="utf-8")
+    ChaosFolder(elsewhere / "before", base, 3, "").add(ChaosRow(number=-1, schedule=()))
+    (elsewhere / "below" / "seed.txt").write_text("-3\n", encoding="ascii")
+    (elsewhere / "shut" / LOCK).mkdir()
     before = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
 
     code, text = invoke("chaos", "small.toml", "--seed", "3", *options)

@@ -96,6 +96,10 @@ def chaos(
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except OSError as error:
+        if resume is not None:
+            fail(
+                [f"--resume {resume}: {error.strerror}; a campaign goes on where its folder can be written"], BAD_INPUT
+            )
         fail([f"--out {out or RUNS_FOLDER}: {error.strerror}; give another folder"], BAD_INPUT)
     console = Console()
     with _kept_if_ended(campaign, rows, resume, scenario):
