@@ -9,7 +9,6 @@ import tempfile
 from typing import IO
 
 from scenarios.live.client.run_address import RunAddress, UsageError, check_name
-from scenarios.view.page_actions import address_options
 
 LEAVING = 5.0
 """Time (s) that an agent has to leave by itself."""
@@ -41,7 +40,7 @@ class OwnAgents:
         if name in self._started:
             raise UsageError(f"{name}: its agent was started here already, process {self._started[name][0].pid}")
         log = tempfile.TemporaryFile()  # noqa: SIM115  closed with its process
-        words = ["agent", name, *address_options(self._where)]
+        words = ["agent", name, *self._where.words]
         command = [sys.executable, "-P", "-m", "gridpeers", *words]
         process = subprocess.Popen(
             command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True

@@ -13,7 +13,7 @@ from netem.models.loss import Bernoulli
 from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress, UsageError, check_name
+from scenarios.live.client.run_address import RunAddress, UsageError, check_name
 from scenarios.live.client.run_client import NobodyError, RunClient
 from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
 from scenarios.live.requests.load_request import load_setting
@@ -101,19 +101,12 @@ def command_line(words: list[str], where: RunAddress) -> str:
     >>> command_line(["stop", "inv4"], RunAddress(run="lab", connect=("tcp/10.0.0.1:7447",)))
     'gridpeers stop inv4 --run lab --connect tcp/10.0.0.1:7447'
     """
-    return typed_command(*words, *address_options(where))
+    return typed_command(*words, *where.words)
 
 
 def _exact(value: float) -> str:
     """Return the shortest number that is read back as the same one."""
     return repr(value).removesuffix(".0")
-
-
-def address_options(where: RunAddress) -> list[str]:
-    """Return the options that say which run is meant; those that say the defaults are left out."""
-    run = [] if where.run == RUN else ["--run", where.run]
-    endpoints = [] if where.connect == (ENDPOINT,) else [word for text in where.connect for word in ("--connect", text)]
-    return run + endpoints + where.access.words
 
 
 class ActionClient:

@@ -90,7 +90,7 @@ def _start(
             if wrong := objection(option, text, keys=keys is not None, insecure=insecure):
                 raise UsageError(wrong)
         endpoint = endpoint_for_run(listen, credentials, access)
-        check_alone(run, beyond, credentials)
+        check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
         from scenarios.live.launch.link_log import LinkLog, check_new

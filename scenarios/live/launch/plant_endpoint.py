@@ -5,7 +5,6 @@ from __future__ import annotations
 from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.live.client.access import Access
 from scenarios.live.client.run_address import (
-    ENDPOINT,
     RUN,
     RunAddress,
     UsageError,
@@ -48,9 +47,8 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None, access
         there = runs_at(where, credentials) if error.in_use and accepting((where,)) else []
         if not there:
             raise
-        first = () if (there[0], where) == (RUN, ENDPOINT) else ("--run", there[0], "--connect", where)
-        first = (*first, *(access or Access()).words)
-        status, down = command_line("status", *first), command_line("down", *first)
+        found_by = RunAddress(run=there[0], connect=(where,), access=access or Access()).words
+        status, down = command_line("status", *found_by), command_line("down", *found_by)
         beside = next_port(listen)
         other = loopback_of(beside)
         raise UsageError(
@@ -67,7 +65,9 @@ def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
         return sorted(client.runs)
 
 
-def check_alone(run: str, beyond: tuple[str, ...], credentials: Credentials | None = None) -> None:
+def check_alone(
+    run: str, beyond: tuple[str, ...], credentials: Credentials | None = None, access: Access | None = None
+) -> None:
     """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
 
     Parameters
@@ -78,12 +78,15 @@ def check_alone(run: str, beyond: tuple[str, ...], credentials: Credentials | No
         Endpoints that the plant will connect to; without any, it cannot meet another plant.
     credentials : Credentials or None, optional
         The plant's.
+    access : Access or None, optional
+        The options that gave them, for the command that the error names.
     """
     if not beyond:
         return
-    with RunClient(RunAddress(run=run, connect=beyond, credentials=credentials)) as client:
+    there = RunAddress(run=run, connect=beyond, credentials=credentials, access=access or Access())
+    with RunClient(there) as client:
         if client.until(lambda: client.plant, LOOKING):
             raise UsageError(
                 f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
-                f"({command_line('down', '--run', run, '--connect', beyond[0])}), or give this run another name"
+                f"({command_line('down', *there.words)}), or give this run another name"
             )

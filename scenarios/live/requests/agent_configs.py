@@ -73,7 +73,7 @@ def check_free(client: RunClient, name: str) -> None:
     if name in plant_status(client).agents:
         raise NobodyError(
             f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
-            f"({command_line('stop', name)}), or start the agent of another inverter"
+            f"({command_line('stop', name, *client.where.words)}), or start the agent of another inverter"
         )
 
 
