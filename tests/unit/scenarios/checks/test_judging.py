@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
@@ -27,6 +28,8 @@ from tests.unit.scenarios.checks.cases import ran
 from wire.plugins.plugin import Plugin, plugin_problems
 
 HERE = __name__
+
+PAGE = (Path(__file__).parents[4] / "docs" / "checks.md").read_text(encoding="utf-8")
 
 NAMED = Event()
 """Set when `waits_to_be_named` has been named."""
@@ -263,8 +266,9 @@ def test_all_wrong_checks_come_at_once() -> None:
 
 
 def test_gridpeers_own_checks_are_entries_like_any_other() -> None:
-    """Each has a sentence, and limits that its defaults keep."""
-    for name in ALWAYS:
+    """Each has a sentence, limits that its defaults keep, and its name in docs/checks.md."""
+    for name in CHECKS.own:
+        assert re.search(rf"`(checks = \[\")?{name}(\"\])?`", PAGE), name
         assert plugin_problems(CHECKS, Plugin(use=name)) == []
         assert CHECKS.resolve(name).__doc__
 
