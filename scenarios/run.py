@@ -60,7 +60,7 @@ def _logged(request: Request, progress: Progress) -> RunReport:
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
     try:
-        with file.open("w", encoding="utf-8") as log:
+        with file.open("w", encoding="utf-8", errors="backslashreplace") as log:
             try:
                 return _run(request, progress, log)
             except (BrokenRunError, OutputLostError) as error:
@@ -81,7 +81,7 @@ def _logged(request: Request, progress: Progress) -> RunReport:
 def _log_no_room(file: Path, line: str) -> None:
     """Add a line to a log whose disk is full, if there is room for it; an empty log is not left behind."""
     with contextlib.suppress(OSError):
-        with contextlib.suppress(OSError), file.open("a", encoding="utf-8") as log:
+        with contextlib.suppress(OSError), file.open("a", encoding="utf-8", errors="backslashreplace") as log:
             log.write(line)
         if not file.stat().st_size:
             file.unlink()

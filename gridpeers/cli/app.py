@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import Literal
 
 from wire.driver.leftover import leave
@@ -52,7 +53,18 @@ def _main() -> None:
         except ModuleNotFoundError as error:
             fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
-            fail([too_few_files(error) or str(error)], BROKEN)
+            fail([too_few_files(error) or _without_folder(error) or str(error)], BROKEN)
+
+
+def _without_folder(error: OSError) -> str:
+    """Return what is wrong if the present folder is gone, as a sentence; empty if it is there."""
+    if not isinstance(error, FileNotFoundError) or error.filename is not None:
+        return ""
+    try:
+        Path.cwd()
+    except FileNotFoundError:
+        return "the present folder is gone; change to one that is there (cd), and give the command again"
+    return ""
 
 
 def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:

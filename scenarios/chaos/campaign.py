@@ -23,7 +23,7 @@ from scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
 from scenarios.chaos.schedule_search import BATCH, drawn
 from scenarios.chaos.told_schedule import happening, told
 from scenarios.checks.check_registry import RETURNS, chosen_checks
-from scenarios.results.run_files import refusal, set_broken, set_complete
+from scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
 from scenarios.run_request import Driver
 from scenarios.sweep.workers import on_this_machine
 from wire.counted import counted
@@ -176,7 +176,7 @@ def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Fail
     """Write the table in the order of the runs, and the report."""
     folder.write_table()
     summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
-    (folder.path / "report.txt").write_text("\n".join(summary.lines()) + "\n", encoding="utf-8")
+    write_whole(folder.path / "report.txt", "\n".join(summary.lines()) + "\n")
     return summary
 
 

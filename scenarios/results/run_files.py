@@ -129,7 +129,7 @@ def set_broken(folder: Path, why: str) -> None:
         try:
             set_status(folder, f"broken: {why}")
         except OSError:
-            with (folder / "status.txt").open("r+", encoding="utf-8") as file:
+            with (folder / "status.txt").open("r+", encoding="utf-8", errors="backslashreplace") as file:
                 file.write("broken: " + why.replace("\n", " ") + "\n")
                 file.truncate()
 
@@ -153,13 +153,16 @@ def refusal(folder: Path, error: OSError) -> str:
 
 
 def write_whole(path: Path, content: str | bytes | Iterable[str]) -> None:
-    """Write a file, from its text, pieces of it, or bytes, at once or not at all."""
+    """Write a file, from its text, pieces of it, or bytes, at once or not at all.
+
+    A folder's name may have bytes that are no UTF-8; a text that names it has them as escapes, so that it is UTF-8.
+    """
     partial = path.with_name(path.name + ".partial")
     try:
         if isinstance(content, bytes):
             partial.write_bytes(content)
         else:
-            with partial.open("w", encoding="utf-8", newline="\n") as file:
+            with partial.open("w", encoding="utf-8", errors="backslashreplace", newline="\n") as file:
                 file.writelines([content] if isinstance(content, str) else content)
         partial.replace(path)
     except OSError as error:

@@ -1,6 +1,7 @@
 """Where a run's results go, and that nothing there is overwritten."""
 
 import errno
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import IO, Any
@@ -76,3 +77,14 @@ def test_a_full_disk_leaves_no_part_of_a_file_and_the_status_still_tells(
 
     assert [path.name for path in tmp_path.iterdir()] == ["status.txt"]
     assert (tmp_path / "status.txt").read_text() == "broken: cannot be written\n"
+
+
+def test_a_text_that_names_a_folder_of_any_bytes_is_utf_8(tmp_path: Path) -> None:
+    """Bytes of a name that are no UTF-8 are escapes in what is written, whether the file is new or there."""
+    place = os.fsdecode(b"runs\xff")
+
+    write_whole(tmp_path / "report.txt", f"Results: {place}/")
+    set_broken(tmp_path, f"{place} is gone")
+
+    assert (tmp_path / "report.txt").read_text(encoding="utf-8") == "Results: runs\\udcff/"
+    assert (tmp_path / "status.txt").read_text(encoding="utf-8") == "broken: runs\\udcff is gone\n"
