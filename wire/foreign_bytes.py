@@ -1,4 +1,4 @@
-"""Bytes of others that are to be JSON or msgpack of ours: whatever is wrong with them is one kind of error. Pure."""
+"""Decode JSON or msgpack that another program wrote: whatever is wrong with it is one kind of error. Pure."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    r"""Return what is in bytes, or in a text.
+    r"""Return the value that bytes or a text encode.
 
     Parameters
     ----------
     decode : Callable[[bytes], T]
         `decode` of a decoder of msgspec.
     data : bytes or str
-        What came.
+        The bytes, or the text.
 
     Raises
     ------
     msgspec.DecodeError
-        If it is something else; in one printable line. msgspec itself has other errors for a text that is no UTF-8 and
-        for brackets a thousand deep, and repeats the name of a field that it does not know as it came.
+        If they encode no such value; in one printable line. msgspec itself has other errors for a text that is no UTF-8
+        and for brackets a thousand deep, and repeats the name of a field that it does not know as it came.
 
     Examples
     --------

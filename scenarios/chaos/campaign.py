@@ -20,8 +20,8 @@ from scenarios.chaos.chaos_run import (
 from scenarios.chaos.disturbance import Schedule, counted_kinds
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
+from scenarios.chaos.schedule_report import effective, schedule_lines
 from scenarios.chaos.schedule_search import BATCH, drawn
-from scenarios.chaos.told_schedule import happening, told
 from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
 from scenarios.run_request import Driver
@@ -81,7 +81,7 @@ class Summary:
         """Yield the report."""
         base, rows = self.campaign.base, self.rows.values()
         how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
-        drawn = counted_kinds(happening(base, row.schedule) for row in rows)
+        drawn = counted_kinds(effective(base, row.schedule) for row in rows)
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
         yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
@@ -96,7 +96,7 @@ class Summary:
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for failure in self.failures:
             yield f"{failure.violated}, run {failure.row.number}: {failure.sentence}"
-            yield from (f"    {line}" for line in told(base, failure.simplest.schedule))
+            yield from (f"    {line}" for line in schedule_lines(base, failure.simplest.schedule))
             yield f"    {again(failure.file)}"
 
 

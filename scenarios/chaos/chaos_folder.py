@@ -14,7 +14,7 @@ import msgspec
 from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.numbered_run import seed_of
-from scenarios.chaos.told_schedule import told
+from scenarios.chaos.schedule_report import schedule_lines
 from scenarios.results.run_files import FolderError, shown, write_whole
 from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from scenarios.run_request import Driver
@@ -109,7 +109,7 @@ class ChaosFolder:
             f"{self._command}, run {row.number}, seed of the messages {seed}"
             + (f", shrunk from {len(row.schedule)} disturbances to {len(schedule)}" if fewer else ""),
             f"Once more: {again(file)}",
-            *(f"  {line}" for line in told(self._base, schedule)),
+            *(f"  {line}" for line in schedule_lines(self._base, schedule)),
         ]
         scenario = msgspec.structs.replace(
             self._base.disturbed(schedule, seed, simplest.since_s),

@@ -7,7 +7,7 @@ from math import inf
 
 from netem.models.lie import lie_in_words
 from plant.equipment import Feeder
-from scenarios.schema.absences import Move, why_away
+from scenarios.schema.absences import AgentEvent, why_away
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import inverters_of
 from scenarios.schema.scenario_model import ScenarioModel
@@ -16,7 +16,7 @@ from scenarios.schema.scenario_model import ScenarioModel
 def liar_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
     """Yield a sentence for each agent that lies, with the cases in which it does, and why it cannot if it is away."""
     there = {row.name for row in inverters_of(scenario, feeder) if not row.spare}
-    moves = [Move(event.t_s, event.leave, event.join) for event in scenario.events]
+    events = [AgentEvent(event.t_s, event.leave, event.join) for event in scenario.events]
     cases: dict[str, list[str]] = {}
     for case in scenario.cases:
         for node in netem_of(scenario, case).nodes:
@@ -24,7 +24,7 @@ def liar_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
                 end = "the end" if node.to_s is None else f"{node.to_s:g} s"
                 text = f"{node.name} lies from {node.from_s:g} s to {end}: {lie_in_words(node.lies)}"
                 until = inf if node.to_s is None else node.to_s
-                if why := why_away(node.name, node.from_s, until, moves, at_start=node.name in there):
+                if why := why_away(node.name, node.from_s, until, events, at_start=node.name in there):
                     text += f"; nobody hears it, as {node.name} {why}"
                 cases.setdefault(text, []).append(case)
     for text, of in cases.items():

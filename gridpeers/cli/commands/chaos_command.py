@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scenarios.chaos.chaos_run import ChaosRow
     from scenarios.schema import ScenarioModel
 
-_Begun: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
+_CampaignStart: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
 """Runs that a campaign has already, and a function that returns its folder, made and locked."""
 
 _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
@@ -92,7 +92,9 @@ def chaos(
     runs = runs or first_runs or RUNS
     campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
     try:
-        rows, opened = _new(context, out, campaign) if resume is None else _known(context, resume, campaign)
+        rows, opened = (
+            _new_campaign(context, out, campaign) if resume is None else _resumed_campaign(context, resume, campaign)
+        )
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     except OSError as error:
@@ -118,7 +120,7 @@ def chaos(
     raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
 
 
-def _new(context: typer.Context, out: Path | None, campaign: Campaign) -> _Begun:
+def _new_campaign(context: typer.Context, out: Path | None, campaign: Campaign) -> _CampaignStart:
     """Begin a campaign in a new folder, which is made only once the scenario has passed without disturbances."""
     from datetime import datetime
 
@@ -135,8 +137,8 @@ def _new(context: typer.Context, out: Path | None, campaign: Campaign) -> _Begun
     return {}, opened
 
 
-def _known(context: typer.Context, folder: Path, campaign: Campaign) -> _Begun:
-    """Begin a campaign that goes on in its folder."""
+def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) -> _CampaignStart:
+    """Go on with a campaign in its folder."""
     from scenarios.chaos.chaos_folder import kept_rows
 
     if folder.is_dir():

@@ -42,13 +42,15 @@ class LinkLog:
         Its feeder.
     replay : Path or None
         File of the scenario that replays the run's links: written in any case, and anew with every link command.
-    by_the_way : Path or None
+    replay_if_changed : Path or None
         The same, but only written once there is a link command.
     """
 
-    def __init__(self, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, by_the_way: Path | None) -> None:
+    def __init__(
+        self, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, replay_if_changed: Path | None
+    ) -> None:
         self._scenario, self._feeder = scenario, feeder
-        self._replay, self._by_the_way = replay, by_the_way
+        self._replay, self._replay_if_changed = replay, replay_if_changed
         self._commands: dict[int, Change] = {}
 
     @property
@@ -64,11 +66,11 @@ class LinkLog:
     def close(self, t: float) -> list[str]:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
-        file = self._replay or (self._by_the_way if self._commands else None)
+        file = self._replay or (self._replay_if_changed if self._commands else None)
         return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
 
     def _write_replay(self, t: float) -> None:
-        files = [self._replay, self._by_the_way if self._commands else None]
+        files = [self._replay, self._replay_if_changed if self._commands else None]
         text = to_toml(
             replay_of(self._scenario, self._feeder, self.changes, t),
             {"driver": LIVE, "python": platform.python_version()},

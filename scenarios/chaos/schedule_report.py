@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase, merged_events
-from scenarios.schema.absences import Move, why_away
+from scenarios.schema.absences import AgentEvent, why_away
 from scenarios.schema.participants import inverters_of
 
 
-def told(base: ChaosBase, schedule: Schedule) -> list[str]:
+def schedule_lines(base: ChaosBase, schedule: Schedule) -> list[str]:
     """Return a sentence for each disturbance, in the order of time, with why nothing happens where that is so."""
     lines = []
     for disturbance in sorted(schedule, key=lambda it: it.begins_s):
@@ -21,7 +21,7 @@ def told(base: ChaosBase, schedule: Schedule) -> list[str]:
     return lines
 
 
-def happening(base: ChaosBase, schedule: Schedule) -> Schedule:
+def effective(base: ChaosBase, schedule: Schedule) -> Schedule:
     """Return the disturbances of a schedule without those that only meet an agent that is away."""
     return tuple(it for it in schedule if not _why_idle(base, schedule, it))
 
@@ -32,7 +32,7 @@ def _why_idle(base: ChaosBase, schedule: Schedule, disturbance: Disturbance) -> 
         return ""
     name = str(disturbance.entry["name"])
     events = merged_events(base.tree.get("event", ()), schedule)
-    moves = [Move(float(it["t_s"]), it.get("leave", ()), it.get("join", ())) for it in events]
+    agent_events = [AgentEvent(float(it["t_s"]), it.get("leave", ()), it.get("join", ())) for it in events]
     at_start = any(row.name == name and not row.spare for row in inverters_of(base.scenario, base.feeder))
-    why = why_away(name, disturbance.begins_s, disturbance.ends_s, moves, at_start=at_start)
+    why = why_away(name, disturbance.begins_s, disturbance.ends_s, agent_events, at_start=at_start)
     return f"{name} {why}" if why else ""

@@ -1,4 +1,4 @@
-"""A schedule as it is told: what is planned for an agent that is away does not happen, and is told so."""
+"""The report of a schedule: a disturbance of an agent that is away does not happen, and its line says so."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from scenarios.chaos.campaign import Campaign, Summary
 from scenarios.chaos.chaos_folder import ChaosFolder
 from scenarios.chaos.chaos_run import ChaosRow, run_schedule
 from scenarios.chaos.disturbance import Disturbance, Schedule
-from scenarios.chaos.told_schedule import happening, told
+from scenarios.chaos.schedule_report import effective, schedule_lines
 from tests.chaos.bases import base_in
 from tests.chaos.test_campaign import SMALL
 
@@ -20,7 +20,7 @@ def _lie(name: str, begin: float, end: float) -> Disturbance:
     return Disturbance(table="node", entry={"name": name, "from_s": begin, "to_s": end, "lies": lie})
 
 
-def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_is_told_so(tmp_path: Path) -> None:
+def test_a_lie_of_an_agent_that_has_left_changes_nothing_and_the_report_says_so(tmp_path: Path) -> None:
     """The run has the same bytes without it; report and scenario say why, and it is no lie of the count."""
     (file := tmp_path / "small.toml").write_text(SMALL.format(extra=""), encoding="utf-8")
     base = base_in(file)
@@ -44,5 +44,5 @@ def test_only_who_is_away_all_the_time_does_nothing(tmp_path: Path) -> None:
     schedule: Schedule = (late, idle, AWAY, early, _lie("inv1", 0.3, 0.5))
 
     assert base.is_possible(schedule)
-    assert happening(base, schedule) == tuple(it for it in schedule if it is not idle)
-    assert ["nothing happens" in line for line in told(base, schedule)] == [False, False, False, True, False]
+    assert effective(base, schedule) == tuple(it for it in schedule if it is not idle)
+    assert ["nothing happens" in line for line in schedule_lines(base, schedule)] == [False, False, False, True, False]
