@@ -85,6 +85,10 @@ class RunFolder:
         return new
 
 
+_ODD_BYTE = re.compile("[\udc80-\udcff]")
+"""A byte of a path that is no UTF-8, as Python has it: folders may have such names."""
+
+
 def as_folder(it: Any) -> Path:
     """Return the path of a folder that somebody has named.
 
@@ -93,7 +97,7 @@ def as_folder(it: Any) -> Path:
     FolderError
         If it is no path.
     """
-    if not isinstance(it, str | PathLike) or not str(it) or is_no_path(str(it)):
+    if not isinstance(it, str | PathLike) or not str(it) or is_no_path(_ODD_BYTE.sub("?", str(it))):
         raise FolderError(f"needs the path of a folder, got {it!r:.60}")
     return Path(it)
 

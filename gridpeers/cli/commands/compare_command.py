@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require
+from wire.printable import printable
 
 _Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
 
@@ -52,7 +53,7 @@ def compare(
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
     """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
-    parts, others = first.resolve().parts, second.resolve().parts
+    parts, others = ([printable(part) for part in path.resolve().parts] for path in (first, second))
     if _is_time(parts[-1]) and _is_time(others[-1]) and parts[-2] != others[-2]:
         return parts[-2], others[-2]
     for count in range(1, max(len(parts), len(others)) + 1):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -12,6 +13,7 @@ import gridpeers as gp
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
 from scenarios.schema.configs import configs
+from tests.command_line import invoke
 
 
 @pytest.fixture(scope="module")
@@ -155,3 +157,14 @@ def test_a_file_of_a_run_that_was_spoilt_is_named(run: gp.Result, tmp_path: Path
             with pytest.raises(gp.FolderError, match=f"{name}: cannot be read: .*; run the scenario again"):
                 _ = (opened.history, opened.events, opened.report)
         (folder / name).write_bytes(whole)
+
+
+def test_a_folder_of_any_name_is_read_and_compared(run: gp.Result, tmp_path: Path) -> None:
+    """A name has bytes, and they need not be UTF-8; a table has them as escapes."""
+    folder = tmp_path / os.fsdecode(b"r\xff")
+    run.save(folder)
+
+    assert gp.read(folder).sha256 == run.sha256
+    run.save(tmp_path / "plain")
+    code, text = invoke("compare", str(folder), str(tmp_path / "plain"), "--out", str(tmp_path / "c.svg"))
+    assert (code, "r\\xdcff" in text) == (0, True), text
