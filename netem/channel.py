@@ -101,6 +101,7 @@ class Channel:
             their effect on queue and order is undone.
         """
         self.schedule = schedule
+        self._samplers = {span: sampler for span, sampler in self._samplers.items() if span in schedule.spans}
         self._from, self._to = math.inf, -math.inf
         if rewind and self._before_hold is not None:
             (self._busy_until, self._last), self._before_hold = self._before_hold, None

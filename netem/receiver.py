@@ -12,10 +12,11 @@ from typing import NamedTuple
 from zlib import crc32
 
 from netem.channel import FOREVER, NEVER, Channel
+from netem.fault_schedule import FaultSchedule
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models import INSTANT
 from netem.models.copies import flip
-from netem.schema.change import Change, changed, schedule_of
+from netem.schema.change import Change, Horizon, changed, schedule_of, without_old
 from netem.schema.fault import Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link
@@ -51,13 +52,15 @@ no two are compared further, the message, its delay (s). A plain tuple, as it is
 class _Inbound:
     """One link into this receiver."""
 
-    __slots__ = ("channel", "due", "is_clear", "ledger", "story")
+    __slots__ = ("channel", "due", "forgotten_from", "is_clear", "ledger", "story")
 
     def __init__(self, channel: Channel, *, keep: bool) -> None:
         self.channel, self.is_clear = channel, channel.is_clear
         self.ledger = Ledger(keep=keep)
         self.story = self.due = NEVER
         """Latest arrival so far, as netem has it (s), and as it is (ns)."""
+        self.forgotten_from = FOREVER
+        """When the first of the faults began that are forgotten (s of run time)."""
 
 
 class Receiver:
@@ -89,6 +92,7 @@ class Receiver:
         self._netem, self._microgrids, self._keep = netem, dict(microgrids), keep_trace
         self.changes: list[Change] = []
         """Live changes so far."""
+        self._horizon = Horizon()
         self._links: dict[str, _Inbound] = {}
         self._heap: list[_Waiting] = []
         self._kept: list[_Waiting] = []
@@ -111,7 +115,9 @@ class Receiver:
 
     def was_impaired(self, src: str, t: float) -> bool:
         """Return whether the link from a sender has had a fault by t (s of run time), the present one included."""
-        return any(span.from_s <= t + INSTANT for span in self._link(src).channel.schedule.spans)
+        inbound = self._link(src)
+        begun = (inbound.forgotten_from, *(span.from_s for span in inbound.channel.schedule.spans))
+        return min(begun) <= t + INSTANT
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
         """Judge a message.
@@ -167,24 +173,35 @@ class Receiver:
     def apply(self, change: Change) -> tuple[str, ...]:
         """Change links for messages sent at `change.from_s` (s of run time) or later; kept messages are judged anew.
 
+        Of a link with many faults those that were over long ago are forgotten, unless it has messages that a cut keeps:
+        they may be of that time.
+
         Returns
         -------
         tuple[str, ...]
             Senders so far whose links to this receiver it changes.
         """
         self.changes.append(change)
-        concerned = []
+        over, concerned = self._horizon.after(change), list[str]()
         for src, inbound in self._links.items():
             channel = inbound.channel
             schedule = changed(channel.schedule, change, channel.link, self._microgrids)
             if schedule is not channel.schedule:
                 concerned.append(src)
                 kept = self._take_kept(src, change.from_s)
-                channel.reschedule(schedule, rewind=bool(kept))
+                channel.reschedule(schedule if kept else self._lately(inbound, schedule, over), rewind=bool(kept))
                 inbound.is_clear = channel.is_clear
                 for seq, content, special in kept:
                     self._judge(inbound, src, seq, special.t, special.at, content)
         return tuple(concerned)
+
+    def _lately(self, inbound: _Inbound, schedule: FaultSchedule, over: float) -> FaultSchedule:
+        """Return a schedule, if it has many faults without those that had ended by the time `over` (s)."""
+        left = without_old(schedule, over)
+        if left is not schedule:
+            forgotten = (span.from_s for span in schedule.spans if span.to_s <= over)
+            inbound.forgotten_from = min(inbound.forgotten_from, *forgotten, FOREVER)
+        return left
 
     def _take_kept(self, src: str, t: float) -> list[tuple[int, _Content, _Special]]:
         """Take back the messages that a cut keeps beyond t, to be judged anew: number, message and times."""

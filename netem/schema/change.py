@@ -56,6 +56,32 @@ present change and before the latest one. A change takes effect at its own time,
 order."""
 
 
+class Horizon:
+    """The time before which no link is looked up any more, as live changes come.
+
+    Examples
+    --------
+    >>> horizon = Horizon()
+    >>> [horizon.after(Heal(on="*", from_s=t)) for t in (100.0, 130.0, 120.0)]
+    [-inf, 40.0, 60.0]
+    """
+
+    def __init__(self) -> None:
+        self._latest = -math.inf
+        """Latest time of a change so far (s)."""
+
+    def after(self, change: Change) -> float:
+        """Return it (s of run time) after one more change."""
+        over = min(self._latest, change.from_s) - PAST
+        self._latest = max(self._latest, change.from_s)
+        return over
+
+
+def without_old(schedule: FaultSchedule, over: float) -> FaultSchedule:
+    """Return a schedule without the faults that had ended by the time `over` (s), if it has many."""
+    return schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule
+
+
 class LinkSchedules:
     """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
 
@@ -78,8 +104,7 @@ class LinkSchedules:
 
     def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
         self._netem, self._microgrids = netem, microgrids
-        self._latest = -math.inf
-        """Latest time of a change so far (s)."""
+        self._horizon = Horizon()
 
     @cached_property
     def _schedules(self) -> dict[Link, FaultSchedule]:
@@ -88,11 +113,9 @@ class LinkSchedules:
 
     def apply(self, change: Change) -> None:
         """Take up a change."""
-        over = min(self._latest, change.from_s) - PAST
-        self._latest = max(self._latest, change.from_s)
+        over = self._horizon.after(change)
         for link, before in self._schedules.items():
-            schedule = changed(before, change, link, self._microgrids)
-            self._schedules[link] = schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule
+            self._schedules[link] = without_old(changed(before, change, link, self._microgrids), over)
 
     def of(self, link: Link) -> FaultSchedule:
         """Return the schedule of a link after all changes so far."""

@@ -58,8 +58,9 @@ def data_of(report: LinkReport) -> LinkReportData:
     return data
 
 
-AT_ONCE = 1000
-"""Verdicts in one report: some 25 bytes each, so that a report is far below the longest message."""
+AT_ONCE = 100
+"""Verdicts in one report. Decoded, each has some 350 bytes, and a process of hours keeps the memory that it once needed
+for the largest report."""
 
 
 def report_data(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from itertools import pairwise
 from typing import Any
 
@@ -17,8 +18,8 @@ from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott
 from netem.models.medium import Rate, Slots
 from netem.receiver import Receiver
-from netem.schema.change import Heal
-from netem.schema.fault import Fault
+from netem.schema.change import MOST_SPANS, Heal
+from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition
 from tests.unit.netem.link_messages import MICROGRIDS, T_C, receiver, steady
@@ -277,3 +278,37 @@ def test_until_is_when_the_next_message_is_due() -> None:
     assert all(one <= other for one, other in pairwise(times))
     assert to.counts()["inv1"].delivered == 50
     assert times[0] == pytest.approx(min(times))
+
+
+def test_faults_that_were_over_long_ago_are_forgotten_and_change_no_fate() -> None:
+    """A run of hours has hundreds of commands; a link that had a fault once is still told apart from one without."""
+    lossy = Fault(on="inv1 -> inv2", loss=0.3, delay=0.05, from_s=0.0, to_s=1.0)
+    ahead = [replace(lossy, from_s=10.0 * k, to_s=10.0 * k + 1.0) for k in range(60)]
+    live, planned, known = receiver(), receiver(*ahead), list[int]()
+    fates: list[list[Arrival]] = [[], []]
+    for k in range(600):
+        if k % 10 == 0:
+            live.apply(ahead[k // 10])
+            known.append(sum(type(it) is Span for it in gc.get_objects()))
+        for to, found in zip((live, planned), fates, strict=True):
+            to.offer("inv1", k, float(k), float(k), PAYLOAD)
+            found += to.due(k + 0.5)
+    assert fates[0] == fates[1]
+    assert live.trace_sha256 == planned.trace_sha256
+    assert known[-1] <= known[MOST_SPANS]
+    assert live.was_impaired("inv1", 0.5)
+    assert not receiver().was_impaired("inv1", 0.5)
+
+
+def test_faults_are_remembered_while_a_cut_keeps_a_message_of_their_time() -> None:
+    """Its fate is judged when the cut is healed, by what the link was when it was sent."""
+    live = receiver()
+    live.apply(Fault(on="inv1 -> inv2", cut=Cut(hold=True)))
+    live.apply(Fault(on="inv1 -> inv2", duplicate=Duplicate(p=1.0), from_s=0.0, to_s=1.0))
+    live.offer("inv1", 0, 0.5, 0.5, PAYLOAD)
+    for k in range(40):
+        live.apply(Fault(on="inv1 -> inv2", loss=0.1, from_s=10.0 * k, to_s=10.0 * k + 1.0))
+
+    live.apply(Heal(on="inv1 -> inv2", from_s=500.0, kinds=("cut",)))
+
+    assert len(live.due(600.0)) == 2
