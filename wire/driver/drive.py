@@ -9,6 +9,7 @@ from typing import Protocol
 
 from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from wire.backlog import Loss
+from wire.driver.free_lists import FreeLists
 from wire.driver.log_limit import limit_log
 from wire.driver.session import Session
 
@@ -164,6 +165,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
     take = session.take
     limit = limit_log(log)
     now = monotonic()
+    free_lists = FreeLists(now)
     while True:
         perform(core.take_actions(), session, log)
         if core.finished:
@@ -195,6 +197,7 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
         if core.rejects.has_lines:
             for line in core.rejects.take_lines():
                 log.warning("%s", line)
+        free_lists.tend(now)
 
 
 def _connect(core: Core, session: Session) -> None:

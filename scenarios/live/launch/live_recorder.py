@@ -14,6 +14,7 @@ from scenarios.live.launch.link_log import LinkLog
 from scenarios.live.show.snapshot import line_of
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError
+from wire.driver.free_lists import FreeLists
 from wire.driver.large_blocks import keep_out_of_the_heap
 from wire.messages import LinkRequest, Telemetry
 from wire.rate_limit import RateLimit
@@ -130,9 +131,11 @@ class LiveRecorder:
             recorder.close()
 
     def _follow(self) -> None:
+        free_lists = FreeLists(monotonic())
         while not self.client.ended:
             if self.client.take(None):
                 return
+            free_lists.tend(monotonic())
         self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
     def _take(self, message: Recordable) -> None:
