@@ -1,4 +1,4 @@
-"""What is typed after `gridpeers link`."""
+"""Mistakes in the words of `gridpeers link` are told in one line, before anything is sent."""
 
 from __future__ import annotations
 

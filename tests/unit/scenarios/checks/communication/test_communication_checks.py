@@ -77,7 +77,7 @@ def test_journals_that_come_late_change_no_verdict(check: str, changes: Changes)
 
 
 def test_a_record_of_any_size_is_judged(sound: CheckedCase, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is too much for the memory of a check of one's own is no reason not to judge a run."""
+    """Shipped checks read a record in parts; only its whole content, for a check of one's own, has a limit."""
     monkeypatch.setattr(record_content, "MOST_BYTES", 1000)
     large = replace(sound)
 
