@@ -5,10 +5,11 @@ from __future__ import annotations
 import atexit
 import gc
 import os
-import sys
 import threading
 from collections.abc import Callable
 from time import monotonic
+
+from wire.driver.output import flush_output
 
 GRACE = 1.0
 """Time (s) for such threads to end by themselves."""
@@ -33,6 +34,5 @@ def leave(status: int, tell: Callable[[str], None]) -> None:
     if still := [thread.name for thread in left if thread.is_alive()]:
         tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
         atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once they had ended
-        sys.stdout.flush()
-        sys.stderr.flush()
+        flush_output()
         os._exit(status)

@@ -10,6 +10,8 @@ rich alike. There are two reactions:
 - A plant, an agent or a group of them continues, and its output is dropped. Its output is a log, and others depend on
   it. To leave as on SIGTERM would take an inverter off the network, or end the run for all, because a person
   quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
+
+Laws, metrics and checks of a user run in the process that writes: they cannot close its output.
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -57,7 +59,27 @@ class UnwritableError(OutputLostError):
         return f"standard output cannot be written: {self._why}"
 
 
-class _Watched(io.FileIO):
+class _Unclosed(io.IOBase):
+    """A layer of standard output or error that stays open when anybody closes it, and writes its buffer instead."""
+
+    def close(self) -> None:
+        """Write the buffer."""
+        self.flush()
+
+
+class _Text(_Unclosed, io.TextIOWrapper):
+    """The outermost layer, for text."""
+
+    def detach(self) -> BinaryIO:
+        """Raise `UnsupportedOperation`: without the layers below, nothing could be printed any more."""
+        raise io.UnsupportedOperation("standard output and error stay as they are; write to their .buffer")
+
+
+class _Buffer(_Unclosed, io.BufferedWriter):
+    """The layer between."""
+
+
+class _Watched(_Unclosed, io.FileIO):
     """Standard output or error that detects its loss; from then on, a command's output is dropped.
 
     A process that continues tries again: a disk may have space again, but a reader never comes back.
@@ -105,7 +127,7 @@ def speaking(program: str) -> Iterator[None]:
         try:
             yield
         finally:
-            _flush()  # an error at the interpreter's own flush would print a traceback
+            flush_output()  # an error at the interpreter's own flush would print a traceback
     except UnwritableError as error:
         print(f"{program}: {error}", file=sys.stderr)
         raise
@@ -132,8 +154,8 @@ def watch_readers(*, quits: bool) -> None:
         elif stream is getattr(sys, f"__{name}__"):
             stream.flush()
             watched = _Watched(stream, quits=quits)
-            fresh = io.TextIOWrapper(
-                watched if raw is binary else io.BufferedWriter(watched),
+            fresh = _Text(
+                watched if raw is binary else _Buffer(watched),
                 encoding=stream.encoding,
                 errors=stream.errors,
                 line_buffering=stream.line_buffering,
@@ -142,8 +164,8 @@ def watch_readers(*, quits: bool) -> None:
             setattr(sys, name, fresh)
 
 
-def _flush() -> None:
-    """Write all buffers, while their loss can still be detected."""
+def flush_output() -> None:
+    """Write all buffers, while their loss can still be detected; a stream that is closed or none has none."""
     for stream in (sys.stdout, sys.stderr):
-        if stream is not None:
+        if isinstance(stream, io.TextIOBase) and not stream.closed:
             stream.flush()
