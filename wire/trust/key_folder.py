@@ -22,7 +22,7 @@ from wire.bounds import is_name
 from wire.foreign_bytes import decode_foreign
 from wire.printable import printable
 from wire.trust.credentials import Credentials
-from wire.trust.member import Member, Role
+from wire.trust.member import DATE_AND_TIME, Member, Role
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -111,7 +111,9 @@ def open_credentials(
     ca, own = _certificate(folder / CA), _certificate(certificate)
     ends = _check_certificate(own, ca, certificate, folder, member, now)
     _check_key(key, own)
-    soon = f"the certificate of {member.name} ends on {ends:%Y-%m-%d}; gridpeers keys issue {member.name} renews it"
+    soon = (
+        f"the certificate of {member.name} ends on {ends:{DATE_AND_TIME}}; gridpeers keys issue {member.name} renews it"
+    )
     return Credentials(
         own=member,
         ca=str((folder / CA).absolute()),
@@ -152,6 +154,21 @@ def read_list(folder: Path) -> MemberList:
     if not all(is_name(member.name) for member in signed.list.members):
         raise KeysError(f"{folder / LIST}: has a name that is none; copy it anew from the site")
     return signed.list
+
+
+def own_certificate(folder: Path, member: Member) -> x509.Certificate | None:
+    """Return the certificate of a member if it is in the folder; None if it is not, or is of an earlier generation.
+
+    Raises
+    ------
+    KeysError
+        If the file is no certificate, or cannot be read.
+    """
+    path = folder / f"{member.name}.pem"
+    if not path.exists():
+        return None
+    certificate = _certificate(path)
+    return certificate if _common_name(certificate) == member.common_name else None
 
 
 def require_private(path: Path) -> None:
@@ -213,7 +230,6 @@ def _check_certificate(
 ) -> datetime:
     """Raise KeysError unless a certificate is valid and names the member; return its end."""
     from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
-    from cryptography.x509.oid import NameOID
 
     try:
         own.verify_directly_issued_by(ca)
@@ -221,8 +237,7 @@ def _check_certificate(
         raise KeysError(
             f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
         ) from None
-    named = own.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    common_name = str(named[0].value) if named else ""
+    common_name = _common_name(own)
     if common_name != member.common_name:
         raise KeysError(
             f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
@@ -232,14 +247,22 @@ def _check_certificate(
         begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
         if now > ends:
             renewal = f"gridpeers keys issue {member.name}" if certificate is own else "gridpeers keys init"
-            raise KeysError(f"{what}: expired on {ends:%Y-%m-%d %H:%M} UTC; {renewal} makes a new one")
+            raise KeysError(f"{what}: expired on {ends:{DATE_AND_TIME}}; {renewal} makes a new one")
         if now < begins:
             raise KeysError(
-                f"{what}: is valid from {begins:%Y-%m-%d %H:%M} UTC, and the clock of this host shows "
+                f"{what}: is valid from {begins:{DATE_AND_TIME}}, and the clock of this host shows "
                 f"{now:%Y-%m-%d %H:%M}; set the clock"
             )
     first_end: datetime = min(own.not_valid_after_utc, ca.not_valid_after_utc)
     return first_end
+
+
+def _common_name(certificate: x509.Certificate) -> str:
+    """Return the common name of a certificate; empty if it has none."""
+    from cryptography.x509.oid import NameOID
+
+    named = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(named[0].value) if named else ""
 
 
 def _check_key(path: Path, certificate: x509.Certificate) -> None:

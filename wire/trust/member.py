@@ -17,6 +17,9 @@ Role = Literal["plant", "agent", "operator", "viewer"]
 
 ROLES: tuple[Role, ...] = get_args(Role)
 
+DATE_AND_TIME = "%Y-%m-%d %H:%M UTC"
+"""Form of the time at which a certificate ends: it may live for hours."""
+
 LONGEST_COMMON_NAME = 64
 """Characters of a common name (X.520, ub-common-name)."""
 
@@ -33,7 +36,8 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     revoked: bool = False
     """Whether the certificate of this generation was revoked."""
     expires: str = ""
-    """Day on which the certificate ends, e.g. "2027-11-23"; empty if none was issued."""
+    """When the certificate ends, to the minute, e.g. "2027-11-23 12:00 UTC"; empty if none was issued. Lists of old
+    sites have the day alone."""
 
     @property
     def common_name(self) -> str:

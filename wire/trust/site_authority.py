@@ -18,7 +18,7 @@ import msgspec
 from wire.bounds import is_name
 from wire.printable import printable
 from wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, read_list, require_private
-from wire.trust.member import LONGEST_COMMON_NAME, Member, Role
+from wire.trust.member import DATE_AND_TIME, LONGEST_COMMON_NAME, Member, Role
 
 if TYPE_CHECKING:
     from cryptography import x509
@@ -123,13 +123,13 @@ def issue(
             raise KeysError(problem)
         if now >= ca.not_valid_after_utc:
             raise KeysError(
-                f"{folder / CA}: expired on {ca.not_valid_after_utc:%Y-%m-%d %H:%M} UTC; gridpeers keys init makes a "
+                f"{folder / CA}: expired on {ca.not_valid_after_utc:{DATE_AND_TIME}}; gridpeers keys init makes a "
                 "new site"
             )
         before = known.of(name)
         generation = 1 if before is None else before.generation + before.revoked
         ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
-        member = Member(name=name, role=role, generation=generation, expires=f"{ends:%Y-%m-%d}")
+        member = Member(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
         key = ec.generate_private_key(ec.SECP256R1())
         certificate = _certificate(member.common_name, key, ca_key, ca, now, ends - now)
         _write_key(folder / f"{name}.key", key)

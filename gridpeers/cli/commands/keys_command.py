@@ -93,22 +93,22 @@ def revoke(name: _Name, keys: _Keys = Path()) -> None:
 
 @app.command()
 def show(keys: _Keys = Path()) -> None:
-    """Show the members of a site: role, end of the certificate, whether its key is here.
+    """Show the members of a site: role, whether the certificate is valid, from when to when, whether its key is here.
 
     A private key that others may read is warned of.
 
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
+        from wire.trust.certificate_validity import validity
         from wire.trust.key_folder import CA_KEY, LIST, exposed_keys, read_list
 
-        known = read_list(keys)
+        known, now = read_list(keys), datetime.now(UTC)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            ended = member.expires < f"{datetime.now(UTC):%Y-%m-%d}"
-            state = "revoked" if member.revoked else f"{'expired' if ended else 'until'} {member.expires}"
+            state = validity(keys, member, now)
             here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
         for exposed in exposed_keys(keys):

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import re
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
@@ -41,7 +42,7 @@ def test_a_site_from_its_making_to_a_revoked_member(elsewhere: Path) -> None:
     assert code == 0, shown
     rows = shown.splitlines()
     assert rows[0] == "site lab, members.json is version 6; ca.key is here: certificates are issued in this folder"
-    assert [row.split()[:3] for row in rows[1:3]] == [["agent", "inv1", "until"], ["agent", "inv2", "revoked"]]
+    assert [row.split()[:3] for row in rows[1:3]] == [["agent", "inv1", "valid"], ["agent", "inv2", "revoked"]]
     assert rows[1].endswith(", key here")
 
 
@@ -69,15 +70,39 @@ def test_names_are_all_judged_before_any_certificate_is_issued(elsewhere: Path) 
     assert invoke("keys", "issue", "inv1", "inv1", "--keys", "lab")[1].count("inv1.pem") == 1
 
 
-def test_show_says_which_certificates_have_expired(elsewhere: Path) -> None:
-    """One that ended a day ago has "expired" where others have "until"."""
+def test_show_says_to_the_minute_from_when_to_when_certificates_are_valid(elsewhere: Path) -> None:
+    """One may end within hours, or begin later; where the file is not there, the list tells the end."""
     from wire.trust.site_authority import issue
 
     assert invoke("keys", "init", "lab")[0] == 0
-    issue(Path("lab"), "inv1", days=1.0, now=datetime.now(UTC) - timedelta(days=3))
-    rows = {row.split()[1]: row.split()[2] for row in invoke("keys", "show", "--keys", "lab")[1].splitlines()[1:]}
+    now = datetime.now(UTC)
+    issue(Path("lab"), "inv1", days=1.0, now=now - timedelta(days=3))
+    issue(Path("lab"), "inv2", days=0.25, now=now)
+    issue(Path("lab"), "inv3", days=1.0, now=now + timedelta(days=3))
+    (elsewhere / "lab" / "viewer.pem").unlink()
+    (elsewhere / "lab" / "plant.pem").write_text("no PEM")
+    rows = {row.split()[1]: row.split(maxsplit=2)[2] for row in invoke("keys", "show", "--keys", "lab")[1].splitlines()}
 
-    assert rows == {"inv1": "expired", "operator": "until", "plant": "until", "viewer": "until"}
+    def span(begins: timedelta, ends: timedelta) -> str:
+        issued = now + begins - timedelta(minutes=5)  # clocks of hosts differ
+        return f"{issued:%Y-%m-%d %H:%M} to {now + ends:%Y-%m-%d %H:%M} UTC, key here"
+
+    assert rows["inv1"] == f"expired  {span(timedelta(days=-3), timedelta(days=-2))}"
+    assert rows["inv2"] == f"valid    {span(timedelta(), timedelta(hours=6))}"
+    assert rows["inv3"] == f"not yet  {span(timedelta(days=3), timedelta(days=4))}"
+    assert re.fullmatch(r"valid    until \d{4}-\d\d-\d\d \d\d:\d\d UTC, key here", rows["viewer"])
+    assert rows["plant"].startswith("damaged  lab/plant.pem: is no certificate in PEM")
+
+
+def test_a_list_with_the_day_alone_is_read_as_the_whole_day() -> None:
+    """Lists of sites that were made before have no time: such a certificate counts until the day is over."""
+    from wire.trust.certificate_validity import validity
+    from wire.trust.member import Member
+
+    member, day = Member(name="inv1", role="agent", expires="2027-11-23"), datetime(2027, 11, 23, 18, tzinfo=UTC)
+
+    assert validity(Path("nowhere"), member, day) == "valid    until 2027-11-23"
+    assert validity(Path("nowhere"), member, day + timedelta(days=1)) == "expired  2027-11-23"
 
 
 def test_show_warns_of_every_key_that_others_may_read(elsewhere: Path) -> None:

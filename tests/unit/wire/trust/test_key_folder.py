@@ -216,7 +216,7 @@ def test_an_authority_with_a_wrong_key_issues_and_revokes_nothing(
 
 def test_an_authority_that_has_expired_issues_nothing(lab: Path) -> None:
     """Its certificates would have ended before they began; before, they end with it at the latest."""
-    assert issue(lab, "inv3", days=3650, now=NOW + timedelta(days=300)).expires == "2036-11-20"
+    assert issue(lab, "inv3", days=3650, now=NOW + timedelta(days=300)).expires == "2036-11-20 12:00 UTC"
     with pytest.raises(KeysError, match=r"ca\.pem: expired on 2036-11-20 12:00 UTC; gridpeers keys init makes"):
         issue(lab, "inv3", now=NOW + timedelta(days=3651))
 
@@ -281,7 +281,7 @@ def test_time_decides_whether_a_certificate_counts(lab: Path) -> None:
         lab, now=NOW - timedelta(days=1)
     )
     soon = open_credentials(lab, ("agent",), "inv1", now=NOW + timedelta(days=340))[1]
-    assert soon == "the certificate of inv1 ends on 2027-11-23; gridpeers keys issue inv1 renews it"
+    assert soon == "the certificate of inv1 ends on 2027-11-23 12:00 UTC; gridpeers keys issue inv1 renews it"
 
 
 def test_a_name_and_a_role_that_do_not_fit_are_refused(lab: Path) -> None:
