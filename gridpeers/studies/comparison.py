@@ -12,7 +12,7 @@ import pandas as pd
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.running import read
 from gridpeers.runs.showing import shown_in_notebooks
-from scenarios.results.findings import SHARED
+from scenarios.results.metrics import SHARING_OF_ISLANDS
 from scenarios.schema.scenario_errors import ScenarioError
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.sweep.file.paths import flatten
@@ -144,7 +144,7 @@ def _table(a: Result, b: Result, names: tuple[str, str]) -> pd.DataFrame:
     frame = pd.concat([_column(run) for run in (a, b)], axis=1, keys=names, sort=False)
     frame.index.names = ["window", "metric"]
     both = set(a.islands.index.get_level_values("window")) & set(b.islands.index.get_level_values("window"))
-    frame = frame.loc[[row for row in _in_order(frame.index) if not (row[0] in both and row[1] in SHARED)]]
+    frame = frame.loc[[row for row in _in_order(frame.index) if not (row[0] in both and row[1] in SHARING_OF_ISLANDS)]]
     frame["difference"] = frame[names[1]] - frame[names[0]]
     frame.attrs["units"] = dict(a.metrics.attrs["units"])
     return frame
@@ -156,7 +156,7 @@ def _column(run: Result) -> pd.Series:
     islands = {
         (window, f"{name}{OF_ISLAND}{island}"): row[name]
         for (window, island), row in run.islands.iterrows()
-        for name in SHARED
+        for name in SHARING_OF_ISLANDS
     }
     return pd.concat([whole, pd.Series(islands, dtype=float)]) if islands else whole
 

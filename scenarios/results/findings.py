@@ -22,10 +22,6 @@ SteadyValues = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""
 
 
-SHARED = ("MPSI", "MQSI", "t_restore_s")
-"""Measures that mean nothing over several islands at once."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Findings:
     """The measures of one run."""

@@ -9,7 +9,7 @@ off the network takes no part: each row is measured over those that are present 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,6 +69,13 @@ class Settling:
     """Highest minus lowest frequency (Hz) of a GFM at the end of the window, the largest of all GFM."""
     V_swing_pu: float
     """Highest minus lowest terminal voltage (pu) of an inverter at the end of the window, the largest of all."""
+
+
+SHARING = ("MPSI", "MQSI", "t_restore_s", "t_share_s")
+"""Measures of sharing. They mean nothing over several islands at once, as each island shares for itself."""
+
+SHARING_OF_ISLANDS = tuple(each.name for each in fields(Steady) if each.name in SHARING)
+"""Those of them that each island has instead: its steady values."""
 
 
 def mean_voltage(history: History, nameplates: Nameplates) -> Floats:

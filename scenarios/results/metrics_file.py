@@ -68,7 +68,7 @@ def metrics_json(
     live : Mapping[str, Any], optional
         The table on a live run; see docs/results.md.
     """
-    from scenarios.results.findings import SHARED  # numpy, which a run starts without
+    from scenarios.results.metrics import SHARING_OF_ISLANDS  # numpy, which a run starts without
 
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in findings.results.items():
@@ -77,8 +77,8 @@ def metrics_json(
             cases[case][label]["messages_saved"] = share
         for label, islands in findings.islands.get(case, {}).items():
             whole = cases[case][label]
-            whole |= dict.fromkeys(SHARED)
-            for name in ("MPSI", "MQSI"):
+            whole |= dict.fromkeys(SHARING_OF_ISLANDS)
+            for name in SHARING_OF_ISLANDS:
                 whole.get("reasons", {}).pop(name, None)
             whole["islands"] = {name: _numbers(asdict(values)) for name, values in islands.items()}
         for label, measured in findings.own.get(case, {}).items():

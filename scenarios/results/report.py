@@ -15,8 +15,8 @@ from scenarios.checks.check_verdict import CheckVerdict, summary
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
 from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
-from scenarios.results.findings import SHARED, Findings
-from scenarios.results.metrics import Steady
+from scenarios.results.findings import Findings
+from scenarios.results.metrics import SHARING, Steady
 from scenarios.results.report_table import GAP, Grid, folded
 from scenarios.results.steadiness import STEADY
 
@@ -198,7 +198,8 @@ def _row(
             continue
         values, mixed = steady[event], not island and report.findings.apart(case, event)
         row += [
-            "-" if mixed and name in SHARED else _cell(report, case, event, name, values, island) for name in quantities
+            "-" if mixed and name in SHARING else _cell(report, case, event, name, values, island)
+            for name in quantities
         ]
         if quantities[0] == "f_error_Hz":
             restored = "never" if values.t_restore_s is None else f"{values.t_restore_s:.2f} s"
@@ -234,7 +235,7 @@ def _reasons(report: RunReport, quantities: tuple[Quantity, ...]) -> list[str]:
             parts = {"": whole} | {f", island of {name}": values for name, values in apart.items()}
             for where, values in parts.items():
                 for name in quantities:
-                    if name not in values.reasons or (apart and not where and name in SHARED):
+                    if name not in values.reasons or (apart and not where and name in SHARING):
                         continue
                     mean = getattr(values, name)
                     dust = math.isnan(mean) or _nothing_shared(values, name)

@@ -22,9 +22,10 @@ from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.event_windows import CaseRecord
-from scenarios.results.findings import SHARED, Findings, find
+from scenarios.results.findings import Findings, find
 from scenarios.results.history import History
 from scenarios.results.link_record import LinkRecord
+from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
@@ -128,8 +129,10 @@ def _indexes(found: Findings, case: str, label: str) -> dict[str, Any]:
     islands = found.islands.get(case, {}).get(label, {})
     numbers = asdict(whole) | asdict(found.settled[case][label])
     if islands:
-        numbers |= dict.fromkeys((*SHARED, "t_share_s"))
-        numbers["islands"] = {name: {key: getattr(island, key) for key in SHARED} for name, island in islands.items()}
+        numbers |= dict.fromkeys(SHARING)
+        numbers["islands"] = {
+            name: {key: getattr(island, key) for key in SHARING_OF_ISLANDS} for name, island in islands.items()
+        }
     del numbers["reasons"]
     return numbers | {"steady": float(not any(one.reasons for one in islands.values() or (whole,)))}
 

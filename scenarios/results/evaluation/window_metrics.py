@@ -13,7 +13,7 @@ from plant.equipment import Feeder
 from scenarios.results.evaluation.metric import Measured, make_metrics, measured
 from scenarios.results.event_windows import CaseRecord, Window
 from scenarios.results.history import Flags, Floats, History, Nameplates, read_only
-from scenarios.results.metrics import Settling, Steady, measure, settling
+from scenarios.results.metrics import SHARING, Settling, Steady, measure, settling
 from scenarios.schema import ScenarioModel
 from scenarios.schema.participants import without_agent
 from scenarios.schema.plugin_keys import metrics_of
@@ -98,56 +98,45 @@ class WindowData(History):
         return settling(self, self.nameplates, self.window, self.f_nom)
 
 
-def _built_in(
-    value: Callable[[WindowData], Any], text: str, *, of_sharing: bool = False
-) -> Callable[[WindowData], Any]:
-    """Return a metric of gridpeers with the sentence that `gridpeers doc metrics` prints.
-
-    One of sharing has no value where there are several islands: each shares for itself.
-    """
+def _built_in(value: Callable[[WindowData], Any], text: str) -> Callable[[WindowData], Any]:
+    """Return a metric of gridpeers with the sentence that `gridpeers doc metrics` prints."""
 
     def metric(window: WindowData) -> Any:
-        return None if of_sharing and window.islands else value(window)
+        return value(window)
 
     metric.__doc__ = text
     return metric
 
 
-f_error_Hz = _built_in(
-    lambda window: window.steady.f_error_Hz,
-    "abs(f - f_nom), mean over the grid-forming inverters, at the end of the window (Hz).",
+_STEADY = frozenset(each.name for each in fields(Steady))
+
+
+def _measure(name: str, text: str) -> Callable[[WindowData], Any]:
+    """Return the metric that is a field of `Steady` or of `Settling`; one of sharing is None over several islands."""
+
+    def value(window: WindowData) -> Any:
+        if name in SHARING and window.islands:
+            return None
+        return getattr(window.steady if name in _STEADY else window.settled, name)
+
+    return _built_in(value, text)
+
+
+f_error_Hz = _measure(
+    "f_error_Hz", "abs(f - f_nom), mean over the grid-forming inverters, at the end of the window (Hz)."
 )
-MPSI = _built_in(
-    lambda window: window.steady.MPSI, "Mean power sharing index, (16), at the end of the window.", of_sharing=True
+MPSI = _measure("MPSI", "Mean power sharing index, (16), at the end of the window.")
+V_error = _measure("V_error", "Mean of abs(V - 1) at the end of the window (pu).")
+MQSI = _measure("MQSI", "Mean var sharing index, (17), at the end of the window.")
+t_restore_s = _measure("t_restore_s", "Time until frequency and power sharing are restored for good (s).")
+t_load_s = _measure("t_load_s", "Time until the inverters carry their steady load within 2 % for good (s).")
+p = _measure("p", "Real power of each inverter at the end of the window (pu of its rating).")
+t_f_s = _measure("t_f_s", "Time until the frequency is restored for good (s).")
+t_share_s = _measure("t_share_s", "Time until power is shared equally for good (s).")
+f_swing_Hz = _measure(
+    "f_swing_Hz", "Highest minus lowest frequency of a grid-forming inverter at the end of the window (Hz)."
 )
-V_error = _built_in(lambda window: window.steady.V_error, "Mean of abs(V - 1) at the end of the window (pu).")
-MQSI = _built_in(
-    lambda window: window.steady.MQSI, "Mean var sharing index, (17), at the end of the window.", of_sharing=True
-)
-t_restore_s = _built_in(
-    lambda window: window.steady.t_restore_s,
-    "Time until frequency and power sharing are restored for good (s).",
-    of_sharing=True,
-)
-t_load_s = _built_in(
-    lambda window: window.steady.t_load_s,
-    "Time until the inverters carry their steady load within 2 % for good (s).",
-)
-p = _built_in(
-    lambda window: window.steady.p, "Real power of each inverter at the end of the window (pu of its rating)."
-)
-t_f_s = _built_in(lambda window: window.settled.t_f_s, "Time until the frequency is restored for good (s).")
-t_share_s = _built_in(
-    lambda window: window.settled.t_share_s, "Time until power is shared equally for good (s).", of_sharing=True
-)
-f_swing_Hz = _built_in(
-    lambda window: window.settled.f_swing_Hz,
-    "Highest minus lowest frequency of a grid-forming inverter at the end of the window (Hz).",
-)
-V_swing_pu = _built_in(
-    lambda window: window.settled.V_swing_pu,
-    "Highest minus lowest voltage of an inverter at the end of the window (pu).",
-)
+V_swing_pu = _measure("V_swing_pu", "Highest minus lowest voltage of an inverter at the end of the window (pu).")
 messages_saved = _built_in(
     lambda window: window.messages_saved, "Share of states that the laws did not send to their neighbours."
 )
