@@ -56,10 +56,13 @@ class LiveNetwork:
         self._noted: Complex = circuit.V_branch.astype(complex)
         self._steps_since = False
         """Whether steps were taken since `V_branch` was written."""
-        self.source_voltage = self.reduction.circuit.source_voltage
-        """Phasors of the connected ideal sources (V)."""
         self._excess = 0
         self._parts: IslandParts | None = None
+
+    @property
+    def source_voltage(self) -> Complex:
+        """Phasors of the connected ideal sources (V)."""
+        return self.reduction.circuit.source_voltage
 
     def reduced(self, circuit: Circuit, *, foreseen: bool = False) -> Reduction:
         """Factor a circuit, once; call it ahead of a scheduled event (`foreseen`) to save this work in its step."""
@@ -79,7 +82,6 @@ class LiveNetwork:
         self.V_branch[dead] = 0.0
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
-        self.source_voltage = self.reduction.circuit.source_voltage
 
     def guess(self) -> None:
         """Start the next solution from the last voltages, or from nominal ones where these were almost 0."""
@@ -151,11 +153,6 @@ class LiveNetwork:
         """Go on with all islands at once: a part has failed, and what to do next is decided for all."""
         self._parts = None
         self.net.sparse.increments[:] = 0.0
-
-    def set_source(self, source_voltage: Complex) -> None:
-        """Move the ideal sources to other phasors (V), topology unchanged."""
-        self.source_voltage = source_voltage
-        self._linearise(self._branch_voltages())
 
     def note(self) -> None:
         """Note that the branches have other voltages: `V_branch` has those of the first time it is read."""

@@ -131,15 +131,6 @@ class RecordedDecision:
         wall = self.config.clock == "wall"
         return self.config.T_c if wall else self.config.by_own_clock().T_c
 
-    @property
-    def limits_hit(self) -> tuple[str, ...]:
-        """Limits of the law at which a set-point rests: "P_set_min", "P_set_max", "V_set_min", "V_set_max"."""
-        if self.action != "law":
-            return ()
-        limits, (P_set, V_set) = limits_of(self.config.control), self.after
-        values = {"P_set": (P_set, self.config.P_rated), "V_set": (V_set, self.config.V_nom)}
-        return tuple(name for name in LIMITS if (value := values[name[:5]])[0] == limits[name] * value[1])
-
 
 def limits_of(control: Control) -> dict[str, float]:
     """Return the limits (pu) to which an agent holds what its law decides, by the name of their parameter.

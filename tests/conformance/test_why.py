@@ -106,7 +106,6 @@ def test_a_limit_hit(tmp_path: Path) -> None:
         step = assert_adds_up(explanation)
         assert step.P_set.limits < -1e-6
         assert step.P_set.after == 0.68
-        assert explanation.decision.limits_hit == ("P_set_max",)
     assert "at its upper limit" in str(hit[0])
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
@@ -78,6 +80,11 @@ def at_rest(network: Circuit, parameters: GfmParameters | GflParameters, *, h: f
     dynamics = Dynamics(network, (inverter(parameters, **droops),), h)
     dynamics.start(np.zeros(1), np.zeros(1))
     return dynamics
+
+
+def move_source(dynamics: Dynamics, source: NDArray[np.complex128]) -> None:
+    """Let the stiff bus jump to other phasors (V)."""
+    dynamics.connect(replace(dynamics.network.circuit, source_voltage=source))
 
 
 def pair(first: GfmParameters, second: GfmParameters, load: float) -> Dynamics:

@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from plant.dynamics import Dynamics
 from plant.equipment.inverter_parameters import GflParameters
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, circuit, inverter
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, circuit, inverter, move_source
 
 UNEQUAL = V_B * BALANCED * np.array([1.0, 0.9, 1.05]) * np.exp(1j * np.radians([0.0, 4.0, -3.0]))
 """Unequal phase voltages, B and C off their angles (V)."""
@@ -57,7 +57,7 @@ def test_the_frequency_is_the_mean_of_the_three_plls() -> None:
     """A jump of phase B alone moves the reading by a third of what that PLL sees."""
     dynamics = at_unequal_voltages(replace(GFL_D, mode="balanced_power"))
     moved = UNEQUAL * np.exp(1j * np.array([0.0, 0.1, 0.0]))
-    dynamics.network.set_source(moved)
+    move_source(dynamics, moved)
 
     out = dynamics.run(1)
     k_p, k_i, u_B = 50.0, 900.0, 0.9

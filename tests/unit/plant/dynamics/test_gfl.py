@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from plant.dynamics import Dynamics
 from plant.dynamics.kernel import gfl
 from plant.plant_config import GflParameters
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, on_stiff_bus
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, move_source, on_stiff_bus
 from tests.unit.plant.dynamics.test_gfm import crossing
 
 WATT = replace(GFL_D, frequency_watt=True, T_ff=0.05)
@@ -51,7 +51,7 @@ def test_the_plls_first_answer_to_a_phase_jump(h: float, expected: float) -> Non
 def test_the_pll_after_a_phase_jump() -> None:
     """Row 14: it undershoots to 59.940 Hz a tenth of a second after the jump."""
     plant = on_stiff_bus(GFL_D)
-    plant.network.set_source(V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)))
+    move_source(plant, V_B * BALANCED * np.exp(1j * np.deg2rad(10.0)))
 
     f = plant.run(200)[:, 0, 0]
 
@@ -104,7 +104,7 @@ def test_the_dead_band_jumps() -> None:
 def test_volt_var() -> None:
     """Row 19: 5 % droop gives 0.4 pu of var for -2 %, through the lags of 0.05 and 0.2 s."""
     plant = on_stiff_bus(replace(GFL_D, volt_var=True))
-    plant.network.set_source(0.98 * V_B * BALANCED)
+    move_source(plant, 0.98 * V_B * BALANCED)
 
     q = plant.run(2000)[:, 0, 2] / S_B
 
@@ -145,7 +145,7 @@ def test_the_current_reference_is_clipped() -> None:
     plant = on_stiff_bus(GFL_D)
     plant.inverters.set_points[0, 0] = 0.8
     plant.run(2000)
-    plant.network.set_source(0.5 * V_B * BALANCED)
+    move_source(plant, 0.5 * V_B * BALANCED)
 
     plant.run(3000)
     units = plant.inverters

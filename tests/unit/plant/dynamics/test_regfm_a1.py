@@ -11,7 +11,7 @@ from plant.dynamics import Circuit, Dynamics
 from plant.dynamics.phasors import aligned_sum
 from plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from plant.plant_config import Method
-from tests.unit.plant.dynamics.circuits import BALANCED, S_B, V_B, Z_B, circuit, inverter, pair
+from tests.unit.plant.dynamics.circuits import BALANCED, S_B, V_B, Z_B, circuit, inverter, move_source, pair
 
 DIRECT = replace(REGFM_A1, voltage_control=False)
 METHODS = ("first-order", "second-order")
@@ -146,7 +146,7 @@ def test_a_step_follows_the_poles_of_the_linearised_model() -> None:
 def test_a_sag_draws_no_more_than_the_largest_current(method: Method) -> None:
     """At 0.3 pu it would give 4.7 pu; each phase gives ImaxF = 2 pu at most."""
     dynamics = at_stiff_bus(REGFM_A1, method, 0.002)
-    dynamics.network.set_source(0.3 * V_B * BALANCED)
+    move_source(dynamics, 0.3 * V_B * BALANCED)
 
     dynamics.run(5)
     current = np.abs(dynamics.inverters.I[0]) / (S_B / (3.0 * V_B))
