@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterable, Mapping
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +15,7 @@ import msgspec
 from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.numbered_run import seed_of
+from scenarios.chaos.row_problem import row_problem
 from scenarios.chaos.schedule_report import schedule_lines
 from scenarios.results.run_files import FolderError, shown, write_whole
 from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
@@ -156,12 +158,8 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
     try:
         text = (folder / SCENARIO).read_text(encoding="utf-8")
         theirs = int((folder / SEED).read_text(encoding="ascii"))
-        rows = rows_in(folder, ChaosRow)
     except (OSError, ValueError) as error:
-        why = getattr(error, "strerror", None) or error
-        raise FolderError(
-            f"{where}: no folder of a campaign: {why}; name one with {SCENARIO}, {SEED} and {JOURNAL}"
-        ) from None
+        raise _no_campaign(where, error) from None
     if text != base.text:
         raise FolderError(f"{where}: its {SCENARIO} is not the scenario and case to be disturbed; begin a new folder")
     if not 0 <= theirs <= GREATEST_SEED:
@@ -171,12 +169,20 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
         )
     if theirs != seed:
         raise FolderError(f"{where}: it was begun with --seed {theirs}, not {seed}; give that one")
-    if rows and min(rows) < 0:
-        raise FolderError(f"{shown(folder / JOURNAL)}: there is no run {min(rows)} in any campaign; remove its line")
+    try:
+        rows = rows_in(folder, ChaosRow, partial(row_problem, base))
+    except OSError as error:
+        raise _no_campaign(where, error) from None
     if rows and (last := max(rows)) >= runs:
         raise FolderError(f"{where}: it has run {last} already; give --runs {last + 1} or more")
     here = {SAME_IN_PROCESSES} if driver == "processes" else set()
     return {number: row for number, row in rows.items() if here <= {*row.passed, *row.violated}}
+
+
+def _no_campaign(where: str, error: OSError | ValueError) -> FolderError:
+    """Return the error of a folder that lacks a file of a campaign."""
+    why = getattr(error, "strerror", None) or error
+    return FolderError(f"{where}: no folder of a campaign: {why}; name one with {SCENARIO}, {SEED} and {JOURNAL}")
 
 
 def again(file: Path) -> str:

@@ -5,6 +5,7 @@ A kill can cut the last line off before its line feed: that run counts as not do
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, Protocol, TypeVar
 
@@ -34,7 +35,7 @@ def journal_line(row: JournalRow) -> bytes:
     return msgspec.json.encode(row) + b"\n"
 
 
-def rows_in(folder: Path, kind: type[Row]) -> dict[int, Row]:
+def rows_in(folder: Path, kind: type[Row], problem: Callable[[Row], str]) -> dict[int, Row]:
     """Return the runs in the journal of a folder, by their numbers; of two lines of one run the later one counts.
 
     Parameters
@@ -43,23 +44,25 @@ def rows_in(folder: Path, kind: type[Row]) -> dict[int, Row]:
         Folder of the study.
     kind : type[Row]
         Type of its rows.
+    problem : Callable[[Row], str]
+        Returns why the study has no such run, and what to do: people edit journals. "" of a run that it has.
 
     Raises
     ------
     OSError
         If the journal cannot be read.
     FolderError
-        If a line is damaged.
+        If a line is damaged, or the study has no such run.
     """
     rows, decoder = dict[int, Row](), msgspec.json.Decoder(kind)
     for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):
         try:
             row = decode_foreign(decoder.decode, line)
+            text = problem(row)
         except msgspec.DecodeError as error:
-            where = f"{shown(folder / JOURNAL)}:{place}"
-            raise FolderError(
-                f"{where}: this line is damaged ({error}); remove it, and its run is done again"
-            ) from None
+            text = f"this line is damaged ({error}); remove it, and its run is done again"
+        if text:
+            raise FolderError(f"{shown(folder / JOURNAL)}:{place}: {text}")
         rows[row.number] = row
     return rows
 

@@ -50,16 +50,20 @@ class SweepFolder:
         """Finished runs by number."""
         whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
         try:
-            known = _check(folder, whole)
+            _check(folder, whole)
             folder.mkdir(parents=True, exist_ok=True)
             self._lock = locked(folder, "--out", "sweep")
-            if not known:
-                write_whole(folder / "sweep.toml", plan.text)
-                write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
-                write_whole(folder / MANIFEST, json.dumps(whole, indent=2) + "\n")
-            set_status(folder, "running")
-            self.done = self._kept_rows()
-            self._journal = open_journal(folder)
+            try:
+                if not _check(folder, whole):  # once more: another sweep may have begun there before the lock
+                    write_whole(folder / "sweep.toml", plan.text)
+                    write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
+                    write_whole(folder / MANIFEST, json.dumps(whole, indent=2) + "\n")
+                self.done = self._kept_rows()
+                set_status(folder, "running")
+                self._journal = open_journal(folder)
+            except BaseException:
+                os.close(self._lock)
+                raise
         except OSError as error:
             raise FolderError(
                 f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
@@ -90,10 +94,12 @@ class SweepFolder:
     def _kept_rows(self) -> dict[int, SweepRow]:
         """Return the finished runs in the journal."""
         journal = self.path / JOURNAL
-        found = rows_in(self.path, SweepRow) if journal.exists() else {}
-        if beyond := [number for number in found if not 0 <= number < self._size]:
-            raise FolderError(f"{shown(journal)}: there is no run {beyond[0]} in this sweep; remove its line")
-        return found
+        return rows_in(self.path, SweepRow, self._problem) if journal.exists() else {}
+
+    def _problem(self, row: SweepRow) -> str:
+        """Return why a run is none of this sweep; "" if it is one."""
+        last = self._size - 1
+        return "" if 0 <= row.number <= last else f"this sweep has runs 0 to {last}, none {row.number}; remove the line"
 
 
 def _check(folder: Path, whole: Mapping[str, object]) -> bool:

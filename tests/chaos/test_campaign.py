@@ -26,6 +26,7 @@ from scenarios.chaos.machine_error import MachineError
 from scenarios.chaos.numbered_run import shrink_number
 from scenarios.checks.check_registry import ALWAYS
 from scenarios.results.folder_lock import LOCK, locked
+from scenarios.results.run_journal import journal_line
 from scenarios.run_case import run_case
 from scenarios.schema import load_scenario
 from tests.chaos.bases import base_in, base_named
@@ -433,7 +434,10 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
         (("--resume", "old", "--runs", "1"), "--resume old: it has run 1 already; give --runs 2 or more"),
         (("--resume", "other"), "--resume other: its scenario.toml is not the scenario and case to be disturbed"),
         (("--resume", "bad"), "bad/runs.jsonl:1: this line is damaged ("),
-        (("--resume", "before"), "before/runs.jsonl: there is no run -1 in any campaign; remove its line"),
+        (("--resume", "before"), "before/runs.jsonl:3: there is no run -1 in any campaign; remove this line"),
+        (("--resume", "above"), 'above/runs.jsonl:3: no check is called "../../x": the name of a check has letters,'),
+        (("--resume", "odd"), "odd/runs.jsonl:3: its schedule is none that chaos draws (KeyError: 't_s'); remove this"),
+        (("--resume", "away"), "away/runs.jsonl:3: its schedule is none that chaos draws (ScenarioError: chaos: event"),
         (("--resume", "below"), "--resume below: its seed.txt is damaged, no campaign has that seed (0 to 1000000000)"),
         (("--resume", "shut"), "--resume shut: Is a directory; a campaign goes on where its folder can be written"),
         (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
@@ -442,7 +446,7 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
 def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[str, ...], why: str) -> None:
     """One line says what does not fit, before anything is run, and the folder stays as it is."""
     base = base_in(_small(elsewhere))
-    for name in ("old", "other", "bad", "before", "below", "shut"):
+    for name in ("old", "other", "bad", "before", "above", "odd", "away", "below", "shut"):
         (elsewhere / name).mkdir()
         folder = ChaosFolder(elsewhere / name, base, 3, "")
         folder.add(ChaosRow(number=0, schedule=()))
@@ -450,7 +454,16 @@ def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[st
     (elsewhere / "other" / "scenario.toml").write_text("", encoding="utf-8")
     journal = elsewhere / "bad" / "runs.jsonl"
     journal.write_text(journal.read_text(encoding="utf-8").replace('"number":0', '"number":"many"'), encoding="utf-8")
-    ChaosFolder(elsewhere / "before", base, 3, "").add(ChaosRow(number=-1, schedule=()))
+    timeless = Disturbance(table="event", entry={"leave": ["inv4"]})
+    stranger = Disturbance(table="event", entry={"t_s": 0.5, "leave": ["inv99"]})
+    for name, row in {
+        "before": ChaosRow(number=-1, schedule=()),
+        "above": ChaosRow(number=2, schedule=(), violated={"frequency": "low", "../../x": "low"}),
+        "odd": ChaosRow(number=2, schedule=(timeless,)),
+        "away": ChaosRow(number=2, schedule=(stranger,), violated={"frequency": "low"}),
+    }.items():
+        with (elsewhere / name / "runs.jsonl").open("ab") as lines:
+            lines.write(journal_line(row))
     (elsewhere / "below" / "seed.txt").write_text("-3\n", encoding="ascii")
     (elsewhere / "shut" / LOCK).mkdir()
     before = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
