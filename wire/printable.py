@@ -24,3 +24,14 @@ def printable(text: str, limit: int = 4000) -> str:
     """
     text = _UNPRINTABLE.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
     return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def utf8(text: str) -> str:
+    r"""Return a text for a file: what Python keeps of bytes that are no UTF-8, as in names of files, is spelt out.
+
+    Examples
+    --------
+    >>> utf8(b"no such file: caf\xe9".decode("utf-8", "surrogateescape"))
+    'no such file: caf\\udce9'
+    """
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

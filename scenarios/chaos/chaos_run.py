@@ -26,6 +26,7 @@ from scenarios.run_request import BrokenRunError, Driver, Request
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.sweep.sweep_case import plant_at_start
 from wire.messages import PlantEvent
+from wire.printable import utf8
 
 ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "ends",
@@ -113,7 +114,8 @@ def run_schedule(
         row = compared(row, _once_restored(base, schedule, seed, number, "inprocess", within), SAME_IN_PROCESSES)
     if again:
         row = compared(row, _once_restored(base, schedule, seed, number, driver, within), REPEATS)
-    return msgspec.structs.replace(row, took_s=round(monotonic() - began, 3))
+    violated = {name: utf8(text) for name, text in row.violated.items()}  # an error may name a file by any bytes
+    return msgspec.structs.replace(row, violated=violated, took_s=round(monotonic() - began, 3))
 
 
 def compared(row: ChaosRow, other: ChaosRow, asked: str) -> ChaosRow:

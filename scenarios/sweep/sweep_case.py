@@ -29,6 +29,7 @@ from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
+from wire.printable import utf8
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""
@@ -85,7 +86,7 @@ def run_with_history(number: int, scenario: ScenarioModel, case: str) -> tuple[S
     try:
         return _run(number, scenario, case)
     except Exception as error:
-        text = str(error)
+        text = utf8(str(error))
         known = type(error).__name__ in ("PlantError", "RecordError")
         return SweepRow(number=number, status="broke", why=text if known else f"{type(error).__name__}: {text}"), None
 

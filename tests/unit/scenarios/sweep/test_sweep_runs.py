@@ -27,6 +27,7 @@ from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
 from scenarios.schema.configs import configs
 from scenarios.schema.loading import load_scenario
+from scenarios.sweep import sweep_case
 from scenarios.sweep.file import read_sweep
 from scenarios.sweep.study import Summary, study
 from scenarios.sweep.sweep_case import plant_at_start
@@ -249,6 +250,21 @@ def test_a_folder_of_another_sweep_is_refused_by_name(sweep_file: Write, tmp_pat
     (tmp_path / "other" / "thesis.tex").write_text("")
     with pytest.raises(FolderError, match=r"there are other things in it \(thesis.tex\)"):
         SweepFolder(tmp_path / "other", plan)
+
+
+def test_a_broken_run_whose_error_is_no_utf_8_is_kept(
+    sweep_file: Write, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its bytes are escapes in the journal and in the table."""
+
+    def broken(*words: Any) -> Any:
+        raise RuntimeError(os.fsdecode(b"caf\xe9"))
+
+    monkeypatch.setattr(sweep_case, "_run", broken)
+    summary = done(sweep_file('[grid]\n"gains.k_p" = [0.0005]\n'), tmp_path / "here")
+
+    assert dict(summary.broke) == {r"RuntimeError: caf\udce9": 1}
+    assert pq.read_table(summary.table).to_pydict()["why"] == [r"RuntimeError: caf\udce9"]
 
 
 def test_a_damaged_line_of_the_journal_is_named(sweep_file: Write, tmp_path: Path) -> None:
