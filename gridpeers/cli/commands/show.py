@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Annotated, Literal, get_args
 
 import typer
@@ -32,8 +33,8 @@ def check(
     """Check a scenario file and its feeder for problems.
 
     All problems come at once. A file without any is tried: whether its feeder has an operating point to start from.
-    Notes tell what its events de-energise, which agents lie, and where a graph bears fewer liars than
-    its law should.
+    Notes tell what its events de-energise, which agents lie, where a graph bears fewer liars than
+    its law should, and how to run it if it asks for certificates.
 
     Exit code: 0 it can be run, 2 it has problems.
 
@@ -46,6 +47,7 @@ def check(
     from scenarios.predict.robustness_notes import robustness_notes
     from scenarios.results.file_sizes import file_sizes
     from scenarios.schema.liar_notes import liar_notes
+    from scenarios.schema.security_notes import security_notes
     from scenarios.schema.supply import supply_notes
     from scenarios.start_check import start_problem
 
@@ -53,7 +55,8 @@ def check(
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
-    for note in (*supply_notes(spec, feeder), *liar_notes(spec, feeder), *robustness_notes(spec, feeder)):
+    notes = (supply_notes(spec, feeder), liar_notes(spec, feeder), robustness_notes(spec, feeder))
+    for note in chain(*notes, security_notes(spec, feeder, file)):
         typer.echo(f"NOTE  {note}")
     typer.echo(
         f"{file}: can be run: {counted(len(spec.cases), 'case')} {', '.join(spec.cases)}; "
