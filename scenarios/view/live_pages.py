@@ -13,6 +13,7 @@ import msgspec
 from scenarios.live.client.run_address import RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, command_line
+from scenarios.view.page_rights import looks_only
 from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
@@ -41,6 +42,7 @@ class LivePages:
         self._news: set[asyncio.Event] = set()
         self._worker = ThreadPoolExecutor(1, "actions")
         self._actions = ActionClient(where)
+        self._looks_only = looks_only(where.credentials)
         self._agents = OwnAgents(where)
 
     def begin(self) -> None:
@@ -109,7 +111,7 @@ class LivePages:
             return {"ok": False, "text": f"no action: {error}"}
         command = command_line(action.words(), self._where)
         if not self._control:
-            return {"ok": False, "command": command, "text": "this view only looks; start it with --control"}
+            return {"ok": False, "command": command, "text": f"refused: {self._looks_only}"}
         perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
         if action.verb == "start":
             perform = lambda: self._agents.start(action.subject)  # noqa: E731

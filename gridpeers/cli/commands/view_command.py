@@ -77,9 +77,10 @@ def _live(
     """Yield the pages of a live run, and the line that tells their address."""
     with run_client(run, connect, wait, access, meet_agents=True, acts=control) as client:
         from scenarios.view.live_pages import LivePages
+        from scenarios.view.page_rights import looks_only
         from scenarios.view.run_follower import RunFollower
 
-        rights = "" if control else "; it only looks (--control lets it act)"
+        rights = "" if control else f"; {looks_only(client.where.credentials)}"
         with RunFollower(client) as follower:
             yield (
                 LivePages(follower, client.where, control=control),
