@@ -74,8 +74,15 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     @property
     def kind(self) -> str:
-        """Key of its kind in `KINDS`."""
-        return next(key for key in KINDS if key == self.table or key in self.entry)
+        """Key of its kind in `KINDS`: its table, or the first key of its entry that is one.
+
+        Examples
+        --------
+        >>> both = {"on": "* <-> *", "from_s": 1.0, "to_s": 2.0, "corrupt": 0.1, "duplicate": 0.3}
+        >>> Disturbance(table="link", entry=both).kind
+        'corrupt'
+        """
+        return next(key for key in (self.table, *self.entry) if key in KINDS)
 
     def __str__(self) -> str:
         times = ("t_s", "from_s", "to_s")
