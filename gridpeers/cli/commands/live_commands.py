@@ -131,7 +131,7 @@ def _start(
             if kept.whole is not None and sizes.sentence:
                 say(f"run {run}: {'an hour' if duration is None else f'{duration:g} s'} {sizes.sentence}")
             replay = None if out is None else out / "replay.toml"
-            link_log = LinkLog(spec, feeder, record, replay)
+            link_log = LinkLog(scenario=spec, feeder=feeder, replay=record, replay_if_changed=replay)
             info = live_record(spec, config, everyone, tuple(row.name for row in (*feeder.inverters, *feeder.spares)))
             if agents:
                 found_by = RunAddress(run=run, connect=(endpoint,), access=access).words

@@ -47,7 +47,7 @@ class LinkLog:
     """
 
     def __init__(
-        self, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, replay_if_changed: Path | None
+        self, *, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, replay_if_changed: Path | None
     ) -> None:
         self._scenario, self._feeder = scenario, feeder
         self._replay, self._replay_if_changed = replay, replay_if_changed
