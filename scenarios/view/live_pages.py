@@ -113,7 +113,7 @@ class LivePages:
         if not self._control:
             return {"ok": False, "command": command, "text": f"refused: {self._looks_only}"}
         perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
-        if action.verb == "start":
+        if action.kind == "start":
             perform = lambda: self._agents.start(action.subject)  # noqa: E731
         try:
             return {"ok": True, "command": command, "text": perform(), "scenario": scenario_form(action)}

@@ -21,7 +21,9 @@ from scenarios.live.requests.run_requests import ask
 from wire.bounds import Text
 from wire.driver.command_line import command_line as typed_command
 
-Verb = Literal["open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"]
+ActionKind = Literal[
+    "open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"
+]
 
 FIND = 1.5
 """Longest wait (s) for the plant of a run that the page follows already."""
@@ -30,7 +32,7 @@ FIND = 1.5
 class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A click."""
 
-    verb: Verb
+    kind: ActionKind
     subject: Text = ""
     """The switch, the agent, the load, or one end of the link."""
     other: Text = ""
@@ -54,14 +56,14 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
         Examples
         --------
-        >>> PageAction(verb="cut", subject="inv1", other="inv4").words()
+        >>> PageAction(kind="cut", subject="inv1", other="inv4").words()
         ['link', 'cut', 'inv1', 'inv4']
-        >>> PageAction(verb="load", subject="48", P_kW=300.0, Q_kvar=90.0).words()
+        >>> PageAction(kind="load", subject="48", P_kW=300.0, Q_kvar=90.0).words()
         ['load', '48', '--P', '300', '--Q', '90']
         """
-        match self.verb:
+        match self.kind:
             case "open" | "close":
-                return ["event", self.verb, self.subject]
+                return ["event", self.kind, self.subject]
             case "synchronise":
                 return ["event", "close", self.subject, "--synchronised"]
             case "stop":
@@ -69,19 +71,19 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
             case "start":
                 return ["agent", self.subject]
             case "delay" | "loss":
-                return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.verb}", _exact(self.value)]
+                return ["link", "set", f"{self.subject} <-> {self.other}", f"--{self.kind}", _exact(self.value)]
             case "heal all":
                 return ["link", "heal"]
             case "load":
                 given = {"--factor": self.factor, "--P": self.P_kW, "--Q": self.Q_kvar}
                 options = [(name, _exact(value)) for name, value in given.items() if value is not None]
                 return ["load", self.subject, *chain.from_iterable(options)]
-        return ["link", self.verb, self.subject, self.other]
+        return ["link", self.kind, self.subject, self.other]
 
     def link_command(self) -> LinkCommand:
         """Return what links are told."""
-        on = EVERYTHING if self.verb == "heal all" else f"{self.subject} <-> {self.other}"
-        match self.verb:
+        on = EVERYTHING if self.kind == "heal all" else f"{self.subject} <-> {self.other}"
+        match self.kind:
             case "cut":
                 return LinkCommand(fault=Fault(on=on, cut=Cut()))
             case "delay":
@@ -131,14 +133,14 @@ class ActionClient:
             If it cannot be done.
         """
         client = self._at_the_run()
-        match action.verb:
+        match action.kind:
             case "open" | "close" | "synchronise" | "stop":
-                return ask(client, action.verb, action.subject)
+                return ask(client, action.kind, action.subject)
             case "load":
                 setting = load_setting(action.factor, action.P_kW, action.Q_kvar)
                 return ask(client, "load", action.subject, setting)
         for name in (action.subject, action.other):
-            if action.verb != "heal all":
+            if action.kind != "heal all":
                 check_name("LINKS", name)
         command = action.link_command()
         check_link_command(command, links_of_run(client)[0])

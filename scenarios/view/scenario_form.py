@@ -16,16 +16,16 @@ def scenario_form(action: PageAction) -> str:
 
     Examples
     --------
-    >>> print(scenario_form(PageAction(verb="load", subject="48", factor=1.5)))
+    >>> print(scenario_form(PageAction(kind="load", subject="48", factor=1.5)))
     [[event]]
     load = { 48 = { factor = 1.5 } }
-    >>> print(scenario_form(PageAction(verb="loss", subject="inv1", other="inv4", value=0.25)))
+    >>> print(scenario_form(PageAction(kind="loss", subject="inv1", other="inv4", value=0.25)))
     [[link]]
     on = "inv1 <-> inv4"
     loss = 0.25
     """
     link: dict[str, Any] = {"on": f"{action.subject} <-> {action.other}"}
-    match action.verb:
+    match action.kind:
         case "open":
             return _entry("event", {"open": [action.subject]})
         case "close":
@@ -43,7 +43,7 @@ def scenario_form(action: PageAction) -> str:
         case "cut":
             return _entry("link", link | {"cut": True})
         case "delay" | "loss":
-            return _entry("link", link | {action.verb: action.value})
+            return _entry("link", link | {action.kind: action.value})
     return ""
 
 

@@ -6,7 +6,7 @@ export class LoadDialog {
   // act(action, key): send an action
   constructor(act) {
     this.dialog = $("load-dialog"); this.act = act; this.name = "";
-    const send = values => { this.act({ verb: "load", subject: this.name, ...values }, `load ${this.name}`); this.dialog.close(); };
+    const send = values => { this.act({ kind: "load", subject: this.name, ...values }, `load ${this.name}`); this.dialog.close(); };
     $("load-factor-form").addEventListener("submit", event => { event.preventDefault(); send({ factor: $("load-factor").valueAsNumber }); });
     $("load-power-form").addEventListener("submit", event => { event.preventDefault(); send({ P_kW: $("load-P").valueAsNumber, Q_kvar: $("load-Q").valueAsNumber }); });
     this.dialog.addEventListener("click", event => { if (event.target === this.dialog) this.dialog.close(); });

@@ -208,7 +208,7 @@ function showTip() {
   tip.style.left = `${Math.min(S.tip.x + 14, innerWidth - box.width - 8)}px`; tip.style.top = `${Math.min(S.tip.y + 14, innerHeight - box.height - 8)}px`;
 }
 function tipText(kind, subject) {
-  const does = verb => S.hello?.control || S.hello?.record && verb === "show how it decided" ? `\nclick: ${verb}` : "";
+  const does = deed => S.hello?.control || S.hello?.record && deed === "show how it decided" ? `\nclick: ${deed}` : "";
   if (kind === "switch") return `switch ${subject}: ${S.switches[subject] ?? true ? "closed" : "open"}${does(S.switches[subject] ?? true ? "open it" : "close it")}`;
   if (kind === "load") { const load = loadOf(subject); return load ? `load ${subject}: ${loadWords(load, S.loads[subject])}${does("set it")}` : ""; }
   if (kind === "agent") {
@@ -229,18 +229,18 @@ function click(kind, subject) {
   if (S.hello?.record && kind === "agent") choose(S.chosen === subject ? "" : subject);
   if (!S.hello?.control || S.pending.has(subject)) return;
   if (kind === "load") { loadDialog.open(loadOf(subject), S.loads[subject]); return; }
-  if (kind === "switch") act({ verb: S.switches[subject] ?? true ? "open" : "close", subject }, subject);
-  else if (kind === "agent") act({ verb: S.inverters.get(subject)?.note === "no agent" ? "start" : "stop", subject }, subject);
+  if (kind === "switch") act({ kind: S.switches[subject] ?? true ? "open" : "close", subject }, subject);
+  else if (kind === "agent") act({ kind: S.inverters.get(subject)?.note === "no agent" ? "start" : "stop", subject }, subject);
   else {
     const [a, b] = subject.split("|"), tool = document.querySelector("input[name=tool]:checked").value, hurt = ["cut", "impaired"].includes(S.pairs.get(subject)?.kind);
-    if (tool !== "look") act(tool === "cut" ? { verb: hurt ? "heal" : "cut", subject: a, other: b } : { verb: tool, subject: a, other: b, value: Number($(tool).value) }, subject);
+    if (tool !== "look") act(tool === "cut" ? { kind: hurt ? "heal" : "cut", subject: a, other: b } : { kind: tool, subject: a, other: b, value: Number($(tool).value) }, subject);
   }
 }
 const waiting = [];
-function act(action, key) { S.socket.send(JSON.stringify(action)); waiting.push(key); S.pending.set(key, action.verb); setTimeout(() => { S.pending.delete(key); render(); }, 8000); render(); }
+function act(action, key) { S.socket.send(JSON.stringify(action)); waiting.push(key); S.pending.set(key, action.kind); setTimeout(() => { S.pending.delete(key); render(); }, 8000); render(); }
 function done(result) {
-  const key = result.command ? waiting.shift() : null, verb = S.pending.get(key);
-  if (key && !(result.ok && (verb === "stop" || verb === "start"))) S.pending.delete(key);
+  const key = result.command ? waiting.shift() : null, kind = S.pending.get(key);
+  if (key && !(result.ok && (kind === "stop" || kind === "start"))) S.pending.delete(key);
   const line = document.createElement("li"), text = document.createElement("span");
   if (result.command) { const code = document.createElement("code"); code.textContent = result.command; line.append(code); }
   text.textContent = result.text; line.append(text);
@@ -250,10 +250,10 @@ function done(result) {
   render();
 }
 $("link-form").addEventListener("submit", event => {
-  event.preventDefault(); const verb = event.submitter.value, a = $("link-a").value, b = $("link-b").value;
-  act(verb === "heal all" ? { verb } : { verb, subject: a, other: b, value: Number($(verb)?.value || 0) }, verb === "heal all" ? "heal all" : pairOf(a, b));
+  event.preventDefault(); const kind = event.submitter.value, a = $("link-a").value, b = $("link-b").value;
+  act(kind === "heal all" ? { kind } : { kind, subject: a, other: b, value: Number($(kind)?.value || 0) }, kind === "heal all" ? "heal all" : pairOf(a, b));
 });
-$("switch-form").addEventListener("submit", event => { event.preventDefault(); act({ verb: event.submitter.value, subject: $("switch").value }, $("switch").value); });
+$("switch-form").addEventListener("submit", event => { event.preventDefault(); act({ kind: event.submitter.value, subject: $("switch").value }, $("switch").value); });
 $("load-choice").addEventListener("submit", event => { event.preventDefault(); click("load", $("load").value); });
 
 setInterval(() => { if (performance.now() - S.heard > silence()) render(); }, 250);

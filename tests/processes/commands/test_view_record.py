@@ -128,7 +128,7 @@ def test_a_record_is_seen_at_any_time(desk: Desk, browser: Browser, tmp_path: Pa
     other = page_of(browser, url)
     shows(other, 1.0)
     shows(page, 0.96)
-    assert page.evaluate("""() => { gridpeersView.socket.send('{"verb":"open","subject":"13-152"}'); return 1 }""")
+    assert page.evaluate("""() => { gridpeersView.socket.send('{"kind":"open","subject":"13-152"}'); return 1 }""")
     page.keyboard.press("Home")
     shows(page, 0.0)
     assert errors == []

@@ -104,7 +104,7 @@ def test_a_frozen_plant_and_a_restarted_one_are_told(desk: Desk, browser: Browse
     assert page.evaluate("() => gridpeersView.frame.live.restarts") == 1
 
     assert page.locator("#control").is_hidden()
-    page.evaluate("""() => gridpeersView.socket.send('{"verb":"open","subject":"13-152"}')""")
+    page.evaluate("""() => gridpeersView.socket.send('{"kind":"open","subject":"13-152"}')""")
     page.wait_for_selector("#command-list li.bad :text('only looks')", state="attached")
 
     view.signal(signal.SIGSTOP)

@@ -18,7 +18,7 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
 from scenarios.view.own_agents import OwnAgents
-from scenarios.view.page_actions import ActionClient, PageAction, Verb, command_line
+from scenarios.view.page_actions import ActionClient, ActionKind, PageAction, command_line
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config
 from wire.codec import decode, encode
@@ -95,46 +95,46 @@ def fault(**kinds: float) -> dict[str, Any]:
 
 
 REQUESTS: list[tuple[PageAction, str, dict[str, Any]]] = [
-    (PageAction(verb="open", subject="13-152"), "event open 13-152", {"verb": "open", "argument": "13-152"}),
-    (PageAction(verb="close", subject="13-152"), "event close 13-152", {"verb": "close", "argument": "13-152"}),
+    (PageAction(kind="open", subject="13-152"), "event open 13-152", {"verb": "open", "argument": "13-152"}),
+    (PageAction(kind="close", subject="13-152"), "event close 13-152", {"verb": "close", "argument": "13-152"}),
     (
-        PageAction(verb="synchronise", subject="13-152"),
+        PageAction(kind="synchronise", subject="13-152"),
         "event close 13-152 --synchronised",
         {"verb": "synchronise", "argument": "13-152"},
     ),
-    (PageAction(verb="stop", subject="inv4"), "stop inv4", {"verb": "stop", "argument": "inv4"}),
+    (PageAction(kind="stop", subject="inv4"), "stop inv4", {"verb": "stop", "argument": "inv4"}),
     (
-        PageAction(verb="load", subject="48", factor=1.5),
+        PageAction(kind="load", subject="48", factor=1.5),
         "load 48 --factor 1.5",
         {"verb": "load", "argument": "48", "load": LoadSetting(factor=1.5)},
     ),
     (
-        PageAction(verb="load", subject="48", P_kW=300.0, Q_kvar=-90.5),
+        PageAction(kind="load", subject="48", P_kW=300.0, Q_kvar=-90.5),
         "load 48 --P 300 --Q -90.5",
         {"verb": "load", "argument": "48", "load": LoadSetting(P=3e5, Q=-90_500.0)},
     ),
     (
-        PageAction(verb="cut", subject="inv1", other="inv4"),
+        PageAction(kind="cut", subject="inv1", other="inv4"),
         "link cut inv1 inv4",
         {"verb": "link", "link_command": fault(cut=True)},
     ),
     (
-        PageAction(verb="delay", subject="inv1", other="inv4", value=0.1),
+        PageAction(kind="delay", subject="inv1", other="inv4", value=0.1),
         f"link set {BOTH!r} --delay 0.1",
         {"verb": "link", "link_command": fault(delay=0.1)},
     ),
     (
-        PageAction(verb="loss", subject="inv1", other="inv4", value=0.25),
+        PageAction(kind="loss", subject="inv1", other="inv4", value=0.25),
         f"link set {BOTH!r} --loss 0.25",
         {"verb": "link", "link_command": fault(loss=0.25)},
     ),
     (
-        PageAction(verb="heal", subject="inv1", other="inv4"),
+        PageAction(kind="heal", subject="inv1", other="inv4"),
         "link heal inv1 inv4",
         {"verb": "link", "link_command": {"heal": {"on": BOTH, "from_s": 0.0}}},
     ),
     (
-        PageAction(verb="heal all"),
+        PageAction(kind="heal all"),
         "link heal",
         {"verb": "link", "link_command": {"heal": {"on": EVERYTHING, "from_s": 0.0}}},
     ),
@@ -178,12 +178,12 @@ def test_the_command_that_is_shown_makes_the_same_request(
 
 
 @pytest.mark.parametrize("value", [0.123456789, 1.0 / 3.0, 1e-7])
-@pytest.mark.parametrize("verb", ["delay", "loss"])
+@pytest.mark.parametrize("kind", ["delay", "loss"])
 def test_the_number_that_is_shown_is_the_one_that_is_done(
-    verb: Literal["delay", "loss"], value: float, commands: list[Command]
+    kind: Literal["delay", "loss"], value: float, commands: list[Command]
 ) -> None:
     """It is not rounded: the command that is copied does exactly the same."""
-    action = PageAction(verb=verb, subject="inv1", other="inv4", value=value)
+    action = PageAction(kind=kind, subject="inv1", other="inv4", value=value)
     ActionClient(WHERE).perform(action)
     invoke(*action.words())
 
@@ -210,7 +210,7 @@ def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr(subprocess, "Popen", begin)
     where = RunAddress(run="lab", connect=("tcp/10.0.0.1:7447",))
-    action = PageAction(verb="start", subject="inv4")
+    action = PageAction(kind="start", subject="inv4")
     agents = OwnAgents(where)
     text = agents.start(action.subject)
     agents.close()
@@ -227,9 +227,9 @@ def test_a_name_is_no_option_of_its_command(name: str) -> None:
     """An agent of that name would be help on the terminal, and exit code 0 here."""
     for field in ("subject", "other"):
         with pytest.raises(msgspec.ValidationError, match="is no name of a switch, load, inverter or agent"):
-            msgspec.json.decode(msgspec.json.encode({"verb": "start", field: name}), type=PageAction)
+            msgspec.json.decode(msgspec.json.encode({"kind": "start", field: name}), type=PageAction)
 
 
 def test_every_action_is_here() -> None:
     """An action of the page without a test of its request would be a way to do another one."""
-    assert {action.verb for action, _, _ in REQUESTS} | {"start"} == set(get_args(Verb))
+    assert {action.kind for action, _, _ in REQUESTS} | {"start"} == set(get_args(ActionKind))

@@ -31,13 +31,13 @@ def of_event(scenario: ScenarioModel, key: str) -> Any:
 @pytest.mark.parametrize(
     ("action", "key", "value"),
     [
-        (PageAction(verb="open", subject="13-152"), "open", ("13-152",)),
-        (PageAction(verb="close", subject="18-135"), "close", ("18-135",)),
-        (PageAction(verb="synchronise", subject="18-135"), "synchronised", True),
-        (PageAction(verb="stop", subject="inv4"), "leave", ("inv4",)),
-        (PageAction(verb="start", subject="inv10"), "join", ("inv10",)),
-        (PageAction(verb="load", subject="48", factor=1.5), "load", {"48": LoadChange(factor=1.5)}),
-        (PageAction(verb="load", subject="48", P_kW=300, Q_kvar=-9), "load", {"48": LoadChange(P_kW=300, Q_kvar=-9)}),
+        (PageAction(kind="open", subject="13-152"), "open", ("13-152",)),
+        (PageAction(kind="close", subject="18-135"), "close", ("18-135",)),
+        (PageAction(kind="synchronise", subject="18-135"), "synchronised", True),
+        (PageAction(kind="stop", subject="inv4"), "leave", ("inv4",)),
+        (PageAction(kind="start", subject="inv10"), "join", ("inv10",)),
+        (PageAction(kind="load", subject="48", factor=1.5), "load", {"48": LoadChange(factor=1.5)}),
+        (PageAction(kind="load", subject="48", P_kW=300, Q_kvar=-9), "load", {"48": LoadChange(P_kW=300, Q_kvar=-9)}),
     ],
 )
 def test_an_event_of_the_page_is_one_of_a_scenario(action: PageAction, key: str, value: Any, tmp_path: Path) -> None:
@@ -50,9 +50,9 @@ def test_an_event_of_the_page_is_one_of_a_scenario(action: PageAction, key: str,
 @pytest.mark.parametrize(
     ("action", "kinds"),
     [
-        (PageAction(verb="cut", subject="inv1", other="inv4"), {"cut"}),
-        (PageAction(verb="delay", subject="inv1", other="inv4", value=0.1), {"delay"}),
-        (PageAction(verb="loss", subject="inv1", other="inv4", value=0.25), {"loss"}),
+        (PageAction(kind="cut", subject="inv1", other="inv4"), {"cut"}),
+        (PageAction(kind="delay", subject="inv1", other="inv4", value=0.1), {"delay"}),
+        (PageAction(kind="loss", subject="inv1", other="inv4", value=0.25), {"loss"}),
     ],
 )
 def test_a_fault_of_the_page_is_one_of_a_scenario(action: PageAction, kinds: set[str], tmp_path: Path) -> None:
@@ -66,4 +66,4 @@ def test_a_fault_of_the_page_is_one_of_a_scenario(action: PageAction, kinds: set
 
 def test_what_ends_another_entry_has_none() -> None:
     """To heal a link is the end of the entry that cuts it."""
-    assert scenario_form(PageAction(verb="heal", subject="inv1", other="inv4")) == ""
+    assert scenario_form(PageAction(kind="heal", subject="inv1", other="inv4")) == ""
