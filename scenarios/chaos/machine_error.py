@@ -27,7 +27,7 @@ def _numbers(*codes: int) -> str:
 
 
 _WORDS = {
-    _MEMORY: rf"MemoryError|{_numbers(errno.ENOMEM)}|memory allocation of \d+ bytes failed",
+    _MEMORY: rf"MemoryError|{_numbers(errno.ENOMEM)}|memory allocation of \d+ bytes failed|failed to map segment from",
     _KILLED: "was killed by SIGKILL",
     _PROCESSES: rf"can't start new thread|Zenoh cannot start its threads|{_numbers(errno.EAGAIN)}",
     _FILES: rf"{_numbers(errno.EMFILE, errno.ENFILE)}|may have \d+ files open at once",

@@ -90,6 +90,10 @@ def test_a_lack_in_this_process_is_told(
         ("raise OSError(28, 'No space')", f"{DISK}{{tmp}} (OSError: [Errno 28] No space)"),
         ("raise OSError(24, 'Too many')", f"{FILES} (OSError: [Errno 24] Too many)"),
         ("raise SystemExit('Err(Os { code: 12, kind: OutOfMemory })')", f"{MEMORY} (Err(Os {{{{ code: 12, kind: "),
+        (
+            "raise ImportError('libgfortran.so.5: failed to map segment from shared object')",
+            f"{MEMORY} (ImportError: libgfortran.so.5: failed to map segment from shared object)",
+        ),
         ("raise SystemExit('cannot open: Too many (os error 24)')", f"{FILES} (cannot open: Too many (os error 24))"),
     ],
 )

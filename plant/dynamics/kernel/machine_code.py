@@ -7,6 +7,7 @@ numba; it begins with a hash of its name and the rest, so that half a file is no
 from __future__ import annotations
 
 import ctypes
+import errno
 import os
 from collections.abc import Callable
 from contextlib import suppress
@@ -79,8 +80,7 @@ class MachineCode(NamedTuple):
         RuntimeError
             If it calls what this process does not have.
         """
-        from llvmlite import binding
-
+        binding = _llvm()
         global _linker
         if _linker is None:
             _linker = new_linker()
@@ -98,8 +98,7 @@ def _digest(file: Path, rest: bytes) -> str:
 
 def new_linker() -> Any:
     """Return a linker for this processor."""
-    from llvmlite import binding
-
+    binding = _llvm()
     binding.initialize_native_target()
     binding.initialize_native_asmprinter()
     return binding.create_lljit_compiler(suppress_errors=True)
@@ -107,13 +106,29 @@ def new_linker() -> Any:
 
 def file_name(function: str, types: str) -> str:
     """Return the name of the file for a function, the types of its arguments, this processor, and this numba."""
-    from llvmlite import binding
-
+    binding = _llvm()
     parts = (
         *(function, types, binding.get_process_triple(), binding.get_host_cpu_name()),
         *(binding.get_host_cpu_features().flatten(), metadata.version("numba"), metadata.version("llvmlite")),
     )
     return f"{function.rpartition('.')[2]}-{sha256(repr(parts).encode()).hexdigest()[:24]}{SUFFIX}"
+
+
+def _llvm() -> Any:
+    """Return llvmlite's binding; where the system has no memory for its library, which llvmlite does not say, say so.
+
+    Raises
+    ------
+    OSError
+        With `errno.ENOMEM` there.
+    """
+    try:
+        from llvmlite import binding
+    except OSError as error:
+        if "failed to map segment" in str(error.__context__):  # of the dynamic linker, without a number
+            raise OSError(errno.ENOMEM, os.strerror(errno.ENOMEM), "libllvmlite.so") from error
+        raise
+    return binding
 
 
 def _caller(name: str, function: Any, results: str, alive: Any) -> Callable[[bytes], Any]:

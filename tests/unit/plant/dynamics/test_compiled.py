@@ -171,6 +171,27 @@ def test_where_machine_code_cannot_be_linked_numba_runs_it(folder: Path, monkeyp
     assert Kernel(gather)(outer, -1.0, 2) == gather(outer, -1.0, 2)
 
 
+NO_MEMORY = """
+import resource
+from pathlib import Path
+from plant.dynamics.kernel.machine_code import file_name
+pages = int(Path("/proc/self/statm").read_text().split()[0])
+room = pages * resource.getpagesize() + 2**24
+resource.setrlimit(resource.RLIMIT_AS, (room, room))
+try:
+    file_name("step", "")
+except OSError as error:
+    print(error)
+"""
+
+
+def test_llvmlite_without_memory_is_told_as_such() -> None:
+    """Llvmlite says that its library could not be found or loaded; a campaign would take that for the scenario's."""
+    done = subprocess.run([sys.executable, "-c", NO_MEMORY], capture_output=True, text=True, timeout=60.0)
+
+    assert (done.stdout, done.stderr) == ("[Errno 12] Cannot allocate memory: 'libllvmlite.so'\n", "")
+
+
 def test_a_record_by_itself_goes_to_numba(folder: Path) -> None:
     """What has no words here is called as before."""
     record = np.zeros(1, [("a", "f8"), ("b", "f8")])[0]
