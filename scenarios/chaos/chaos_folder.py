@@ -20,6 +20,7 @@ from scenarios.chaos.schedule_report import schedule_lines
 from scenarios.results.run_files import FolderError, shown, write_whole
 from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from scenarios.run_request import Driver
+from scenarios.schema.relative_folders import with_relative_folders
 from scenarios.schema.scenario_writing import to_toml
 from wire.driver.command_line import command_line
 
@@ -118,6 +119,7 @@ class ChaosFolder:
             name=f"{self._base.scenario.name[:16]}-{violated}"[:31],
             title="",
         )
+        scenario = with_relative_folders(scenario, file.parent)
         write_whole(file, to_toml(scenario, {}, [remark.replace("\n", " ") for remark in remarks], terse=True))
         return file
 

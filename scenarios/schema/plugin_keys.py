@@ -5,7 +5,7 @@ Such a key is a text, or a table with `use` (a law also with `command` or `fmu`)
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_args
 
@@ -89,23 +89,33 @@ def checks_off(scenario: ScenarioModel) -> tuple[str, ...]:
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
     """Return the scenario as any process can follow it: with the folder of everything that stands beside its file."""
+
+    def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
+        named = _labelled(key, registry) if registry in (METRICS, CHECKS) else key
+        return placed(named, registry, folder)
+
+    return with_keys(scenario, change)
+
+
+def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> ScenarioModel:
+    """Return the scenario with a change of every key that names something plugged in, given key and registry."""
     cases = {
         name: replace(
             case,
-            graph=placed(case.graph, GRAPHS, folder),
-            law=placed(case.law, LAWS, folder),
-            netem=_placed_faults(case.netem, folder),
+            graph=change(case.graph, GRAPHS),
+            law=change(case.law, LAWS),
+            netem=_with_faults(case.netem, change),
         )
         for name, case in scenario.cases.items()
     }
     return replace(
         scenario,
-        paper=placed(scenario.paper, BENCHMARKS, folder),
-        law=placed(scenario.law, LAWS, folder),
-        metrics=tuple(placed(_labelled(key, METRICS), METRICS, folder) for key in scenario.metrics),
-        claims=tuple(placed(key, CLAIMS, folder) for key in scenario.claims),
-        checks=tuple(placed(_labelled(key, CHECKS), CHECKS, folder) for key in scenario.checks),
-        netem=_placed_faults(scenario.netem, folder),
+        paper=change(scenario.paper, BENCHMARKS),
+        law=change(scenario.law, LAWS),
+        metrics=tuple(change(key, METRICS) for key in scenario.metrics),
+        claims=tuple(change(key, CLAIMS) for key in scenario.claims),
+        checks=tuple(change(key, CHECKS) for key in scenario.checks),
+        netem=_with_faults(scenario.netem, change),
         cases=cases,
     )
 
@@ -127,11 +137,11 @@ def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
     return table | ({"use": use, "folder": folder_of(use, place)} if ":" in use else {"folder": place})
 
 
-def _placed_faults(netem: Netem, folder: Path) -> Netem:
+def _with_faults(netem: Netem, change: Callable[[PluginKey, Registry[Any]], PluginKey]) -> Netem:
     links = []
     for fault in netem.links:
         keys = ({**dict(it.parameters), "use": it.use, "folder": it.folder} for it in fault.own)
-        links.append(replace(fault, own=tuple(plugin_of(placed(key, FAULTS, folder)) for key in keys)))
+        links.append(replace(fault, own=tuple(plugin_of(change(key, FAULTS)) for key in keys)))
     return replace(netem, links=tuple(links))
 
 

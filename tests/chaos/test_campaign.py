@@ -7,6 +7,7 @@ import errno
 import json
 import os
 import re
+import shutil
 import signal
 import tempfile
 from pathlib import Path
@@ -15,6 +16,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from plant.tables.read import DATA
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.chaos import campaign as campaigns
 from scenarios.chaos import chaos_run, schedule_search
@@ -101,6 +103,30 @@ def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.
     assert f"frequency, run {failure.row.number}: {failure.simplest.violated['frequency']}" in [*summary.lines()]
     assert again == base_in(failure.file).scenario
     assert "frequency" in run_scenario(base_in(failure.file)).violated
+
+
+def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(elsewhere: Path) -> None:
+    """No path of this machine is in its file: in another place it loads what stands beside it there."""
+    study = elsewhere / "here" / "study"
+    shutil.copytree(DATA / "microgrid123", study / "feeder")
+    (study / "breaks.py").write_text(f"{BREAKS}\n\ndef calm(case):\n    yield from ()\n", encoding="utf-8")
+    text = SMALL.format(extra='law = "breaks:Breaks"\nchecks = ["breaks:calm"]')
+    text = text.replace("[plant]\n", '[plant]\nfeeder = "feeder"\n')
+    (study / "small.toml").write_text(text, encoding="utf-8")
+    row = ChaosRow(number=0, schedule=(), violated={"frequency": "60.1 Hz; too high"})
+    base = base_in(study / "small.toml")
+    found = elsewhere / "here" / "found"
+    found.mkdir()
+    file = ChaosFolder(found, base, 8, "gridpeers chaos").write_failure("frequency", row, row)
+
+    kept = [line for line in file.read_text().splitlines() if not line.startswith("#")]
+    assert str(elsewhere) not in "\n".join(kept)
+    shutil.copytree(elsewhere / "here", elsewhere / "there")
+    moved, _ = load_scenario(elsewhere / "there" / file.relative_to(elsewhere / "here"))
+    there = str(elsewhere / "there" / "study")
+    assert moved.law == {"use": "breaks:Breaks", "folder": there}
+    assert {"use": "breaks:calm", "folder": there} in moved.checks
+    assert moved.plant.feeder == f"{there}/feeder"
 
 
 def _rows(folder: Path) -> list[dict[str, str]]:
