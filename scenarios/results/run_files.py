@@ -12,12 +12,17 @@ from pathlib import Path
 RUNS = Path("runs")
 """Parent of the run folders that the user does not name, seen from the working directory."""
 
+STATUS = "status.txt"
+"""File that says how far a folder's run is."""
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a system that takes no more bytes, whatever is done to the file."""
 
 _GONE = (errno.ENOENT, errno.ENOTDIR, errno.ESTALE, errno.EACCES, errno.EPERM)
 """Errors of a folder that was removed, or closed to us, while it was written to."""
+
+
+_NOT_EMPTY = "the folder is not empty; give a new or an empty one"
 
 
 class FolderError(ValueError):
@@ -41,9 +46,10 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
     FolderError
         If the folder has something in it, is a file, or cannot be made. Nothing is written then.
     """
-    folder = empty_folder(out if out is not None else _free(RUNS / scenario, now), "--out", "running")
-    if out is None:
-        _point_latest(folder)
+    if out is not None:
+        return empty_folder(out, "--out", "running")
+    folder = empty_folder(_made(RUNS / scenario, now), "--out", "running")
+    _point_latest(folder)
     return folder
 
 
@@ -77,12 +83,18 @@ def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
     Raises
     ------
     FolderError
-        If there is something in it, it is a file, or it cannot be made or written.
+        If there is something in it, it is a file, or it cannot be made or written. Of two commands that take a folder
+        at the same time for their status, one gets it.
     """
+    where = f"{option} {folder}".strip()
     try:
-        _require_empty(folder, f"{option} {folder}".strip())
+        _require_empty(folder, where)
         folder.mkdir(parents=True, exist_ok=True)
         if status:
+            try:
+                (folder / STATUS).touch(exist_ok=False)
+            except FileExistsError:
+                raise FolderError(f"{where}: {_NOT_EMPTY}") from None
             set_status(folder, status)
     except OSError as error:
         raise FolderError(_unmade(folder, error.strerror, option)) from None
@@ -94,7 +106,7 @@ def _require_empty(folder: Path, where: str) -> None:
     if folder.exists() and not folder.is_dir():
         raise FolderError(f"{where}: this is a file; give a new or an empty folder")
     if folder.is_dir() and any(folder.iterdir()):
-        raise FolderError(f"{where}: the folder is not empty; give a new or an empty one")
+        raise FolderError(f"{where}: {_NOT_EMPTY}")
 
 
 def _unmade(folder: Path, why: str | None, option: str) -> str:
@@ -104,7 +116,7 @@ def _unmade(folder: Path, why: str | None, option: str) -> str:
 
 def set_status(folder: Path, status: str) -> None:
     """Write the one line of status.txt: "running", "complete", "complete: what is missing", or "broken: why"."""
-    write_whole(folder / "status.txt", status.replace("\n", " ") + "\n")
+    write_whole(folder / STATUS, status.replace("\n", " ") + "\n")
 
 
 def set_complete(folder: Path, missing: Iterable[str] = ()) -> None:
@@ -129,7 +141,7 @@ def set_broken(folder: Path, why: str) -> None:
         try:
             set_status(folder, f"broken: {why}")
         except OSError:
-            with (folder / "status.txt").open("r+", encoding="utf-8", errors="backslashreplace") as file:
+            with (folder / STATUS).open("r+", encoding="utf-8", errors="backslashreplace") as file:
                 file.write("broken: " + why.replace("\n", " ") + "\n")
                 file.truncate()
 
@@ -180,12 +192,20 @@ def shown(folder: Path) -> str:
     return str(folder)
 
 
-def _free(parent: Path, now: datetime) -> Path:
+def _made(parent: Path, now: datetime) -> Path:
+    """Make a folder that is named by a time, and return it; a number tells those of one second apart."""
     stem = now.strftime("%Y-%m-%dT%H-%M-%S")
     folder, number = parent / stem, 2
-    while folder.exists():
+    while True:
+        try:
+            folder.mkdir(parents=True)
+            return folder
+        except FileExistsError as error:
+            if not os.path.lexists(folder):  # what is in the way is above it
+                raise FolderError(_unmade(folder, error.strerror, "--out")) from None
+        except OSError as error:
+            raise FolderError(_unmade(folder, error.strerror, "--out")) from None
         folder, number = parent / f"{stem}-{number}", number + 1
-    return folder
 
 
 def _point_latest(folder: Path) -> None:

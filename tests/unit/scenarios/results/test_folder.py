@@ -8,6 +8,7 @@ from typing import IO, Any
 
 import pytest
 
+from scenarios.results import run_files
 from scenarios.results.run_files import FolderError, new_folder, set_broken, set_status, write_whole
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
@@ -38,6 +39,27 @@ def test_a_folder_with_something_in_it_is_refused_and_left_alone(tmp_path: Path)
         new_folder(tmp_path, "islanding", NOW)
 
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_of_two_commands_at_once_one_gets_the_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The other one has seen it empty, too, and is refused before it writes anything."""
+    monkeypatch.setattr(run_files, "_require_empty", lambda *words: None)
+    new_folder(tmp_path, "islanding", NOW)
+    set_status(tmp_path, "complete")
+
+    with pytest.raises(FolderError, match="the folder is not empty; give a new or an empty one"):
+        new_folder(tmp_path, "islanding", NOW)
+
+    assert (tmp_path / "status.txt").read_text() == "complete\n"
+
+
+def test_a_link_to_nowhere_in_the_way_of_the_runs_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No folder can be made below it, whatever its name."""
+    monkeypatch.chdir(tmp_path)
+    Path("runs").symlink_to("nowhere")
+
+    with pytest.raises(FolderError, match="cannot be made or written: File exists; give another folder by --out"):
+        new_folder(None, "islanding", NOW)
 
 
 def test_a_file_is_no_folder(tmp_path: Path) -> None:
