@@ -21,6 +21,7 @@ from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.judging import judge_case
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import live_drawing
+from scenarios.record.record_info import LIVE
 from scenarios.results.evaluation.benchmark_registry import benchmark_of
 from scenarios.results.evaluation.claims import Verdict, judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, windows
@@ -166,7 +167,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         ValueError
             If it was a live run, whose windows people made.
         """
-        if self.driver == "live":
+        if self.driver == LIVE:
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
         return find(self._spec, self._feeder, {case: _case_record(result) for case, result in self.items()})
 
@@ -184,7 +185,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         recorded = {case: _plant_events(result) for case, result in cases.items()}
         *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
         events = recorded[case]
-        if self.driver == "live":
+        if self.driver == LIVE:
             departures = compare(spec, self._feeder, events, float(last.record.t[-1]))
             return live_drawing(departures, spec, self._feeder, last.record, events)
         histories = {case: result.record for case, result in cases.items()}

@@ -19,7 +19,7 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
+from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, with_recorder
 from scenarios.drivers.telemetry_stream import Recordable
 from wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
@@ -110,7 +110,7 @@ def run_processes(
     if plant_config.credentials is not None:
         own["listen"] = ("tls/127.0.0.1:0",)
     configs = [replace(config, **own) for config in agents.values()]
-    plant_config = replace(plant_config, listen=(endpoint,), recorders=(RECORDER,), star=star)
+    plant_config = replace(with_recorder(plant_config), listen=(endpoint,), star=star)
     first = [name for name in agents if name in plant_config.agents]
     order = list(start_order) if start_order is not None else [PLANT, *first]
     if sorted(order) != sorted([PLANT, *first]):

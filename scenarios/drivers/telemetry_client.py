@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import monotonic
 
+from msgspec.structs import replace
+
+from plant.plant_config import PlantConfig
 from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
@@ -15,8 +18,25 @@ from wire.trust.credentials import Credentials
 RECORDER = "history"
 """Name of a driver's recorder in its run."""
 
+RECORDER_WAIT = 1.0
+"""Least wait (s) of the plant of a live run that is recorded: without its recorder the first row would be missing."""
+
 LOOK = 0.5
 """Longest wait (s) between two checks for missing messages."""
+
+
+def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
+    """Return a plant with the recorder of its driver.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant.
+    waits : bool, optional
+        Whether it waits for the recorder even if it waits for no agent, as in a live run that is recorded.
+    """
+    wait = max(RECORDER_WAIT, config.wait_for_agents) if waits else config.wait_for_agents
+    return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
 
 class TelemetryClient:

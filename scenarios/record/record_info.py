@@ -25,6 +25,10 @@ METADATA = "gridpeers"
 """Name of the metadata record with the `RecordInfo`."""
 
 
+LIVE: Literal["live"] = "live"
+"""The driver of a live run, as files name it."""
+
+
 class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The run of a record, as it was configured."""
 

@@ -11,8 +11,8 @@ from msgspec.structs import replace
 
 from plant.build import start_plant
 from scenarios.drivers.inprocess import run_inprocess
-from scenarios.live.launch.live_folders import LIVE
 from scenarios.live.numbers.live_report import write_report
+from scenarios.record.record_info import LIVE
 from scenarios.record.record_reader import RunRecord
 from scenarios.replay.changed_scenario import unwritten
 from scenarios.replay.changes import ChangedRule

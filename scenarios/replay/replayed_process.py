@@ -15,10 +15,9 @@ from agents.realtime.realtime_agent import RealtimeAgent
 from plant.plant_config import PlantConfig
 from plant.plant_interface import LivePlant
 from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers.telemetry_client import RECORDER
+from scenarios.drivers.telemetry_client import with_recorder
 from scenarios.emulation.emulated_links import links_of
-from scenarios.live.launch.live_processes import RECORDER_WAIT
-from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_info import LIVE, RecordInfo
 from scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
 from scenarios.replay.replay_error import ReplayError
 from wire.backlog import Loss
@@ -205,9 +204,7 @@ def plant_again(recorded: RecordedProcess, info: RecordInfo, plant: LivePlant, l
 
 def as_run(info: RecordInfo, epoch: int) -> PlantConfig:
     """Return the configuration of the plant as its driver has completed it: it waits for its recorder too."""
-    wait = info.plant.wait_for_agents
-    wait = max(RECORDER_WAIT, wait) if info.driver == "live" else wait
-    return replace(info.plant, epoch=epoch, record="physics", recorders=(RECORDER,), wait_for_agents=wait)
+    return replace(with_recorder(info.plant, waits=info.driver == LIVE), epoch=epoch, record="physics")
 
 
 def recorded_links(info: RecordInfo, name: str) -> Links | None:

@@ -94,10 +94,11 @@ def _start(
     spec, feeder = load(scenario)
     with usage_errors():
         from scenarios.live.launch.link_log import LinkLog, check_new
-        from scenarios.live.launch.live_folders import LIVE, folders, live_record
+        from scenarios.live.launch.live_folders import folders, live_record
         from scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
         from scenarios.live.launch.live_processes import all_here, plant_here, say
         from scenarios.live.numbers.live_report import conclude
+        from scenarios.record.record_info import LIVE
         from scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from scenarios.results.metrics_file import RunMetrics
 

@@ -13,6 +13,7 @@ from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.judged_time import require_longer
 from scenarios.emulation.emulation_config import EmulationConfig
+from scenarios.record.record_info import LIVE
 from wire.messages import PlantEvent
 from wire.schema.plausible import Plausible, Unit
 
@@ -40,7 +41,7 @@ class LastWords:
         for agent in found.agents:
             sent = found.sent.get(agent)
             epochs = sent.epochs if sent else {}
-            if not epochs and agent not in joining and found.info.driver != "live":
+            if not epochs and agent not in joining and found.info.driver != LIVE:
                 yield Violation(text="never sends a state", agent=agent, t=0.0)
             for _, last in epochs.values():
                 if last >= end - self.silent_s or self._explained(case, agent, last, killed):

@@ -15,7 +15,7 @@ from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.client.run_address import UsageError
-from scenarios.live.launch.live_folders import LIVE
+from scenarios.record.record_info import LIVE
 from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of

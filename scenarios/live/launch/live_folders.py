@@ -8,21 +8,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
 
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.live.launch.ended_scenario import ended_scenario
-from scenarios.record.record_info import RecordInfo
+from scenarios.record.record_info import LIVE, RecordInfo
 from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
 from scenarios.schema import ScenarioModel
 from scenarios.schema.scenario_writing import to_toml
 from scenarios.versions import versions
-
-LIVE: Literal["live"] = "live"
-"""The driver of a live run, as files name it."""
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from plant.realtime.pacer import sentence
 from plant.start_words import COMPILING, READY
 from scenarios.drivers.children import Child
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import RECORDER
+from scenarios.drivers.telemetry_client import with_recorder
 from scenarios.drivers.warm_servers import release
 from scenarios.emulation.emulated_links import links_of
 from scenarios.live.client.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
@@ -38,9 +38,6 @@ from wire.printable import printable
 
 LOGGED = ("roster", "warning")
 """Kinds of events that a plant in this process also writes to its log."""
-
-RECORDER_WAIT = 1.0
-"""Least wait (s) of a plant that is recorded: without its recorder the first row would be missing."""
 
 CHECK = 0.25
 """Time (s) between two checks for process faults that are due."""
@@ -101,7 +98,7 @@ def plant_here(
     """
     requests = stop_at_signals(StoppedError)
     _log()
-    config = _recorded(config, folder)
+    config = with_recorder(config, waits=folder is not None)
 
     def on_word(word: str) -> None:
         if word == COMPILING:  # the plant's log reports the rest
@@ -152,7 +149,7 @@ def all_here(
         The run, for its record.
     """
     requests = stop_at_signals(StoppedError)
-    config = _recorded(config, folder)
+    config = with_recorder(config, waits=folder is not None)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
     over = threading.Event()
 
@@ -270,12 +267,6 @@ def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
         say("the run ended before it began")
     else:
         say(f"ended at t = {recorder.client.t:.2f} s; {sentence(pacing, config.T_c / config.speed)}")
-
-
-def _recorded(config: PlantConfig, folder: Path | None) -> PlantConfig:
-    """Return the plant with its recorder, for which it waits a moment even if it waits for no agent."""
-    wait = config.wait_for_agents if folder is None else max(RECORDER_WAIT, config.wait_for_agents)
-    return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
 
 def _signal_of(stop: BaseException) -> str:
