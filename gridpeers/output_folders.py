@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +13,7 @@ from plant.tables.read import DATA, feeders
 from scenarios.results.run_files import (
     RUNS,
     FolderError,
+    empty_folder,
     new_folder,
     refusal,
     set_broken,
@@ -40,16 +43,33 @@ __all__ = [
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[None]:
-    """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was."""
+    """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was.
+
+    Raises
+    ------
+    FolderError
+        If there is something in it, it is a file, it cannot be made or written, or another command fills it.
+    """
     there = folder.exists()
+    handle = os.open(empty_folder(folder), os.O_RDONLY | os.O_CLOEXEC)
     try:
-        yield
-    except BaseException:  # an interruption, too
-        for path in folder.iterdir() if folder.is_dir() else ():
-            shutil.rmtree(path) if path.is_dir() else path.unlink()
-        if folder.is_dir() and not there:
-            folder.rmdir()
-        raise
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise FolderError(f"{folder}: another command is writing in it; give another folder") from None
+        empty_folder(folder)  # another command may have filled it before the lock
+        try:
+            yield
+        except BaseException as error:  # an interruption, too
+            for path in folder.iterdir() if folder.is_dir() else ():
+                shutil.rmtree(path) if path.is_dir() else path.unlink()
+            if folder.is_dir() and not there:
+                folder.rmdir()
+            if isinstance(error, OSError):
+                raise FolderError(refusal(folder, error)) from None
+            raise
+    finally:
+        os.close(handle)
 
 
 def feeder_folder(name: str) -> Path:

@@ -56,19 +56,16 @@ def import_(
 
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
-    from gridpeers.output_folders import whole_folder
+    from gridpeers.output_folders import FolderError, shown, whole_folder
     from plant.tables import feeders
-    from scenarios.results.run_files import refusal, shown
 
     feeder = read_script(str(file), switch or [], leave_out or [])
     folder = out or Path(folder_of(feeder.name))
     try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            fail([f"{folder}: is there already; name a new folder with --out"], BAD_INPUT)
         with whole_folder(folder):
             save_readable(feeder, folder)
-    except OSError as error:
-        fail([refusal(folder, error)], BAD_INPUT)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
     _describe(feeder)
     for note in feeder.notes[:SHOWN]:
         typer.echo(f"NOTE  {note}")

@@ -65,10 +65,9 @@ def grow(
     Example:  gridpeers feeder grow microgrid123 --copies 11 --joint 450 --switch 13-152 --out hundred
     """
     from gridpeers.feeder import Feeder
-    from gridpeers.output_folders import whole_folder
+    from gridpeers.output_folders import FolderError, shown, whole_folder
     from plant.equipment.joined_copies import copy_name, joined_copies
     from plant.tables import FeederError
-    from scenarios.results.run_files import refusal, shown
     from wire.schema.suggestion import suggestion
 
     try:
@@ -92,12 +91,10 @@ def grow(
         switches=", ".join(f'"{name}"' for name in of_copies),
     )
     try:
-        if out.exists() and (not out.is_dir() or any(out.iterdir())):
-            fail([f"{out}: is there already; name a new or an empty folder"], BAD_INPUT)
         with whole_folder(out):
             grown.save(out / grown.name)
             (out / "islanding.toml").write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail([refusal(out, error)], BAD_INPUT)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
     size = f"{counted(len(grown.buses), 'bus', 'buses')}, {counted(len(grown.inverters), 'inverter')}"
     typer.echo(f"{size}: {shown(out / 'islanding.toml')}")

@@ -100,14 +100,10 @@ def init(
     """
     import shlex
 
-    from gridpeers.output_folders import whole_folder
-    from scenarios.results.run_files import refusal, shown
+    from gridpeers.output_folders import FolderError, shown, whole_folder
     from wire.driver.command_line import command_line
 
     try:
-        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            kind = "the folder is not empty" if folder.is_dir() else "this is a file"
-            fail([f"{folder}: {kind}; give a new or an empty folder"], BAD_INPUT)
         if feeder is None:
             if switch or leave_out or inverters:
                 fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
@@ -119,8 +115,8 @@ def init(
             with whole_folder(folder):
                 _propose(folder, feeder, switch or [], leave_out or [], inverters)
             following = command_line("run", "islanding.toml", "--driver", "inprocess", within=folder)
-    except OSError as error:
-        fail([refusal(folder, error)], BAD_INPUT)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
     for file in sorted(path.name for path in folder.iterdir()):
         typer.echo(f"{shown(folder / file)}")
     typer.echo(f"Next:  cd {shlex.quote(str(folder))} && {following}")

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
+from gridpeers.output_folders import whole_folder
 from tests.command_line import invoke
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
@@ -32,6 +33,16 @@ def test_a_new_project_runs_and_its_test_passes(elsewhere: Path) -> None:
     assert tested() == 1
 
 
+def test_a_folder_that_another_command_fills_is_left_to_it(elsewhere: Path) -> None:
+    """One that ends early empties its folder: what the other has written must not go with it."""
+    with whole_folder(elsewhere / "study"):
+        code, text = invoke("init", "study")
+        (elsewhere / "study" / "notes.txt").write_text("of the other")
+
+    assert (code, text) == (2, "gridpeers: study: another command is writing in it; give another folder\n")
+    assert [path.name for path in (elsewhere / "study").iterdir()] == ["notes.txt"]
+
+
 def test_a_folder_with_something_in_it_is_left_alone(elsewhere: Path) -> None:
     """Nothing of the user's is written over."""
     (elsewhere / "notes.txt").write_text("mine")
@@ -39,5 +50,5 @@ def test_a_folder_with_something_in_it_is_left_alone(elsewhere: Path) -> None:
     code, text = invoke("init", ".")
 
     assert code == 2
-    assert text == "gridpeers: .: the folder is not empty; give a new or an empty folder\n"
+    assert text == "gridpeers: .: the folder is not empty; give a new or an empty one\n"
     assert [path.name for path in elsewhere.iterdir()] == ["notes.txt"]
