@@ -17,7 +17,7 @@ from scenarios.chaos.machine_error import MachineError
 from scenarios.drivers.children import Child
 from scenarios.run_request import BrokenRunError
 from tests.chaos.bases import base_in
-from tests.chaos.test_campaign import SMALL
+from tests.chaos.small_campaign import SMALL
 from tests.command_line import invoke
 
 pytestmark = pytest.mark.usefixtures("elsewhere")

@@ -10,7 +10,7 @@ from scenarios.chaos.chaos_run import ChaosRow, run_schedule
 from scenarios.chaos.disturbance import Disturbance, Schedule
 from scenarios.chaos.schedule_report import effective, schedule_lines
 from tests.chaos.bases import base_in
-from tests.chaos.test_campaign import SMALL
+from tests.chaos.small_campaign import SMALL
 
 AWAY = Disturbance(table="event", entry={"t_s": 0.3, "leave": ["inv4"]}, back={"t_s": 0.6, "join": ["inv4"]})
 

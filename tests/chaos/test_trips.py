@@ -18,7 +18,7 @@ from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.schema import load_scenario
 from scenarios.schema.scenario_model import ScenarioModel
 from tests.chaos.bases import base_in, base_named
-from tests.chaos.test_campaign import SMALL
+from tests.chaos.small_campaign import SMALL
 from wire.messages import PlantEvent
 
 TRIPS = """[protection]

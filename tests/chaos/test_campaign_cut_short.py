@@ -1,0 +1,215 @@
+"""Campaigns that cannot go on: interrupted, or without what they need of the machine."""
+
+from __future__ import annotations
+
+import errno
+import signal
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from scenarios.chaos import campaign as campaigns
+from scenarios.chaos import chaos_run
+from scenarios.chaos.campaign import Campaign, run_campaign
+from scenarios.chaos.chaos_folder import ChaosFolder
+from scenarios.chaos.chaos_run import run_scenario
+from scenarios.chaos.machine_error import MachineError
+from scenarios.chaos.numbered_run import shrink_number
+from scenarios.run_case import run_case
+from tests.chaos.bases import base_in
+from tests.chaos.small_campaign import rows_of, small
+from tests.command_line import invoke
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+class FullDisk:
+    """Runs of cases, of which the machine has no room for the later ones.
+
+    Parameters
+    ----------
+    whole : int
+        Number of runs that it has room for.
+    error : OSError
+        What it says then.
+    """
+
+    def __init__(self, whole: int, error: OSError) -> None:
+        self.whole, self._error, self.asked = whole, error, 0
+
+    def __call__(self, *words: Any) -> Any:
+        """Run a case, or raise the error."""
+        self.asked += 1
+        if self.asked > self.whole:
+            raise self._error
+        return run_case(*words)
+
+
+NO_SPACE = OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_ctrl_c_keeps_what_there_is(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupted campaign has its runs so far, says how many, and ends with 130."""
+    small(elsewhere)
+    whole = campaigns.run_number
+
+    def interrupted(text: str, seed: int, number: int, *rest: Any) -> Any:
+        if number == 2:
+            raise KeyboardInterrupt
+        return whole(text, seed, number, *rest)
+
+    monkeypatch.setattr(campaigns, "run_number", interrupted)
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--jobs", "1", "--out", "out")
+
+    assert code == 130
+    assert "interrupted; 2 of 9 runs are kept in out/; go on with: gridpeers chaos small.toml --case IV " in text
+    assert text.endswith(" --resume out\n")
+    assert len(rows_of(elsewhere / "out")) == 2
+    assert "2 of 9 runs" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
+    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: interrupted")
+
+
+def test_a_signal_in_the_first_run_is_told(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As later ones: what is kept, and the exit code of the signal."""
+
+    def ended(*words: Any) -> Any:
+        signal.raise_signal(signal.SIGTERM)
+
+    small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", ended)
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--out", "out")
+
+    assert code == 143
+    assert "interrupted; 0 of 9 runs are kept and no folder was made" in text
+
+
+def test_workers_that_are_ended_leave_no_folder(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Theirs are in one of the campaign, which goes with it; those of other campaigns stay."""
+    base = base_in(small(elsewhere))
+    (tmp := elsewhere / "tmp").mkdir()
+    (others := tmp / "gridpeers-chaos-others").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp))
+
+    def killed(text: str, seed: int, number: int, schedule: Any, driver: str, within: Path) -> Any:
+        (within / "gridpeers-chaos-of-worker").mkdir()
+        assert within.parent == tmp
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(campaigns, "run_number", killed)
+    folder = ChaosFolder(elsewhere, base, 8, "")
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda what, done, of: None)
+
+    assert [*tmp.iterdir()] == [others]
+
+
+def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command tells the first error, though later files cannot be written either."""
+
+    def full(folder: ChaosFolder, *rest: Any) -> None:
+        if len(rest) == 1:
+            folder.rows[rest[0].number] = replace(rest[0], violated={"frequency": "too low"})
+        if folder.rows:
+            raise OSError(errno.ENOSPC, "No space left on device", str(folder.path / "chaos.csv"))
+
+    small(elsewhere)
+    for method in ("add", "write_table", "write_failure"):
+        monkeypatch.setattr(ChaosFolder, method, full)
+    code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert "chaos.csv: cannot be written: No space left on device" in text
+    status = (elsewhere / "out" / "status.txt").read_text(encoding="utf-8")
+    assert status.startswith("broken: ")
+    assert "No space left on device after 1 of 2 runs" in status
+
+
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (NO_SPACE, "cannot be written in {tmp} (No space left on device); make room there"),
+        (OSError(errno.EFBIG, "File too large"), "cannot be written in {tmp} (File too large); make room there"),
+        (OSError(errno.EMFILE, "Too many open files"), "too many files are open: this process may have "),
+    ],
+)
+def test_what_the_machine_lacks_is_no_failure_of_the_scenario(
+    error: OSError, told: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The campaign ends with 3, says what and where, keeps its runs, shrinks nothing, leaves no temporary folder."""
+    small(elsewhere)
+    (tmp := elsewhere / "tmp").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp))
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(3, error))
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--seed", "3", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert told.format(tmp=tmp) in text
+    assert "2 of 9 runs are kept in out/" in text
+    assert full.asked == 4
+    assert [row["status"] for row in rows_of(elsewhere / "out")] == ["passed", "passed"]
+    assert not (elsewhere / "out" / "failures").exists()
+    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: ")
+    assert [*tmp.iterdir()] == []
+
+
+def test_without_room_for_the_first_run_the_scenario_is_not_blamed(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 3, the disk, and no folder."""
+    small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", FullDisk(0, NO_SPACE))
+    code, text = invoke("chaos", "small.toml", "--runs", "9", "--out", "out")
+
+    assert code == 3
+    assert f"cannot be written in {tempfile.gettempdir()} (No space left on device)" in text
+    assert "0 of 9 runs are kept and no folder was made" in text
+    assert "violated" not in text
+    assert not (elsewhere / "out").exists()
+
+
+def test_a_run_whose_record_ends_early_is_not_judged(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A disk that is nearly full ends the record first: checks of messages would find less, and pass."""
+
+    def cut_off(*words: Any) -> Any:
+        recorded, outcome = run_case(*words)
+        return replace(recorded, record_failure="the record run.mcap ends at 0.50 s: its disk is full"), outcome
+
+    base = base_in(small(elsewhere))
+    monkeypatch.setattr(chaos_run, "run_case", cut_off)
+
+    with pytest.raises(MachineError, match=r"the record run.mcap ends at 0.50 s: its disk is full"):
+        run_scenario(base)
+
+
+def test_without_room_nothing_is_shrunk(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine without room ends the shrinking of a failure, and does not count as the failure."""
+    base = base_in(small(elsewhere))
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
+
+    with pytest.raises(MachineError, match="No space left on device"):
+        shrink_number(base.text, 8, 3, "frequency", "inprocess")
+    assert full.asked == 1
+
+
+@pytest.mark.parametrize(
+    ("out", "said"),
+    [
+        ("small.toml", "--out small.toml: this is a file; give a new or an empty folder"),
+        ("/dev/null", "--out /dev/null: this is a file; give a new or an empty folder"),
+        ("small.toml/new/one", "small.toml/new/one: cannot be made or written: Not a directory; give another folder"),
+        (".", "--out .: the folder is not empty; give a new or an empty one"),
+    ],
+)
+def test_a_folder_that_cannot_be_used_is_refused_before_the_first_run(
+    out: str, said: str, elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Exit code 2, and no run is done for nothing."""
+    small(elsewhere)
+    monkeypatch.setattr(chaos_run, "run_case", full := FullDisk(0, NO_SPACE))
+    code, text = invoke("chaos", "small.toml", "--out", out)
+
+    assert (code, said in " ".join(text.split())) == (2, True), text
+    assert full.asked == 0

@@ -1,0 +1,150 @@
+"""Campaigns that go on: what they kept is taken up, and what does not fit is refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from scenarios.chaos import campaign as campaigns
+from scenarios.chaos import chaos_run
+from scenarios.chaos.campaign import Campaign, run_campaign
+from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
+from scenarios.chaos.chaos_run import ChaosRow
+from scenarios.chaos.disturbance import Disturbance
+from scenarios.results.folder_lock import LOCK, locked
+from scenarios.results.run_journal import journal_line
+from scenarios.run_request import BrokenRunError
+from tests.chaos.bases import base_in
+from tests.chaos.small_campaign import rows_of, small
+from tests.command_line import invoke
+
+pytestmark = pytest.mark.usefixtures("elsewhere")
+
+
+def test_an_interrupted_campaign_goes_on(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With --resume alone it does what is missing of the runs asked for, and the table is that of one go."""
+    small(elsewhere)
+    words = ("chaos", "small.toml", "--seed", "3", "--jobs", "1")
+    invoke(*words, "--runs", "4", "--out", "whole")
+    invoke(*words, "--runs", "2", "--out", "part")
+    (elsewhere / "part" / "runs_asked.txt").write_text("4\n", encoding="ascii")  # as if it had been ended after two
+    done: list[int] = []
+    run_number = campaigns.run_number
+
+    def counted(text: str, seed: int, number: int, *rest: Any) -> Any:
+        done.append(number)
+        return run_number(text, seed, number, *rest)
+
+    monkeypatch.setattr(campaigns, "run_number", counted)
+    code, text = invoke("chaos", "small.toml", "--jobs", "1", "--resume", "part")
+
+    whole, part = ([{**row, "took_s": ""} for row in rows_of(elsewhere / name)] for name in ("whole", "part"))
+    assert done == [2, 3]
+    assert part == whole
+    assert (code, text.endswith("\n\nResults: part/\n")) == (0, True)
+    assert (elsewhere / "part" / "status.txt").read_text(encoding="utf-8") == "complete\n"
+
+
+def test_all_that_a_campaign_had_is_there_when_it_goes_on(elsewhere: Path) -> None:
+    """Also what runs violated, and the later result of one done twice; half a line, of a kill -9, is left out."""
+    folder = ChaosFolder(elsewhere, base_in(small(elsewhere)), 3, "")
+    cut = Disturbance(table="link", entry={"on": "inv1 <-> inv4", "from_s": 0.4, "to_s": 0.7, "cut": True})
+    folder.add(ChaosRow(number=0, schedule=()))
+    folder.add(ChaosRow(number=0, schedule=(), passed=("ends", "repeats")))
+    folder.add(ChaosRow(number=1, schedule=(cut,), violated={"frequency": "60.1 Hz; too high"}, since_s=0.1 + 0.2))
+    folder.add(ChaosRow(number=2, schedule=(), collapse="no control prevents it"))
+    journal = elsewhere / "runs.jsonl"
+    journal.write_text(journal.read_text(encoding="utf-8") + '{"number":3', encoding="utf-8")
+
+    base = base_in(elsewhere / "small.toml")
+    assert kept_rows(elsewhere, base, 3, "inprocess", 9) == folder.rows
+    assert len(folder.rows) == 3
+    assert kept_rows(elsewhere, base, 3, "processes", 9) == {}, "none of them was done with processes"
+
+
+def test_an_error_that_is_no_utf_8_is_kept(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its bytes are escapes in the journal, the table and the report, and the campaign goes on with it."""
+
+    def broken(*words: Any) -> Any:
+        raise BrokenRunError(os.fsdecode(b"case IV: caf\xe9 ended"))
+
+    base = base_in(small(elsewhere))
+    monkeypatch.setattr(chaos_run, "run_case", broken)
+    row = chaos_run.run_schedule(base, (), 3000000)
+    (elsewhere / "out").mkdir()
+    folder = ChaosFolder(elsewhere / "out", base, 3, "gridpeers chaos small", {0: row}, 1)
+    folder.add(row)
+    run_campaign(Campaign(base=base, seed=3, runs=1), folder, lambda what, done, of: None)
+
+    assert kept_rows(elsewhere / "out", base, 3, "inprocess", 1) == folder.rows
+    assert rows_of(elsewhere / "out")[0]["why"] == r"case IV: caf\udce9 ended"
+    assert r"ends, run 0: case IV: caf\udce9 ended" in (elsewhere / "out" / "report.txt").read_text(encoding="utf-8")
+
+
+def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
+    """While one is at work there, another is refused before it runs anything."""
+    base = base_in(small(elsewhere))
+    (elsewhere / "old").mkdir()
+    ChaosFolder(elsewhere / "old", base, 3, "").add(ChaosRow(number=0, schedule=()))
+    handle = locked(elsewhere / "old", "--out", "chaos")
+    try:
+        code, text = invoke("chaos", "small.toml", "--seed", "3", "--resume", "old")
+    finally:
+        os.close(handle)
+
+    assert (code, text) == (2, "gridpeers: --resume old: another `gridpeers chaos` is at work in it; let it end\n")
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        (("--resume", "none"), "--resume none: no folder of a campaign: No such file or directory; name one with"),
+        (
+            ("--resume", "old", "--seed", "4"),
+            "it was begun with --seed 3, not 4; give that one",
+        ),
+        (("--resume", "old", "--runs", "1"), "--resume old: it has run 1 already; give --runs 2 or more"),
+        (("--resume", "other"), "--resume other: its scenario.toml is not the scenario and case to be disturbed"),
+        (("--resume", "bad"), "bad/runs.jsonl:1: this line is damaged ("),
+        (("--resume", "before"), "before/runs.jsonl:3: there is no run -1 in any campaign; remove this line"),
+        (("--resume", "above"), 'above/runs.jsonl:3: no check is called "../../x": the name of a check has letters,'),
+        (("--resume", "odd"), "odd/runs.jsonl:3: its schedule is none that chaos draws (KeyError: 't_s'); remove this"),
+        (("--resume", "away"), "away/runs.jsonl:3: its schedule is none that chaos draws (ScenarioError: chaos: event"),
+        (("--resume", "below"), "--resume below: its seed.txt is damaged, no campaign has that seed (0 to 1000000000)"),
+        (("--resume", "shut"), "--resume shut: Is a directory; a campaign goes on where its folder can be written"),
+        (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
+    ],
+)
+def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[str, ...], why: str) -> None:
+    """One line says what does not fit, before anything is run, and the folder stays as it is."""
+    base = base_in(small(elsewhere))
+    for name in ("old", "other", "bad", "before", "above", "odd", "away", "below", "shut"):
+        (elsewhere / name).mkdir()
+        folder = ChaosFolder(elsewhere / name, base, 3, "")
+        folder.add(ChaosRow(number=0, schedule=()))
+        folder.add(ChaosRow(number=1, schedule=()))
+    (elsewhere / "other" / "scenario.toml").write_text("", encoding="utf-8")
+    journal = elsewhere / "bad" / "runs.jsonl"
+    journal.write_text(journal.read_text(encoding="utf-8").replace('"number":0', '"number":"many"'), encoding="utf-8")
+    timeless = Disturbance(table="event", entry={"leave": ["inv4"]})
+    stranger = Disturbance(table="event", entry={"t_s": 0.5, "leave": ["inv99"]})
+    for name, row in {
+        "before": ChaosRow(number=-1, schedule=()),
+        "above": ChaosRow(number=2, schedule=(), violated={"frequency": "low", "../../x": "low"}),
+        "odd": ChaosRow(number=2, schedule=(timeless,)),
+        "away": ChaosRow(number=2, schedule=(stranger,), violated={"frequency": "low"}),
+    }.items():
+        with (elsewhere / name / "runs.jsonl").open("ab") as lines:
+            lines.write(journal_line(row))
+    (elsewhere / "below" / "seed.txt").write_text("-3\n", encoding="ascii")
+    (elsewhere / "shut" / LOCK).mkdir()
+    before = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
+
+    code, text = invoke("chaos", "small.toml", "--seed", "3", *options)
+
+    after = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
+    assert (code, why in " ".join(text.split())) == (2, True), text
+    assert {file: text for file, text in after.items() if file.name != LOCK} == before
