@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import inf
-from types import MappingProxyType
 
 from msgspec.structs import replace
 
@@ -19,62 +18,13 @@ from agents.island_detector import IslandDetector
 from agents.laws.call import LawError, decide, start_law
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
+from agents.laws.law_inputs import neighbour_of, neighbours_alike, own_of
 from agents.own_nameplate import nameplate_of
 from agents.topology import in_neighbours, rule_of
 from wire.messages import OFF, Measurement, Nameplate, State
 
 SIGN_OF_LIFE = 0.5
 """Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
-
-
-_converted: dict[str, tuple[State, Nameplate, float, float, Neighbour]] = {}
-"""The last conversion of each sender: its neighbours in one process get the same state, one after the other."""
-
-
-def neighbour_of(nameplate: Nameplate, state: State, age: float, weight: float) -> Neighbour:
-    """Return a neighbour as a law sees it, per unit of the neighbour's own rating."""
-    name = nameplate.sender
-    known = _converted.get(name)
-    if known is not None and known[0] is state and known[1] is nameplate and known[2] == age and known[3] == weight:
-        return known[4]
-    neighbour = Neighbour(
-        name,
-        nameplate.kind == "GFM",
-        age,
-        weight,
-        state.P_set / nameplate.P_rated,
-        state.V_set / nameplate.V_nom,
-        state.Q / nameplate.P_rated,
-        nameplate.m_p,
-        nameplate.m_q,
-        nameplate.P_rated,
-        MappingProxyType(state.shared) if state.shared else NOTHING_SHARED,  # all agents of a process see this one
-    )
-    _converted[name] = state, nameplate, age, weight, neighbour
-    return neighbour
-
-
-def own_of(config: AgentConfig, m: Measurement, P_set: float, V_set: float, saturated: tuple[int, int]) -> Own:
-    """Return the own inverter as a law sees it, with the set-points (W, V) before its step and the saturated sides."""
-    P_rated, V_nom, m_q, f_nom = config.P_rated, config.V_nom, config.m_q, config.f_nom
-    return Own(
-        config.name,
-        config.kind == "GFM",
-        m.t,
-        m.P / P_rated,
-        m.Q / P_rated,
-        m.V / V_nom,
-        (m.f - f_nom) / f_nom,
-        m_q * m.Q / P_rated,  # z
-        P_set / P_rated,
-        V_set / V_nom,
-        config.m_p,
-        m_q,
-        P_rated,
-        V_nom,
-        f_nom,
-        *saturated,
-    )
 
 
 class Agent:
@@ -376,16 +326,7 @@ class Agent:
         else:
             here = [heard[name] for name in neighbours if self.shares_island(name)]
         if ages is None and self._weights.all_count:
-            return [
-                shown[4]
-                if (shown := _converted.get(state.sender)) is not None
-                and shown[0] is state
-                and shown[2] == t - state.t
-                and shown[3] == 1.0
-                and shown[1] is known[state.sender]
-                else neighbour_of(known[state.sender], state, t - state.t, 1.0)
-                for state in here
-            ]
+            return neighbours_alike(known, here, t)
         aged = {state.sender: t - state.t if ages is None else ages[state.sender] for state in here}
         weights = self._weights.at_tick(aged)
         return [neighbour_of(known[name], heard[name], aged[name], weight) for name, weight in weights.items()]

@@ -6,11 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
-from agents.agent import neighbour_of, own_of
 from agents.agent_config import AgentConfig, Control, LawChoice
 from agents.carriers.law_registry import LAWS
 from agents.laws.in_force import law_in_force
 from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from agents.laws.law_inputs import neighbour_of, own_of
 from wire.messages import Measurement, Nameplate, State
 
 Action = Literal["law", "hold", "off", "idle"]
