@@ -80,10 +80,11 @@ class ChaosFolder:
 
     def add(self, row: ChaosRow) -> None:
         """Keep the result of a run, in the order in which they come."""
-        self.rows[row.number] = row
-        for name, line in ((JOURNAL, journal_line(row)), (TABLE, self._cells(row).encode())):
-            with (self.path / name).open("ab") as file:
-                file.write(line)
+        with (self.path / JOURNAL).open("ab") as file:
+            file.write(journal_line(row))
+        self.rows[row.number] = row  # once it is kept: an error tells how many are
+        with (self.path / TABLE).open("ab") as file:
+            file.write(self._cells(row).encode())
 
     def write_table(self) -> None:
         """Write the table in the order of the runs."""

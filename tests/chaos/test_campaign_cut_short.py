@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import shutil
 import signal
 import tempfile
 from pathlib import Path
@@ -104,6 +105,26 @@ def test_workers_that_are_ended_leave_no_folder(elsewhere: Path, monkeypatch: py
         run_campaign(Campaign(base=base, seed=8, runs=3), folder, lambda what, done, of: None)
 
     assert [*tmp.iterdir()] == [others]
+
+
+def test_a_folder_that_is_removed_keeps_nothing(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command says so, and names no way to go on there."""
+    small(elsewhere)
+    whole = campaigns.run_number
+
+    def removing(text: str, seed: int, number: int, *rest: Any) -> Any:
+        if number == 1:
+            shutil.rmtree(elsewhere / "out")
+        return whole(text, seed, number, *rest)
+
+    monkeypatch.setattr(campaigns, "run_number", removing)
+    code, text = invoke("chaos", "small.toml", "--runs", "3", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert text.endswith(
+        "gridpeers: out/runs.jsonl: cannot be written: No such file or directory\n"
+        "gridpeers: 0 of 3 runs are kept as out/ is gone\n"
+    )
 
 
 def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -218,17 +218,20 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
         with interruptible():
             yield
     except (KeyboardInterrupt, OSError, MemoryError, MachineError, WorkersError) as error:
+        kept = len(rows)
         where = "and no folder was made"
-        if folder:
+        if folder and not folder.is_dir():
+            kept, where = 0, f"as {shown(folder)}/ is gone"
+        elif folder:
             words = ["chaos", scenario, "--case", campaign.base.case, "--driver", campaign.driver]
             where = f"in {shown(folder)}/; go on with: {command_line(*words, '--resume', shown(folder))}"
-        kept = f"{len(rows)} of {campaign.runs} runs are kept {where}"
+        left = f"{kept} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
-            fail([f"interrupted; {kept}"], exit_code(error))
+            fail([f"interrupted; {left}"], exit_code(error))
         why = str(machine_lack(["MemoryError"]) if isinstance(error, MemoryError) else error)
         if isinstance(error, OSError):
             why = too_few_files(error) or (refusal(folder, error) if folder else why)
-        fail([why, kept], BROKEN)
+        fail([why, left], BROKEN)
 
 
 @contextmanager
