@@ -6,6 +6,7 @@ import logging
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
 from threading import Timer
+from time import monotonic, sleep
 
 from msgspec.structs import replace
 
@@ -18,14 +19,19 @@ from agents.realtime.realtime_agent import RealtimeAgent
 from wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
-from wire.driver.session import Session
+from wire.driver.session import Session, SessionError
 from wire.keys import check_name
 from wire.node_group import NodeGroup
+from wire.trust.credentials import Credentials
 
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
 AnyAgent = RealtimeAgent | LockstepAgent
+
+OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
+"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
+are copied, or files closed."""
 
 RUN_ENDS = 0.1
 """Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
@@ -120,14 +126,7 @@ def _one_session_after_the_other(
     nodes: tuple[AnyAgent, ...] = ()
     core: AnyAgent | NodeGroup | None = None
     while core is None or core.session_broken:
-        session = Session(
-            first.name,
-            listen=first.listen,
-            connect=first.connect,
-            clock=first.clock,
-            star=first.star,
-            credentials=credentials,
-        )
+        session = _opened(first, credentials, again=core is not None)
         try:
             if core is None:
                 nodes = tuple(
@@ -142,6 +141,29 @@ def _one_session_after_the_other(
         finally:
             session.close()
     return nodes
+
+
+def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
+    """Open a session; one in place of another is tried again for a while, as its certificate may just be renewed."""
+    until = monotonic() + (OPENED_WITHIN if again else 0.0)
+    told = ""
+    while True:
+        try:
+            return Session(
+                config.name,
+                listen=config.listen,
+                connect=config.connect,
+                clock=config.clock,
+                star=config.star,
+                credentials=credentials,
+            )
+        except SessionError as error:
+            if monotonic() >= until:
+                raise
+            if str(error) != told:
+                told = str(error)
+                logging.getLogger(config.name).warning("%s; tries again for up to %g s", told, OPENED_WITHIN)
+        sleep(OPENED_AGAIN)
 
 
 def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AnyAgent:

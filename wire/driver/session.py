@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
@@ -453,6 +454,14 @@ def _config(
 
 
 def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
+    """Return why no session could be opened, without the places in Zenoh's own source.
+
+    Examples
+    --------
+    >>> _explain("inv1", ("tls/127.0.0.1:0",), "No key (os error 2) at /zenoh/utils.rs:523. at /zenoh/unicast.rs:4.")
+    'inv1: cannot open a Zenoh session (listening on tls/127.0.0.1:0): No key (os error 2)'
+    """
+    error = re.sub(r" at /\S+\.rs:\d+\.?", "", error)
     endpoints = ", ".join(listen)
     if "in use" in error:
         return f"{who}: cannot listen on {endpoints}: the port is in use; choose another, or 0 for any free one"

@@ -10,13 +10,14 @@ from typing import Any, cast
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_process import _take_part
+from agents import agent_process
+from agents.agent_process import _opened, _take_part
 from agents.realtime.realtime_agent import RealtimeAgent
 from tests.toy.toy_configs import agent_config
 from wire.codec import encode
 from wire.driver.drive import StoppedError, StoppedOnLeashError
 from wire.driver.inbox import Inbox, Stamped
-from wire.driver.session import Session
+from wire.driver.session import Session, SessionError
 from wire.keys import Keys
 from wire.messages import Stop
 
@@ -74,3 +75,43 @@ def test_an_agent_whose_run_ends_has_not_left() -> None:
 def test_an_agent_whose_run_goes_on_leaves(stop: StoppedError) -> None:
     """One that a person started at once, one that its run started when the plant is still there after a moment."""
     assert ended(stop).left == 1
+
+
+def test_a_session_in_place_of_a_broken_one_is_tried_again(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Keys that are being copied, or a lack of files, cost time and not the agent; the first session fails at once."""
+    clock, opened, session = [0.0], list[float](), object()
+
+    def refusing(name: str, **words: Any) -> object:
+        opened.append(clock[0])
+        if len(opened) < 4:
+            raise SessionError(f"{name}: no key")
+        return session
+
+    monkeypatch.setattr(agent_process, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(agent_process, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
+    monkeypatch.setattr(agent_process, "Session", refusing)
+
+    assert _opened(agent_config("inv1"), None, again=True) is session
+    assert [record.getMessage() for record in caplog.records] == ["inv1: no key; tries again for up to 60 s"]
+    opened.clear()
+    with pytest.raises(SessionError, match="inv1: no key"):
+        _opened(agent_config("inv1"), None, again=False)
+    assert len(opened) == 1
+
+
+def test_a_session_that_cannot_be_opened_again_ends_the_agent(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It does not try for ever: whoever has started it learns that the agent is gone, and why."""
+    clock = [0.0]
+
+    def refusing(name: str, **words: Any) -> str:
+        raise SessionError(f"{name}: no key")
+
+    monkeypatch.setattr(agent_process, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(agent_process, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
+    monkeypatch.setattr(agent_process, "Session", refusing)
+
+    with pytest.raises(SessionError, match="inv1: no key"):
+        _opened(agent_config("inv1"), None, again=True)
+    assert 59.0 <= clock[0] <= 61.0
