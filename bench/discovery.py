@@ -25,7 +25,8 @@ from time import monotonic, sleep
 from typing import Any
 
 from bench.harness import machine, options
-from wire.driver.session import LEASE, load_zenoh
+from wire.driver.session import load_zenoh
+from wire.driver.zenoh_settings import LEASE
 
 HUB = -1
 """Number of the session that all can reach: the plant's place."""

@@ -11,7 +11,8 @@ from plant.plant_config import PlantConfig
 from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
-from wire.driver.session import Clock, Session
+from wire.driver.session import Session
+from wire.driver.zenoh_settings import Clock
 from wire.messages import Pacing, Telemetry
 from wire.trust.credentials import Credentials
 

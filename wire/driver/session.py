@@ -1,7 +1,6 @@
 """A Zenoh session, set up for lock-step or for wall-clock time; the only module that knows Zenoh.
 
 Zenoh's threads only enqueue into `Session.inbox`, and one thread, the owner's, takes the events out.
-`docs/protocol.md` has the measured reason of each setting.
 """
 
 from __future__ import annotations
@@ -12,65 +11,20 @@ import os
 import re
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
 from wire.driver.inbox import Inbox, Stamped
 from wire.driver.lingering import do_not_linger
 from wire.driver.open_files import limit
+from wire.driver.zenoh_settings import ONE_THREAD, PROFILES, RUNTIME, Clock, as_client, zenoh_settings
 from wire.keys import LATEST_ONLY, is_token
 from wire.messages import PLANT
 from wire.trust.credentials import Credentials
 
 if TYPE_CHECKING:
     import zenoh
-
-_RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
-flood of messages can stall it."""
-
-_ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""All in one pool of one thread, for the client of a relay. It passes nothing on, so receiving never waits for sending;
-a message then wakes one thread of Zenoh instead of two."""
-
-LEASE = 60_000
-"""Time (ms) after which a silent link counts as dead, in lock-step. It is long because it must not decide: the death of
-a process closes its links at once, and the deadlines of the lock-step detect a frozen one."""
-
-WALL_LEASE = 2_000
-"""The same in wall-clock time: after a cut Zenoh must renew the link soon. Control does not wait for it."""
-
-
-WAIT_BEFORE_CLOSE = 5_000_000
-"""How long (us) a message that may not be dropped waits for a full link, in lock-step: Zenoh's default."""
-
-WALL_WAIT_BEFORE_CLOSE = 200_000
-"""The same in wall-clock time, where a waiting plant holds up the control of all others. Zenoh renews a closed link
-when its other end reads again."""
-
-
-class _Profile(NamedTuple):
-    """Settings that differ between the two kinds of time."""
-
-    lease: int
-    """Silence (ms) after which a link counts as dead."""
-    retry: tuple[int, int, float]
-    """Time between attempts to connect: first (ms), longest (ms), growth."""
-    timeout: int
-    """Longest time for a link to open (ms)."""
-    wait_before_close: int
-    """How long (us) a message that may not be dropped waits for a link that is full; then the link is closed."""
-    may_drop: bool
-    """Whether messages of which only the newest matters are dropped when a link is full."""
-
-
-Clock = Literal["simulated", "wall"]
-
-_PROFILES: dict[Clock, _Profile] = {
-    "simulated": _Profile(LEASE, (20, 50, 1.5), 10_000, WAIT_BEFORE_CLOSE, may_drop=False),
-    "wall": _Profile(WALL_LEASE, (100, 500, 2.0), 1_000, WALL_WAIT_BEFORE_CLOSE, may_drop=True),
-}
 
 FIRST_LINK = 0.5
 """Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
@@ -82,11 +36,6 @@ failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
 
-MOST_BYTES = 8_000_000
-"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have
-`wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it passes nothing
-more of that sender on that link."""
-
 MOST_UNPREPARED = 64
 """Publishers that are kept for keys that nobody has prepared, such as those of answers: anybody may ask, under as many
 names as he likes."""
@@ -94,8 +43,8 @@ names as he likes."""
 
 def load_zenoh(*, one_thread: bool = False) -> None:
     """Import Zenoh and choose its threads, which the first session starts; a ZENOH_RUNTIME of the user's own counts."""
-    if os.environ.get("ZENOH_RUNTIME") in (None, _RUNTIME, _ONE_THREAD):  # a parent's choice is not this process's
-        os.environ["ZENOH_RUNTIME"] = _ONE_THREAD if one_thread else _RUNTIME
+    if os.environ.get("ZENOH_RUNTIME") in (None, RUNTIME, ONE_THREAD):  # a parent's choice is not this process's
+        os.environ["ZENOH_RUNTIME"] = ONE_THREAD if one_thread else RUNTIME
     import zenoh  # noqa: F401
 
 
@@ -167,7 +116,7 @@ class Session:
             zenoh.init_log_from_env_or(_REFUSED_LINKS)
         self.inbox = inbox or Inbox(holds=clock == "simulated")
         self._zenoh = zenoh
-        self._profile = profile = _PROFILES[clock]
+        self._drops = PROFILES[clock].may_drop
         self._publishers: dict[str, zenoh.Publisher] = {}
         self._unprepared: list[str] = []
         """Keys of the publishers that nobody has prepared, oldest first."""
@@ -176,16 +125,16 @@ class Session:
         self._credentials, self._relayed = credentials, star and not rendezvous
         self._certificates: set[str] = set()
         """Common names of the certificates of all links so far."""
-        config = _config(listen, connect, gossip, meets_all, profile)
-        if star and rendezvous:
-            config["mode"] = "router"
-            config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
-        elif star:
-            config = _config((), connect, False, meets_all, profile)
-        if credentials is not None:
-            link, rules = credentials.zenoh_settings(star=star)
-            config["transport"]["link"] |= link
-            config["access_control"] = rules
+        config = zenoh_settings(
+            listen,
+            connect,
+            gossip=gossip,
+            clock=clock,
+            rendezvous=rendezvous,
+            meets_all=meets_all,
+            star=star,
+            credentials=credentials,
+        )
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
         if star and not rendezvous:
@@ -229,7 +178,7 @@ class Session:
     def _become_client(self, who: str, config: dict[str, Any]) -> None:
         """Open the session again as the client of the router that it has met."""
         self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
+        self._session = self._open(who, as_client(config))
         self._changeable = False
 
     def _meets_router(self) -> bool:
@@ -256,7 +205,7 @@ class Session:
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take the events out of the inbox, as `Inbox.take` does, and set up new links."""
         if self._links is not None and self._links.try_recv() is not None:
-            if self._profile.may_drop:
+            if self._drops:
                 do_not_linger()
             if self._credentials is not None:
                 self._note_links(self._credentials)
@@ -344,7 +293,7 @@ class Session:
     def prepare(self, key: str) -> None:
         """Declare the publisher of a key, once."""
         if key not in self._publishers:
-            drop = self._profile.may_drop and key.split("/")[2] in LATEST_ONLY
+            drop = self._drops and key.split("/")[2] in LATEST_ONLY
             control = self._zenoh.CongestionControl
             self._publishers[key] = self._session.declare_publisher(
                 key,
@@ -402,55 +351,6 @@ class Session:
             callback(item)
 
         return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
-
-
-def _config(
-    listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, meets_all: bool, profile: _Profile
-) -> dict[str, Any]:
-    first, longest, growth = profile.retry
-    return {
-        "mode": "peer",
-        "listen": {"endpoints": list(listen)},
-        "open": {"return_conditions": {"connect_scouted": False, "declares": False}},
-        "connect": {
-            "endpoints": list(connect),
-            "timeout_ms": -1,
-            "exit_on_failure": False,
-            "retry": {"period_init_ms": first, "period_max_ms": longest, "period_increase_factor": growth},
-        },
-        "scouting": {
-            "multicast": {"enabled": False},
-            # Of two peers that learn of each other the one with the greater id connects: no double links. A peer that
-            # does not listen connects to all by itself.
-            "gossip": {
-                "enabled": gossip,
-                "autoconnect_strategy": {
-                    "peer": {"to_router": "always", "to_peer": "always" if meets_all else "greater-zid"}
-                },
-            },
-        },
-        "transport": {
-            # No lowlatency, although it saves a fifth of a tick: while links open, a declaration could wait
-            # for a link to become writable and hold the lock that all Zenoh threads wait for (4 starts in 100 hung).
-            # Without QoS everything on a link keeps its order; discovery relies on that.
-            "unicast": {
-                "lowlatency": False,
-                "qos": {"enabled": False},
-                "open_timeout": profile.timeout,
-                "accept_timeout": profile.timeout,
-            },
-            "link": {
-                "tx": {
-                    "lease": profile.lease,
-                    "keep_alive": 4,
-                    "queue": {"congestion_control": {"block": {"wait_before_close": profile.wait_before_close}}},
-                },
-                "rx": {"max_message_size": MOST_BYTES},
-            },
-            # Else Zenoh makes pools at the first message of more than 3 kB: 65 ms in which the plant misses its steps.
-            "shared_memory": {"enabled": False},
-        },
-    }
 
 
 def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
