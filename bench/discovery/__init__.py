@@ -1,0 +1,1 @@
+"""How many sessions find each other, and how soon."""
