@@ -158,6 +158,9 @@ def kept_rows(folder: Path, base: ChaosBase, seed: int, driver: Driver, runs: in
         If it is no folder of a campaign, or of one with another scenario, another seed or more runs, or is damaged.
     """
     where = f"--resume {folder}"
+    for name in (SCENARIO, SEED, JOURNAL):
+        if (folder / name).exists() and not (folder / name).is_file():  # to read a pipe would take for ever
+            raise FolderError(f"{where}: its {name} is no file; remove it, or begin a new folder")
     try:
         text = (folder / SCENARIO).read_text(encoding="utf-8")
         theirs = int((folder / SEED).read_text(encoding="ascii"))
@@ -200,7 +203,7 @@ def _status(row: ChaosRow) -> str:
 
 def _number(file: Path) -> int | None:
     try:
-        return int(file.read_text(encoding="ascii"))
+        return int(file.read_text(encoding="ascii")) if file.is_file() else None
     except (OSError, ValueError):
         return None
 

@@ -94,6 +94,8 @@ class SweepFolder:
     def _kept_rows(self) -> dict[int, SweepRow]:
         """Return the finished runs in the journal."""
         journal = self.path / JOURNAL
+        if journal.exists() and not journal.is_file():  # to read a pipe would take for ever
+            raise FolderError(f"{shown(journal)}: is no file; remove it, or give another folder by --out")
         return rows_in(self.path, SweepRow, self._problem) if journal.exists() else {}
 
     def _problem(self, row: SweepRow) -> str:

@@ -114,6 +114,7 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
         (("--resume", "odd"), "odd/runs.jsonl:3: its schedule is none that chaos draws (KeyError: 't_s'); remove this"),
         (("--resume", "away"), "away/runs.jsonl:3: its schedule is none that chaos draws (ScenarioError: chaos: event"),
         (("--resume", "below"), "--resume below: its seed.txt is damaged, no campaign has that seed (0 to 1000000000)"),
+        (("--resume", "piped"), "--resume piped: its runs.jsonl is no file; remove it, or begin a new folder"),
         (("--resume", "shut"), "--resume shut: Is a directory; a campaign goes on where its folder can be written"),
         (("--resume", "old", "--out", "new"), "--out new: --resume old goes on in that folder; leave one of them out"),
     ],
@@ -121,7 +122,7 @@ def test_two_campaigns_never_write_in_one_folder(elsewhere: Path) -> None:
 def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[str, ...], why: str) -> None:
     """One line says what does not fit, before anything is run, and the folder stays as it is."""
     base = base_in(small(elsewhere))
-    for name in ("old", "other", "bad", "before", "above", "odd", "away", "below", "shut"):
+    for name in ("old", "other", "bad", "before", "above", "odd", "away", "below", "piped", "shut"):
         (elsewhere / name).mkdir()
         folder = ChaosFolder(elsewhere / name, base, 3, "")
         folder.add(ChaosRow(number=0, schedule=()))
@@ -141,6 +142,8 @@ def test_a_campaign_goes_on_only_where_it_was(elsewhere: Path, options: tuple[st
             lines.write(journal_line(row))
     (elsewhere / "below" / "seed.txt").write_text("-3\n", encoding="ascii")
     (elsewhere / "shut" / LOCK).mkdir()
+    (elsewhere / "piped" / "runs.jsonl").unlink()
+    os.mkfifo(elsewhere / "piped" / "runs.jsonl")
     before = {file: file.read_bytes() for file in elsewhere.rglob("*") if file.is_file()}
 
     code, text = invoke("chaos", "small.toml", "--seed", "3", *options)

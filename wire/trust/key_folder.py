@@ -186,6 +186,8 @@ def exposed_keys(folder: Path) -> list[str]:
             require_private(path)
         except KeysError as error:
             sentences.append(str(error))
+        except OSError as error:
+            sentences.append(f"{path}: cannot be read: {error.strerror}")
     return sentences
 
 
@@ -295,6 +297,8 @@ def _certificate(path: Path) -> x509.Certificate:
 
 def _bytes(path: Path) -> bytes:
     try:
+        if not path.is_dir() and path.exists() and not path.is_file():  # to read a pipe would take for ever
+            raise KeysError(f"{path}: is no file; copy it anew from the site")
         return path.read_bytes()
     except FileNotFoundError:
         raise KeysError(f"{path}: is missing; copy it from the folder where the site issues certificates") from None

@@ -278,6 +278,10 @@ def test_a_damaged_line_of_the_journal_is_named(sweep_file: Write, tmp_path: Pat
     (tmp_path / "here" / "runs.jsonl").write_text('{"number":0,"status":"broke"}\n{"number":1,"status":"broke"}\n')
     with pytest.raises(FolderError, match=r"runs\.jsonl:2: this sweep has runs 0 to 0, none 1; remove the line"):
         done(path, tmp_path / "here")
+    (tmp_path / "here" / "runs.jsonl").unlink()
+    os.mkfifo(tmp_path / "here" / "runs.jsonl")
+    with pytest.raises(FolderError, match=r"runs\.jsonl: is no file; remove it, or give another folder by --out"):
+        done(path, tmp_path / "here")
 
 
 def test_what_several_islands_share_is_a_column_of_each(sweep_file: Write, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import pytest
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
-from wire.trust.key_folder import KeysError, open_credentials, read_list
+from wire.trust.key_folder import KeysError, exposed_keys, open_credentials, read_list
 from wire.trust.site_authority import issue, make_site, revoke
 
 NOW = datetime(2026, 11, 23, 12, tzinfo=UTC)
@@ -314,3 +314,22 @@ def test_a_new_certificate_after_a_revoked_one_has_another_common_name(lab: Path
     assert open_credentials(lab, ("agent",), "inv1", now=NOW)[0].own.generation == 2
     with pytest.raises(KeysError, match=r'no certificate was issued to "inv7"; there are those of'):
         revoke(lab, "inv7")
+
+
+@pytest.mark.parametrize("file", ["ca.pem", "members.json", "inv1.pem", "inv1.key"])
+def test_a_pipe_in_place_of_a_file_is_refused(lab: Path, file: str) -> None:
+    """To read it would take for ever."""
+    (lab / file).unlink()
+    os.mkfifo(lab / file)
+
+    assert refusal(lab) == f"{lab / file}: is no file; copy it anew from the site"
+
+
+def test_a_key_that_leads_nowhere_is_warned_of(lab: Path) -> None:
+    """`gridpeers keys show` names it, and goes on with the others."""
+    (lab / "old.key").symlink_to(lab / "nowhere")
+    (lab / "viewer.key").chmod(0o644)
+
+    first, second = exposed_keys(lab)
+    assert first == f"{lab / 'old.key'}: cannot be read: No such file or directory"
+    assert second.startswith(f"{lab / 'viewer.key'}: others may read or change it")
