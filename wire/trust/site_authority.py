@@ -92,7 +92,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
 
 
 def issue(
-    folder: Path, name: str, role: Role = "agent", *, days: float = LIFE_DAYS, now: datetime | None = None
+    folder: Path, name: str, role: Role | None = None, *, days: float = LIFE_DAYS, now: datetime | None = None
 ) -> Member:
     """Issue a certificate to a name, or renew it; return the member.
 
@@ -103,7 +103,7 @@ def issue(
     name : str
         Name; of an agent that of its inverter.
     role : Role, optional
-        Its role; a name keeps the one it has.
+        Its role; a name keeps the one it has, and any other is an agent if left out.
     days : float, optional
         Life of the certificate (days).
     now : datetime, optional
@@ -119,6 +119,7 @@ def issue(
     now = now or datetime.now(UTC)
     with _changing(folder):
         known, ca, ca_key = _authority(folder)
+        role = role or _role_of(known, name)
         if problem := objection(known, name, role):
             raise KeysError(problem)
         if now >= ca.not_valid_after_utc:
@@ -157,13 +158,19 @@ def objection(known: MemberList, name: str, role: Role) -> str:
     return ""
 
 
-def objections(known: MemberList, names: Sequence[str], role: Role) -> list[str]:
-    """Return why certificates of a role cannot be issued to names, each a line; empty if all can."""
-    found = [objection(known, name, role) for name in names]
+def objections(known: MemberList, names: Sequence[str], role: Role | None = None) -> list[str]:
+    """Return why certificates of a role cannot be issued to names, each a line; empty if all can; see `issue`."""
+    found = [objection(known, name, role or _role_of(known, name)) for name in names]
     for k, name in enumerate(names):
         if not found[k] and (twin := _twin(name, names[:k])):
             found[k] = _TWIN.format(name=name, twin=twin)
     return [problem for problem in found if problem]
+
+
+def _role_of(known: MemberList, name: str) -> Role:
+    """Return the role that a name has; of one without, that of an agent."""
+    before = known.of(name)
+    return "agent" if before is None else before.role
 
 
 def _twin(name: str, others: Sequence[str]) -> str:

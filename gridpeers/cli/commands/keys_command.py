@@ -54,7 +54,10 @@ def init(
 @app.command()
 def issue(
     names: Annotated[list[str], typer.Argument(metavar="NAME...", help="Names; of agents those of their inverters.")],
-    role: Annotated[Role, typer.Option("--role", help="What its holder may do.")] = "agent",
+    role: Annotated[
+        Role | None,
+        typer.Option("--role", help="What its holder may do; a name keeps its role, a new one is an agent."),
+    ] = None,
     keys: _Keys = Path(),
     days: _Days = 365.0,
 ) -> None:
@@ -72,7 +75,7 @@ def issue(
             raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
         for name in names:
             member = issue(keys, name, role, days=days)
-            typer.echo(f"{keys / name}.pem: certificate of {name}, role {role}, until {member.expires}")
+            typer.echo(f"{keys / name}.pem: certificate of {name}, role {member.role}, until {member.expires}")
 
 
 @app.command()

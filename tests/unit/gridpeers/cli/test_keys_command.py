@@ -63,11 +63,21 @@ def test_names_are_all_judged_before_any_certificate_is_issued(elsewhere: Path) 
     assert invoke("keys", "init", "lab")[0] == 0
     assert refused("keys", "issue", "a", "A", "--keys", "lab").startswith("gridpeers: A: differs from a in case alone")
     assert refused("keys", "issue", ".", "CA", "--keys", "lab").count("cannot be a name") == 2
-    text = refused("keys", "issue", "inv1", "a b", "plant", "ca", "--keys", "lab")
+    text = refused("keys", "issue", "inv1", "a b", "plant", "ca", "--role", "agent", "--keys", "lab")
 
     assert [line.partition(": ")[2].split()[0] for line in text.splitlines()] == ['"a', "plant:", '"ca"']
     assert not (elsewhere / "lab" / "inv1.pem").exists()
     assert invoke("keys", "issue", "inv1", "inv1", "--keys", "lab")[1].count("inv1.pem") == 1
+
+
+def test_a_certificate_is_renewed_by_its_name_alone(elsewhere: Path) -> None:
+    """The advice of an expired one, `gridpeers keys issue NAME`, holds for every role."""
+    assert invoke("keys", "init", "lab")[0] == 0
+    assert invoke("keys", "revoke", "operator", "--keys", "lab")[0] == 0
+
+    code, text = invoke("keys", "issue", "plant", "operator", "inv1", "--keys", "lab")
+    roles = [line.split(", ")[1] for line in text.splitlines()]
+    assert (code, roles) == (0, ["role plant", "role operator", "role agent"])
 
 
 def test_show_says_to_the_minute_from_when_to_when_certificates_are_valid(elsewhere: Path) -> None:
