@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 
 from msgspec.structs import replace
 
@@ -35,6 +36,7 @@ from wire.driver.drive import StoppedError
 from wire.driver.stop_signal import StopSignal, stop_at_signals
 from wire.messages import PLANT, Pacing
 from wire.printable import printable
+from wire.rate_limit import RateLimit
 
 LOGGED = ("roster", "warning")
 """Kinds of events that a plant in this process also writes to its log."""
@@ -78,6 +80,18 @@ def meaning(word: str, config: PlantConfig) -> str:
         return f"waits up to {wait:g} s for its {agents}" if wait > 0.0 else f"waits for none of its {agents}"
     refused = re.search(r"WARN.*zenoh_link_tls\S*\s(.*?)(?:\. Hint:.*)?$", word)
     return f"a link was refused: {printable(refused[1])}" if refused else ""
+
+
+def limited(text: str, limit: RateLimit, now: float) -> str:
+    """Return a sentence for a person, or "" of the many that a peer without access makes, which tries again for ever.
+
+    Examples
+    --------
+    >>> limit = RateLimit(burst=1)
+    >>> [limited(text, limit, 0.0) for text in ("a link was refused: 1 s", "", "a link was refused: 2 s")]
+    ['a link was refused: 1 s', '', '']
+    """
+    return (limit.admit(text, now) or "") if text else ""
 
 
 def plant_here(
@@ -159,9 +173,11 @@ def all_here(
         elif supervisor.failed(child) and not over.is_set():
             say(child.report(f"after t = {recorder.client.t:.2f} s"))
 
+    limit = RateLimit()
+
     def on_word(word: str) -> None:
-        if text := meaning(word, config):
-            say(text)
+        if line := limited(meaning(word, config), limit, monotonic()):
+            say(line)
 
     def run(recorder: LiveRecorder) -> str:
         with supervisor:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from plant.start_words import COMPILING, LISTENING
-from scenarios.live.launch.live_processes import meaning
+from scenarios.live.launch.live_processes import limited, meaning
 from tests.toy.toy_configs import toy_configs
+from wire.rate_limit import BURST, RateLimit
 
 
 def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:
@@ -19,3 +20,20 @@ def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:
     assert meaning(line, config) == "a link was refused: peer sent no certificates"
     assert meaning(LISTENING, config) == ""
     assert "is being built" in meaning(COMPILING, config)
+
+
+def test_an_agent_with_an_expired_certificate_does_not_flood_the_terminal() -> None:
+    """It tries again for ever, some times a second: after the first refusals, one in ten seconds is told."""
+    config, _ = toy_configs(2)
+    limit = RateLimit()
+    line = (
+        "WARN app-0 zenoh_link_tls::unicast: invalid peer certificate: certificate expired: verification time {} (UNIX)"
+    )
+
+    told = [limited(meaning(line.format(1795480184 + k), config), limit, 0.5 * k) for k in range(7200)]
+
+    assert (
+        told[0]
+        == "a link was refused: invalid peer certificate: certificate expired: verification time 1795480184 (UNIX)"
+    )
+    assert len([text for text in told if text]) <= BURST + 360
