@@ -20,8 +20,8 @@ from wire.driver.lingering import do_not_linger
 from wire.driver.open_files import limit
 from wire.driver.zenoh_settings import ONE_THREAD, PROFILES, RUNTIME, Clock, as_client, zenoh_settings
 from wire.keys import LATEST_ONLY, is_token
-from wire.messages import PLANT
 from wire.trust.credentials import Credentials
+from wire.trust.link_certificates import LinkCertificates
 
 if TYPE_CHECKING:
     import zenoh
@@ -122,9 +122,9 @@ class Session:
         """Keys of the publishers that nobody has prepared, oldest first."""
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
-        self._credentials, self._relayed = credentials, star and not rendezvous
-        self._certificates: set[str] = set()
-        """Common names of the certificates of all links so far."""
+        self._certificates: LinkCertificates | None = None
+        if credentials is not None:
+            self._certificates = LinkCertificates(credentials, relayed=star and not rendezvous)
         config = zenoh_settings(
             listen,
             connect,
@@ -143,7 +143,6 @@ class Session:
         elif self._changeable and self._meets_router():
             self._become_client(who, config)
         self._links: Any = None
-        self._lines: list[str] = []
         if (
             clock == "wall" or credentials is not None
         ):  # no callback: one during the end of Python would abort the process
@@ -207,8 +206,8 @@ class Session:
         if self._links is not None and self._links.try_recv() is not None:
             if self._drops:
                 do_not_linger()
-            if self._credentials is not None:
-                self._note_links(self._credentials)
+            if self._certificates is not None:
+                self._certificates.note(self._session.info.links())
         return self.inbox.take(needed, timeout)
 
     def take_losses(self) -> tuple[Loss, ...]:
@@ -313,29 +312,17 @@ class Session:
 
     def take_lines(self) -> tuple[str, ...]:
         """Take out lines on links whose other end has a certificate and no access."""
-        lines, self._lines = tuple(self._lines), []
-        return lines
-
-    def _note_links(self, credentials: Credentials) -> None:
-        for link in self._session.info.links():
-            name = link.auth_identifier or ""
-            if name not in self._certificates:
-                self._certificates.add(name)
-                if why := credentials.stranger(name):
-                    self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
+        return () if self._certificates is None else self._certificates.take_lines()
 
     def vouches(self, name: str) -> bool:
         """Return whether a link of this session has had the certificate of a sender, the plant or an agent.
 
-        With links through a relay only the plant's certificate can be seen, and everybody else counts as vouched for:
-        the relay lets each of them use its own keys alone. Without certificates everybody does.
+        Without certificates everybody counts as vouched for.
         """
-        if self._credentials is None or (self._relayed and name != PLANT):
+        if self._certificates is None or self._certificates.vouches(name):
             return True
-        names = self._credentials.common_names(name)
-        if self._certificates.isdisjoint(names):
-            self._note_links(self._credentials)
-        return not self._certificates.isdisjoint(names)
+        self._certificates.note(self._session.info.links())  # one may have just come
+        return self._certificates.vouches(name)
 
     def close(self) -> None:
         """Undeclare the tokens and close."""
