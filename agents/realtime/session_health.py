@@ -3,6 +3,9 @@
 Each measurement lists the agents that the plant hears. If a neighbour on that list is silent here, or the agent itself
 is not on it, the session fails (`wire.timing.session_deadline`).
 
+Both ends of a link see that it fails, and one new session mends it: that of the agent for which most others are silent.
+So an agent that misses only a few of many waits `YIELD` longer, and again if the name of the one it misses is smaller.
+
 Times are s of wall time on the agent's clock.
 """
 
@@ -16,6 +19,10 @@ from wire.timing.session_deadline import SessionDeadline
 
 SILENT = 1.0
 """Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""
+
+
+YIELD = 0.5
+"""Time (s) by which an agent waits longer where the other end may open the new session: one is heard after 0.1 s."""
 
 
 class SessionHealth:
@@ -98,9 +105,11 @@ class SessionHealth:
         now : float
             s on the own clock.
         """
-        silent = self._silent(roster, met, neighbours, now)
+        others = () if roster is None else _expected(roster, self._name, met, neighbours)
+        silent = self._silent(roster, others, now)
         self._patience.whole |= roster is not None and not silent
-        lost = self._patience.lost(silent, now)
+        few = 2 * len(silent) < len(others)
+        lost = self._patience.lost({name: self._yields(name) if few else 0.0 for name in silent}, now)
         for name in silent:
             key, at = self._crossed.get(name, ("", -inf))
             if self._ran and now - at <= SILENT:
@@ -111,19 +120,21 @@ class SessionHealth:
             return "the plant is heard, but does not hear this agent"
         return f"the plant hears {lost}, but nothing comes from it here"
 
-    def _silent(
-        self, roster: Sequence[str] | None, met: Collection[str], neighbours: Collection[str], now: float
-    ) -> tuple[str, ...]:
-        """Return the silent names: the plant, neighbours that it hears, or the agent itself, if it is unheard there."""
+    def _yields(self, missed: str) -> float:
+        """Return how much longer (s) to wait for one of few silent names, so that its agent goes first."""
+        return 0.0 if missed in (PLANT, self._name) else YIELD * (1 + (missed < self._name))
+
+    def _silent(self, roster: Sequence[str] | None, others: Sequence[str], now: float) -> tuple[str, ...]:
+        """Return the silent names: the plant, agents that it hears, or the agent itself, if it is unheard there."""
         if self._ran and now - max(self._came.get(PLANT, -inf), self._plant_seen) > SILENT:
             return (PLANT,)
         if roster is None:
             return ()
         self._ran = True
         unheard = () if self._name in roster else (self._name,)
-        others = (name for name in roster if name != self._name)
-        return *unheard, *(
-            name
-            for name in others
-            if name not in met or (name in neighbours and now - self._came.get(name, -inf) > SILENT)
-        )
+        return *unheard, *(name for name in others if now - self._came.get(name, -inf) > SILENT)
+
+
+def _expected(roster: Sequence[str], own: str, met: Collection[str], neighbours: Collection[str]) -> tuple[str, ...]:
+    """Return the agents of a roster of which something must come: neighbours, and those of which nothing is known."""
+    return tuple(name for name in roster if name != own and (name not in met or name in neighbours))

@@ -8,7 +8,7 @@ has a new id, for which no peer keeps a stale end of a link.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping
 
 PATIENCE = 3.5
 """Silence (s) after which a new session opens. It is longer than Zenoh's lease, after which the others have
@@ -29,7 +29,8 @@ class SessionDeadline:
     Examples
     --------
     >>> patience = SessionDeadline(3.5)
-    >>> [patience.lost(names, now) for names, now in [(("inv2", "inv3"), 0.0), (("inv3",), 3.0), (("inv3",), 3.5)]]
+    >>> both, one = {"inv2": 0.0, "inv3": 0.0}, {"inv3": 0.0}
+    >>> [patience.lost(names, now) for names, now in [(both, 0.0), (one, 3.0), (one, 3.5)]]
     ['', '', 'inv3']
     """
 
@@ -44,13 +45,24 @@ class SessionDeadline:
 
         Examples
         --------
-        >>> patience = SessionDeadline(3.5).next()
-        >>> patience.lost(("inv3",), 0.0), patience.lost(("inv3",), 6.9), patience.lost(("inv3",), 7.0)
+        >>> patience, silent = SessionDeadline(3.5).next(), {"inv3": 0.0}
+        >>> patience.lost(silent, 0.0), patience.lost(silent, 6.9), patience.lost(silent, 7.0)
         ('', '', 'inv3')
         """
         return SessionDeadline(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
 
-    def lost(self, silent: Iterable[str], now: float) -> str:
-        """Note the senders that are wrongly silent now; return the first that has been so too long, else ""."""
+    def lost(self, silent: Mapping[str, float], now: float) -> str:
+        """Note the senders that are wrongly silent now; return the first that has been so too long, else "".
+
+        Parameters
+        ----------
+        silent : Mapping[str, float]
+            Each silent sender, with the time (s) by which it may be silent longer than the patience.
+        now : float
+            s of wall time.
+        """
         self._since = {name: self._since.get(name, now) for name in silent}
-        return next((name for name, since in self._since.items() if now - since >= self._patience), "")
+        return next(
+            (name for name, since in self._since.items() if now - since >= self._patience + silent[name]),
+            "",
+        )

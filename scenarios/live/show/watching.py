@@ -140,7 +140,7 @@ class RunSubscriber:
         heard = {name for name, at in self._heard_at.items() if now - at <= SILENT}
         there = {*([PLANT] if self._client.plant else []), *self._client.present}
         there.update(*(self._used.get(name, ()) for name in heard))
-        silent = sorted(there - heard)
+        silent = dict.fromkeys(sorted(there - heard), 0.0)
         self._patience.whole |= PLANT in heard and not silent
         if self._patience.lost(silent, now):
             self._patience = self._patience.next()
