@@ -187,6 +187,11 @@ class SummaryPass:
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.dropped(link, states)
 
+    def renewed(self, agent: str, t: float) -> None:
+        """Take that an agent opened a new session in wall-clock time, after its state of a run time (s)."""
+        if agent in self._names:
+            self._arrivals.renewed(agent, t)
+
     def counts(self, link: Link, counts: LinkCounts) -> None:
         """Take the account of an emulated link up to now."""
         self._counts[link] = counts

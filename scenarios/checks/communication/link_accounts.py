@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf
+from math import inf, nextafter
 
 from netem.ledger import LinkTrace
 from scenarios.checks.communication.dropped_states import DroppedStates
@@ -132,7 +132,7 @@ class _Verdicts:
 
 @dataclass
 class Presence:
-    """A time in which one process of an agent spoke without a long pause."""
+    """A time in which one process of an agent spoke with one session, without a long pause."""
 
     epoch: int
     """Its epoch."""
@@ -199,6 +199,19 @@ class ArrivalAccounts:
         there[-1].until = max(there[-1].until, state.t)
         if not state.quiet:
             self._states[agent].append(state)
+
+    def renewed(self, agent: str, t: float) -> None:
+        """Note that an agent opened a new session after its state of a run time (s): its links are made anew."""
+        there = self._there[agent]
+        place = next((i for i, one in enumerate(there) if one.since <= t <= one.until), None)
+        if place is None:
+            return
+        before, after = there[place], there[place + 1 :][:1]
+        if before.until == t and after and after[0].epoch == before.epoch:
+            return  # it is told twice
+        later = [state.t for state in self._states[agent] if state.t > t and state.epoch == before.epoch]
+        there.insert(place + 1, Presence(before.epoch, min(later, default=nextafter(t, inf)), before.until))
+        before.until = t
 
     def listens(self, link: Link) -> None:
         """Note that the receiver of a link has its sender for a neighbour, whether anything comes or not."""

@@ -125,6 +125,9 @@ class _Content:
     def dropped(self, link: Link, states: DroppedStates) -> None:
         self.drops[link].append(states)
 
+    def renewed(self, agent: str, t: float) -> None:
+        """Do nothing: `communication_summary` has the accounts of links."""
+
     def counts(self, link: Link, counts: LinkCounts) -> None:
         self.last_counts[link] = counts
 

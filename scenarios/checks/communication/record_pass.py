@@ -24,7 +24,16 @@ from scenarios.record.journal_reader import entries_of, values_of
 from scenarios.record.record_file import RecordFile
 from wire.bounds import MOST_COUNT
 from wire.codec import sound
-from wire.journal import Decision, Entry, Exchange, MessageReference, ReceivedMessage, RejectedCount, SentMessage
+from wire.journal import (
+    Decision,
+    Entry,
+    Exchange,
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    RejectedCount,
+    SentMessage,
+)
 from wire.journal_keys import kind_of, name_of
 from wire.messages import PLANT, Journal, LinkReport, State
 from wire.timing.clock import time_of
@@ -65,6 +74,10 @@ class RecordSink(Protocol):
 
     def dropped(self, link: Link, states: DroppedStates) -> None:
         """Take the number of states that a receiver dropped unread in wall-clock time, or too late to note each."""
+        ...
+
+    def renewed(self, agent: str, t: float) -> None:
+        """Take that an agent opened a new session in wall-clock time, after its state of a run time (s)."""
         ...
 
     def counts(self, link: Link, counts: LinkCounts) -> None:
@@ -139,6 +152,8 @@ class _Pass:
         self._most = int((self._t_end + self._ahead) / self._T_c) if self._simulated else MOST_COUNT
         """Largest number of a state: in simulated time that of its tick."""
         self._coverage: dict[str, JournalCoverage] = {}
+        self._spoke: dict[str, float] = {}
+        """Wall-clock time: run time (s) of the last own state in each agent's journal."""
         self._drop_times = DropTimes(self._t_end, file.info.plant.speed)
         fields = file.info.fields.get(State.__name__, ())
         self._length = len(fields)
@@ -214,6 +229,8 @@ class _Pass:
                 if kind_of(key) == "state" and kind in OF_SENDER:
                     link = name_of(key), journal.sender
                     self._sink.dropped(link, self._drop_times.of(journal.sender, entry))
+            case ProcessEvent(kind="session") if not self._simulated and journal.sender in self._spoke:
+                self._sink.renewed(journal.sender, self._spoke[journal.sender])
             case Decision() if journal.sender != PLANT:
                 self._sink.decision(journal.sender, journal.epoch, entry)
 
@@ -235,6 +252,8 @@ class _Pass:
         numbers = 0 <= state.number <= self._most and 0 <= state.epoch <= MOST_COUNT
         if numbers and self._is_timely(journal, state.t):
             self._sink.state(sender, state)
+            if sender == journal.sender:
+                self._spoke[sender] = state.t
         else:
             self._unreadable += 1
 

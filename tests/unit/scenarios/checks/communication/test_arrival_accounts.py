@@ -19,12 +19,17 @@ IN_FLIGHT = 1.0
 
 
 def missing(
-    sender: Callable[[int], int | None], receiver: Callable[[int], int | None], lost: Collection[int]
+    sender: Callable[[int], int | None],
+    receiver: Callable[[int], int | None],
+    lost: Collection[int],
+    renewed: str = "",
+    told_at: int = 50,
 ) -> list[float]:
     """Run times (s) of the states that are missing, of 10 s with ten states a second.
 
     `sender` and `receiver` give the epoch of the process at a tick, None where there is none or it is frozen; `lost`
-    are the ticks whose state does not arrive.
+    are the ticks whose state does not arrive. An agent that is `renewed` opens a new session after tick 50, and its
+    journal tells it at a later tick.
     """
     accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
     for k in range(100):
@@ -35,6 +40,9 @@ def missing(
                 accounts.state(agent, SentState(k, t, epoch, idle=False, quiet=False))
         if (epoch := sender(k)) is not None and k not in lost:
             accounts.heard(LINK, epoch, k)
+        if renewed and k == told_at:
+            for _ in range(2):  # a part of a journal may come twice
+                accounts.renewed(renewed, 5.0)
     accounts.flush(10.0)
     found = accounts.accounts[LINK]
     return [t for account in found for t in account.late.values() if t <= account.until - IN_FLIGHT]
@@ -81,6 +89,33 @@ def test_links_of_a_process_that_is_frozen_for_long_are_given_up() -> None:
     for ends in ((always, frozen), (frozen, always)):
         assert missing(*ends, range(29, 65)) == []
         assert missing(*ends, [10, *range(29, 65), 80]) == [1.0, 8.0]
+
+
+@pytest.mark.parametrize("renewed", LINK)
+@pytest.mark.parametrize("told_at", [50, 53, 70])
+def test_the_links_of_a_new_session_are_made_anew(renewed: str, told_at: int) -> None:
+    """Either end opens one at 5 s: what is lost in the second before and until something arrives is no fault."""
+    ends = always, always
+    assert missing(*ends, range(45, 56), renewed, told_at) == []
+    assert missing(*ends, [30, *range(45, 56), 70], renewed, told_at) == [3.0, 7.0]
+    assert missing(*ends, range(45, 56)) == [round(0.1 * k, 9) for k in range(45, 56)]
+
+
+def test_a_new_session_over_which_nothing_arrives_is_missed() -> None:
+    """From 7 s after it was opened, here at the end of a longer run."""
+    accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
+    for k in range(200):
+        for agent in LINK:
+            accounts.state(agent, SentState(k, 0.1 * k, 1, idle=False, quiet=False))
+        if k <= 50:
+            accounts.heard(LINK, 1, k)
+        if k == 50:
+            accounts.renewed("inv2", 0.1 * k)
+    accounts.flush(20.0)
+
+    (first, second) = accounts.accounts[LINK]
+    assert not first.late
+    assert min(second.late.values()) == pytest.approx(12.1)
 
 
 def test_a_short_pause_loses_nothing() -> None:

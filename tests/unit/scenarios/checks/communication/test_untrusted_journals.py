@@ -115,3 +115,20 @@ def test_a_window_names_the_same_numbers_however_far_it_is_asked() -> None:
 
     assert window.numbers(2, 6) == [3, 5]
     assert window.numbers(2, MOST_COUNT) == [3, 5, KEPT + 4]
+
+
+def test_a_new_session_in_a_journal_begins_new_accounts_of_links() -> None:
+    """inv2 opens one after 0.5 s and hears inv1 again from 0.7 s on: that the states between are lost is no fault."""
+    new = ["process", 1.0, "session", "instance b"]
+    states = [sent(k, 0.1 * k) for k in range(10)]
+    heard = [["heard", 1.0, "state/inv1", 1, k, ""] for k in range(10) if k not in (5, 6)]
+    other = [[*entry[:2], "state/inv2", entry[3].replace(b"inv1", b"inv2")] for entry in states]
+    found = {
+        renewed: judged([("inv1", packed(*states)), ("inv2", packed(*heard, *entries))], clock="wall")
+        for renewed, entries in ((True, [*other[:6], new, *other[6:]]), (False, other))
+    }
+
+    (whole,) = found[False][0].finish(0).arrivals["inv1", "inv2"]
+    assert sorted(number for _, number in whole.late) == [5, 6]
+    before, after = found[True][0].finish(0).arrivals["inv1", "inv2"]
+    assert (before.until, [number for _, number in before.late], after.late) == (pytest.approx(0.5), [5], {})
