@@ -139,7 +139,7 @@ def _one_session_after_the_other(
                     node.vouches = session.vouches
             _take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
-            session.close()
+            session.close(replaced=core is not None and core.session_broken)
     return nodes
 
 

@@ -21,3 +21,12 @@ def keep_out_of_the_heap() -> None:
     """
     with contextlib.suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)
+
+
+def give_back_freed() -> None:
+    """Give the heap's freed memory back to the system; nothing where the C library is not glibc.
+
+    It takes 1 ms in an agent, and more where more is free: 28 ms for 75 MB.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)

@@ -13,26 +13,39 @@ import os
 import socket
 import stat
 import struct
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
+
+ZENOH_LINGERS = 10
+"""Zenoh's time (s). The kernel keeps it after the option is off, so it tells Zenoh's sockets from others."""
 
 _OFF = struct.pack("ii", 0, 0)
 
 
 def do_not_linger() -> None:
     """Switch SO_LINGER off on this process's TCP sockets; where a process cannot list its open files, do nothing."""
+    for same in tcp_sockets():
+        with suppress(OSError):  # closed in the meantime
+            on, _ = linger(same)
+            if on:
+                same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _OFF)
+
+
+def linger(connection: socket.socket) -> tuple[int, int]:
+    """Return whether closing a socket may block, and for how long (s)."""
+    on, seconds = struct.unpack("ii", connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, len(_OFF)))
+    return on, seconds
+
+
+def tcp_sockets() -> Iterator[socket.socket]:
+    """Yield a copy of each TCP socket of this process, open until the next; none where it cannot list its files."""
     with suppress(OSError):
         for entry in Path("/dev/fd").iterdir():
             with suppress(OSError):  # closed in the meantime
-                _switch_off(int(entry.name))
-
-
-def _switch_off(fd: int) -> None:
-    if not stat.S_ISSOCK(os.fstat(fd).st_mode):
-        return
-    with socket.socket(fileno=os.dup(fd)) as same:
-        if same.type != socket.SOCK_STREAM or same.family not in (socket.AF_INET, socket.AF_INET6):
-            return
-        on, _ = struct.unpack("ii", same.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, len(_OFF)))
-        if on:
-            same.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, _OFF)
+                fd = int(entry.name)
+                if not stat.S_ISSOCK(os.fstat(fd).st_mode):
+                    continue
+                with socket.socket(fileno=os.dup(fd)) as same:
+                    if same.type == socket.SOCK_STREAM and same.family in (socket.AF_INET, socket.AF_INET6):
+                        yield same

@@ -8,6 +8,7 @@ from time import monotonic
 import pytest
 
 from scenarios.drivers.free_endpoint import free_endpoint
+from wire.driver.lingering import tcp_sockets
 from wire.driver.session import Session, SessionError
 
 
@@ -113,3 +114,48 @@ def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_
             session.close()
 
     assert found == {"simulated": (5_000_000, [False, False]), "wall": (200_000, [True, False])}
+
+
+CROWD = """
+import sys
+from wire.driver.session import Session
+plant = Session("plant", listen=(sys.argv[1],), clock="wall", rendezvous=True)
+others = [Session(name, listen=("tcp/127.0.0.1:0",), connect=(sys.argv[1],), clock="wall") for name in "abcd"]
+print("ready", flush=True)
+sys.stdin.read()
+for session in (*others, plant):
+    session.close()
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/dev/fd names every file of a process")
+def test_a_session_that_is_replaced_while_its_links_are_made_leaves_none() -> None:
+    """Zenoh alone leaves links of some in sixty such sessions, each until its other end closes too."""
+    endpoint = free_endpoint()
+    words = [sys.executable, "-c", CROWD, endpoint]
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as crowd:
+        assert crowd.stdout is not None
+        assert crowd.stdout.readline() == "ready\n"
+        for step in range(60):
+            session = Session("e", listen=("tcp/127.0.0.1:0",), connect=(endpoint,), clock="wall")
+            session.take(1, 0.001 * (step % 20))
+            session.close(replaced=True)
+        left = [socket.getpeername() for socket in tcp_sockets()]
+        crowd.communicate()
+
+    assert left == []
+
+
+def test_a_replaced_session_leaves_the_links_of_another_one_alone() -> None:
+    """Two sessions of one process keep their link while a third is closed for a new one."""
+    endpoint = free_endpoint()
+    sender, receiver = Session("a", listen=(endpoint,)), Session("b", connect=(endpoint,))
+    try:
+        receiver.watch("gridpeers/t/alive/**")
+        Session("c", connect=(endpoint,)).close(replaced=True)
+        sender.hold_token("gridpeers/t/alive/a")
+        assert take_one(receiver) == ("appeared", "gridpeers/t/alive/a", b"")
+        assert receiver.peers() == 1
+    finally:
+        receiver.close()
+        sender.close()
