@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable
+from heapq import heappop, heappush
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -108,14 +109,19 @@ class FaultSchedule:
         for kind in sorted({span.kind for span in self.spans}):
             own = [span for span in self.spans if span.kind == kind]
             bounds = sorted({bound for span in own for bound in (span.from_s, span.to_s)})
+            coming = sorted(range(len(own)), key=lambda place: own[place].from_s, reverse=True)
+            begun: list[int] = []  # negative places, as a heap: the latest, which takes precedence, is on top
             for start, end in pairwise(bounds):
-                holds = [span for span in own if span.from_s <= start and end <= span.to_s]
-                if not holds:
+                while coming and own[coming[-1]].from_s <= start:
+                    heappush(begun, -coming.pop())
+                while begun and own[-begun[0]].to_s <= start:
+                    heappop(begun)
+                if not begun:
                     continue
-                last = spans[-1] if spans else None
+                model, last = own[-begun[0]].model, spans[-1] if spans else None
                 # A flap counts from its own beginning, so pieces of one can be joined but never moved.
-                if last and last.kind == kind and last.to_s == start and last.model == holds[-1].model:
+                if last and last.kind == kind and last.to_s == start and last.model == model:
                     spans[-1] = last._replace(to_s=end)
                 else:
-                    spans.append(Span(kind, start, end, holds[-1].model))
+                    spans.append(Span(kind, start, end, model))
         return tuple(spans)
