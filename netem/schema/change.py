@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
@@ -122,31 +122,30 @@ class LinkSchedules:
         return self._schedules[link]
 
 
-def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Netem:
-    """Return entries that do without changes what a scenario did with its changes.
+def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Iterator[Fault]:
+    """Yield entries that do without changes what a scenario did with its changes, those of one receiver after another.
 
-    Links of one receiver that fared alike share an entry. A partition becomes a cut.
+    Links of one receiver that fared alike share an entry. A partition becomes a cut; one by islands is left out, as its
+    links are not known here. The faults of one receiver are in memory at a time: of a long run there are thousands.
     """
-    names = tuple(microgrids)
-    alike: dict[tuple[str, tuple[Span, ...]], list[str]] = {}
-    for link in links_among(names):
-        spans = schedule_of(link, netem, changes, microgrids).flat()
-        if spans:
-            alike.setdefault((link.dst, spans), []).append(link.src)
-    faults = []
-    for (dst, spans), sources in alike.items():
-        on = f"{sources[0]} -> {dst}" if len(sources) == 1 else f"{{{', '.join(sources)}}} -> {dst}"
-        faults += [
-            Fault(
-                on=on,
-                from_s=span.from_s,
-                to_s=None if math.isinf(span.to_s) else span.to_s,
-                **_entry(span),
-            )
-            for span in _cuts_joined(spans)
-        ]
-    islands = tuple(part for part in netem.partitions if part.by == "island")
-    return msgspec.structs.replace(netem, links=tuple(faults), partitions=islands)
+    links = links_among(microgrids)
+    for dst in dict.fromkeys(link.dst for link in links):
+        alike: dict[tuple[Span, ...], list[str]] = {}
+        for link in links:
+            if link.dst == dst:
+                spans = schedule_of(link, netem, _about(link, changes, microgrids), microgrids).flat()
+                alike.setdefault(spans, []).append(link.src)
+        for spans, sources in alike.items():
+            on = f"{sources[0]} -> {dst}" if len(sources) == 1 else f"{{{', '.join(sources)}}} -> {dst}"
+            for span in _cuts_joined(spans):
+                to_s = None if math.isinf(span.to_s) else span.to_s
+                yield Fault(on=on, from_s=span.from_s, to_s=to_s, **_entry(span))
+
+
+def _about(link: Link, changes: Sequence[Change], microgrids: Mapping[str, str]) -> list[Change]:
+    """Return the changes that are about a link: thousands of them have few different patterns, each matched once."""
+    matches = {on: parse(on).matches(*link, microgrids) for on in {change.on for change in changes}}
+    return [change for change in changes if matches[change.on]]
 
 
 def _entry(span: Span) -> dict[str, Any]:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from typing import Any
 
 import msgspec
 
+from netem.schema.fault import Fault
 from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
@@ -31,59 +33,85 @@ def to_toml(
     terse : bool, optional
         Whether values that are defaults, and the table about the run, are left out.
     """
+    return "".join(toml_lines(scenario, as_run, remarks, terse=terse))
+
+
+def toml_lines(
+    scenario: ScenarioModel,
+    as_run: Mapping[str, Any],
+    remarks: Iterable[str] = (),
+    *,
+    terse: bool = False,
+    links: Iterable[Fault] = (),
+) -> Iterator[str]:
+    """Yield the lines of `to_toml`, which has the other parameters.
+
+    Parameters
+    ----------
+    links : Iterable[Fault], optional
+        Further entries `[[link]]`. There may be thousands: each is taken when it is written.
+    """
     keys, tables = _lines(scenario, "", scenario, terse=terse)
     if terse:
-        return "\n".join([*(f"# {remark}".rstrip() for remark in remarks), *keys, *tables]) + "\n"
-    lines = [
-        "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is.",
-        *(f"# {remark}" for remark in remarks),
-        *keys,
-        *tables,
-        "",
-        f"[{AS_RUN}]",
-        *(f"{key} = {_value(value)}" for key, value in as_run.items()),
-    ]
-    return "\n".join(lines) + "\n"
+        head, foot = [f"# {remark}".rstrip() for remark in remarks], []
+    else:
+        first = "# The scenario as run, every default spelled out. `gridpeers run` takes this file as it is."
+        head = [first, *(f"# {remark}" for remark in remarks)]
+        foot = ["", f"[{AS_RUN}]", *(f"{key} = {_value(value)}" for key, value in as_run.items())]
+    for line in chain(head, keys, tables, _entries(links, "link", scenario, terse=terse), foot):
+        yield f"{line}\n"
 
 
 def _lines(
     struct: msgspec.Struct, path: str, common: ScenarioModel, *, entry: bool = False, terse: bool = False
-) -> tuple[list[str], list[str]]:
+) -> tuple[list[str], Iterator[str]]:
     """Return the keys of a table, and the tables below it, as TOML wants them ordered; no case repeats a common table.
 
     Tables below an entry of a list are written on its lines.
     """
     keys: list[str] = []
-    tables: list[str] = []
+    tables: list[Iterator[str]] = []
     for field in fields_of(type(struct)):
-        value, where = getattr(struct, field.name), f"{path}.{_key(field.key)}" if path else _key(field.key)
+        value = getattr(struct, field.name)
+        if value is None or NO_KEY in field.marks:
+            continue
         omits = terse or struct.__struct_config__.omit_defaults
         default = omits and not field.required and INHERITED not in field.marks and value == field.default
         common_too = INHERITED in field.marks and value == getattr(common, field.name)
-        below_terse = terse and INHERITED not in field.marks  # beside a common table, a default is not what is left out
-        if value is None or default or common_too or NO_KEY in field.marks:
+        if default or common_too:
             continue
+        where = f"{path}.{_key(field.key)}" if path else _key(field.key)
+        below_terse = terse and INHERITED not in field.marks  # beside a common table, a default is not what is left out
         if others := field.mark(OtherKeys):
             keys += [f"{_key(key)} = {inline(given)}" for key, given in map(others.write, value)]
         elif INLINE in field.marks:
             inner, below = _lines(value, path, common, terse=below_terse)
-            keys, tables = keys + inner, tables + below
+            keys += inner
+            tables.append(below)
         elif isinstance(value, msgspec.Struct) and not entry:
-            tables += _table(f"[{where}]", value, where, common, terse=below_terse)
+            tables.append(_table(f"[{where}]", value, where, common, terse=below_terse))
         elif isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
-            for item in value:
-                tables += ["", f"[[{where}]]", *_lines(item, where, common, entry=True, terse=terse)[0]]
+            tables.append(_entries(value, where, common, terse=terse))
         elif isinstance(value, dict) and not entry and any(isinstance(it, msgspec.Struct) for it in value.values()):
             for name, item in value.items():
-                tables += _table(f"[{where}.{_key(name)}]", item, f"{where}.{_key(name)}", common, terse=terse)
+                key = f"{where}.{_key(name)}"
+                tables.append(_table(f"[{key}]", item, key, common, terse=terse))
         elif value or not isinstance(value, tuple | dict):
             keys.append(f"{field.key} = {inline(msgspec.to_builtins(value))}")
-    return keys, tables
+    return keys, chain.from_iterable(tables)
 
 
-def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel, *, terse: bool) -> list[str]:
+def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel, *, terse: bool) -> Iterator[str]:
     keys, tables = _lines(struct, path, common, terse=terse)
-    return ["", header, *keys, *tables]
+    return chain(["", header, *keys], tables)
+
+
+def _entries(structs: Iterable[msgspec.Struct], path: str, common: ScenarioModel, *, terse: bool) -> Iterator[str]:
+    """Yield the entries of a list."""
+    for struct in structs:
+        yield ""
+        yield f"[[{path}]]"
+        yield from _lines(struct, path, common, entry=True, terse=terse)[0]
 
 
 def _key(name: str) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import platform
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import msgspec
@@ -20,7 +20,7 @@ from scenarios.results.run_files import shown, write_whole
 from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of
 from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_writing import to_toml
+from scenarios.schema.scenario_writing import toml_lines
 from wire.driver.command_line import command_line
 from wire.messages import LinkRequest
 from wire.timing.clock import rounded_up
@@ -29,6 +29,10 @@ LINKS_ALONE = (
     "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
 )
 """For the head of the file."""
+
+REWRITTEN_EVERY = 10
+"""The file is written anew after a tenth more commands, so after each of the first twenty: to write it takes as long as
+there are commands, of which an hour has hundreds."""
 
 
 class LinkLog:
@@ -41,7 +45,7 @@ class LinkLog:
     feeder : Feeder
         Its feeder.
     replay : Path or None
-        File of the scenario that replays the run's links: written in any case, and anew with every link command.
+        File of the scenario that replays the run's links: written at the end in any case, and now and then before.
     replay_if_changed : Path or None
         The same, but only written once there is a link command.
     """
@@ -52,6 +56,8 @@ class LinkLog:
         self._scenario, self._feeder = scenario, feeder
         self._replay, self._replay_if_changed = replay, replay_if_changed
         self._commands: dict[int, Change] = {}
+        self._due = 1
+        """Number of commands with which the file is next written."""
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -61,7 +67,10 @@ class LinkLog:
     def __call__(self, message: LinkRequest) -> None:
         """Take a command to links."""
         self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
-        self._write_replay(message.t)
+        count = len(self._commands)
+        if count >= self._due:
+            self._due = count + max(1, count // REWRITTEN_EVERY)
+            self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
@@ -70,21 +79,15 @@ class LinkLog:
         return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
 
     def _write_replay(self, t: float) -> None:
-        files = [self._replay, self._replay_if_changed if self._commands else None]
-        text = to_toml(
-            replay_of(self._scenario, self._feeder, self.changes, t),
-            {"driver": LIVE, "python": platform.python_version()},
-            [LINKS_ALONE],
-        )
-        for file in files:
-            if file is not None:
-                write_whole(file, text)
+        for file in filter(None, [self._replay, self._replay_if_changed if self._commands else None]):
+            write_whole(file, replay_lines(self._scenario, self._feeder, self.changes, t))
 
 
-def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> ScenarioModel:
-    """Return the scenario whose links change by schedule as they did by command; it leaves out agents that it lacks.
+def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> Iterator[str]:
+    """Yield the lines of the scenario whose links change by schedule as they did by command.
 
-    An age that the live run had by default is written out, as there is no such default in simulated time.
+    It leaves out agents that the scenario lacks. An age that the live run had by default is written out, as there is no
+    such default in simulated time.
 
     Parameters
     ----------
@@ -104,14 +107,18 @@ def replay_of(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change]
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
     end = max(scenario.time.end_s, rounded_up(needed, T_c))
-    return msgspec.structs.replace(
+    netem = netem_of(scenario, name)
+    by_island = tuple(part for part in netem.partitions if part.by == "island")
+    replay = msgspec.structs.replace(
         scenario,
         name="",
         paper="",
         time=msgspec.structs.replace(scenario.time, end_s=end),
-        netem=replayed(netem_of(scenario, name), changes, microgrids),
+        netem=msgspec.structs.replace(netem, links=(), partitions=by_island),
         cases={name: msgspec.structs.replace(case, netem=Netem(), degraded_communication=ages)},
     )
+    as_run = {"driver": LIVE, "python": platform.python_version()}
+    return toml_lines(replay, as_run, [LINKS_ALONE], links=replayed(netem, changes, microgrids))
 
 
 def check_new(option: str, file: Path | None) -> None:

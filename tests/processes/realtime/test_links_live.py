@@ -128,7 +128,7 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
     assert {fate for t, fate in verdicts(traces["inv2", "inv4"]) if t >= delayed_at} == {0.05}
     assert any(joined_at <= t < healed_at for t, _ in verdicts(traces["inv3", "inv4"]))
 
-    again = setup(links=replayed(told.netem, changes, MICROGRIDS).links)
+    again = setup(links=tuple(replayed(told.netem, changes, MICROGRIDS)))
     lost = {n: fate for n, (t, fate) in fates(traces["inv1", "inv2"]).items() if t >= set_at}
     by_schedule = {n: fate for n, (t, fate) in fates(simulated(again, 6.0)["inv1", "inv2"]).items() if t >= set_at}
     common = sorted(lost.keys() & by_schedule.keys())

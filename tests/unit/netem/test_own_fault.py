@@ -200,7 +200,7 @@ def test_every_problem_of_an_entry_is_told_at_its_key(folder: str) -> None:
 def test_a_run_with_one_can_be_replayed(folder: str) -> None:
     """The file of a live run names it again, with its parameters and its folder."""
     entry = fault(folder, "Jam", parameters=(("share", 0.5),), from_s=1.0)
-    (again,) = replayed(Netem(links=(entry,)), (), {"inv1": "MG1", "inv2": "MG1"}).links
+    (again,) = replayed(Netem(links=(entry,)), (), {"inv1": "MG1", "inv2": "MG1"})
 
     assert (again.on, again.own, again.from_s) == (entry.on, entry.own, 1.0)
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
+
+import msgspec
+import pytest
 
 from agents.agent_config import MAX_AGE
 from netem.schema.change import Heal, schedule_of
 from netem.schema.fault import Fault
 from netem.schema.pattern import Link, links_among
 from scenarios.emulation.link_command import LinkCommand
-from scenarios.live.launch.link_log import replay_of
-from scenarios.schema import load_scenario
+from scenarios.live.launch.link_log import LinkLog, replay_lines
+from scenarios.schema import find_scenario, load_scenario
 from scenarios.schema.netem_tables import netem_of, setup_of
-from scenarios.schema.scenario_writing import to_toml
+from wire.messages import PLANT, LinkRequest
 
 
 def test_the_replayed_scenario_is_one_and_its_links_do_what_was_commanded(tmp_path: Path) -> None:
@@ -30,7 +34,7 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_commanded(tmp_pa
         LinkCommand(heal=Heal(on="inv1 -> inv4", from_s=0.0)).at(1.4),
         LinkCommand(fault=Fault(on="inv7 -> inv8", loss=0.5)).at(7.34),
     ]
-    (tmp_path / "again.toml").write_text(to_toml(replay_of(scenario, feeder, changes, 7.33), {}))
+    (tmp_path / "again.toml").write_text("".join(replay_lines(scenario, feeder, changes, 7.33)))
     again, _ = load_scenario(tmp_path / "again.toml")
     netem = netem_of(again, "IV")
 
@@ -46,3 +50,70 @@ def test_the_replayed_scenario_is_one_and_its_links_do_what_was_commanded(tmp_pa
             assert {k: m for k, m in was.items() if k in ("delay", "loss")} == {
                 k: m for k, m in is_now.items() if k in ("delay", "loss")
             }
+
+
+def a_log(folder: Path, *, record: bool = False) -> tuple[LinkLog, Path]:
+    """Return the log of a run of islanding IV, and its file."""
+    scenario, feeder = load_scenario(find_scenario("islanding"))
+    scenario = msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]})
+    file = folder / "replay.toml"
+    replay, if_changed = (file, None) if record else (None, file)
+    return LinkLog(scenario=scenario, feeder=feeder, replay=replay, replay_if_changed=if_changed), file
+
+
+def cut(number: int) -> LinkRequest:
+    """Return the command of a number: one cut of inv1 -> inv2, at its second."""
+    tree = LinkCommand(fault=Fault(on="inv1 -> inv2", cut=True), for_s=0.5).to_tree()
+    return LinkRequest(sender=PLANT, epoch=1, seq=number, t=float(number), link_command=tree, reply_to="")
+
+
+def cuts_in(file: Path) -> int:
+    """Return how many cuts a file has; a scenario is what it must be at any time."""
+    return len(load_scenario(file)[0].netem.links)
+
+
+def test_the_first_twenty_commands_are_written_at_once_and_later_ones_by_the_tenth(tmp_path: Path) -> None:
+    """A run that is killed has its first twenty commands in the file, and after them all but a tenth at most."""
+    log, file = a_log(tmp_path)
+    written = []
+    for number in range(1, 61):
+        log(cut(number))
+        if file.exists():
+            written.append(cuts_in(file))
+            file.unlink()
+    assert written == [*range(1, 21), 22, 24, 26, 28, 30, 33, 36, 39, 42, 46, 50, 55, 60]
+
+
+def test_the_end_writes_what_is_not_yet_written(tmp_path: Path) -> None:
+    """However the run ends by itself, its file has all commands."""
+    log, file = a_log(tmp_path)
+    for number in range(1, 24):
+        log(cut(number))
+    before = cuts_in(file)
+    (line,) = log.close(24.0)
+    assert (before, cuts_in(file)) == (22, 23)
+    assert line.endswith("replay.toml")
+
+
+@pytest.mark.parametrize(("record", "there"), [(True, True), (False, False)])
+def test_without_a_command_only_a_file_that_was_asked_for_is_written(tmp_path: Path, record: bool, there: bool) -> None:
+    """`--record FILE` is there after every run; a folder of results has a replay only of links that were changed."""
+    log, file = a_log(tmp_path, record=record)
+    lines = log.close(5.0)
+    assert (file.exists(), bool(lines)) == (there, there)
+
+
+def test_a_write_takes_the_memory_of_one_receivers_faults() -> None:
+    """To write hundreds of commands takes less memory than their text has: each entry is made when it is written."""
+    scenario, feeder = load_scenario(find_scenario("islanding"))
+    scenario = msgspec.structs.replace(scenario, cases={"IV": scenario.cases["IV"]})
+    changes = [
+        Fault(on=f"inv{number % 9 + 1} -> *", loss=0.5, from_s=number + 1.0, to_s=number + 1.5) for number in range(360)
+    ]
+    lines = replay_lines(scenario, feeder, changes, 400.0)
+    tracemalloc.start()
+    written = sum(len(line) for line in lines)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert written > 200_000
+    assert peak < written
