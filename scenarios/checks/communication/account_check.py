@@ -10,7 +10,7 @@ from scenarios.checks.check_verdict import NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.communication.link_accounts import Missing
-from scenarios.checks.communication.record_pass import Link
+from scenarios.checks.communication.record_sink import Link
 from scenarios.checks.judged_time import require_longer
 from wire.schema.plausible import Plausible, Unit
 

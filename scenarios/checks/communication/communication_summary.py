@@ -25,7 +25,8 @@ from scenarios.checks.communication.link_accounts import (
     VerdictAccounts,
 )
 from scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from scenarios.checks.communication.record_pass import Link, SentState, end_of, opened, read_into
+from scenarios.checks.communication.record_pass import end_of, opened, read_into
+from scenarios.checks.communication.record_sink import Link, SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo

@@ -13,7 +13,7 @@ from netem.ledger import LinkTrace
 from netem.schema.fault import Span
 from netem.schema.pattern import Link as LinkEnds
 from scenarios.checks.communication.neighbour_use import Uses
-from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.record_sink import Link, SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.checks.communication.state_window import StateWindow
 from scenarios.emulation.emulation_config import EmulationConfig

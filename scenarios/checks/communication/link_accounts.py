@@ -10,7 +10,7 @@ from math import inf, nextafter
 from netem.ledger import LinkTrace
 from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.neighbour_use import Uses
-from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.record_sink import Link, SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.record.journal_coverage import Hole, inside
 from wire.messages import PLANT

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from scenarios.checks.communication.record_pass import Link, SentState
+from scenarios.checks.communication.record_sink import Link, SentState
 from scenarios.checks.communication.state_window import StateWindow
 from scenarios.record.journal_coverage import INSTANT, Hole, inside
 from wire.journal import Decision

@@ -14,7 +14,8 @@ from pathlib import Path
 from netem.ledger import LinkCounts, LinkTrace
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.checks.communication.record_pass import Link, SentState, end_of, opened, read_into
+from scenarios.checks.communication.record_pass import end_of, opened, read_into
+from scenarios.checks.communication.record_sink import Link, SentState
 from scenarios.record.journal_coverage import Hole
 from scenarios.record.record_info import RecordInfo
 from wire.journal import Decision

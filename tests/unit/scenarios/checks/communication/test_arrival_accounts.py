@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 import pytest
 
 from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 
 LINK = ("inv1", "inv2")
 

@@ -12,7 +12,7 @@ from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication import record_content
 from scenarios.checks.communication.communication_summary import SummaryPass
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 from scenarios.record.record_file import RecordFile
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
 from tests.unit.scenarios.checks.communication.records import CUT, LOSSY, QUIET

@@ -19,7 +19,7 @@ from scenarios.checks.communication.communication_summary import summarise
 from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.link_accounts import ArrivalAccounts
 from scenarios.checks.communication.record_content import read_content
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 from scenarios.record.record_info import FILE
 from tests.fuzz.journals import judged
 from tests.record.fake_clock import FakeClockRun, fake_clock_record

@@ -10,7 +10,7 @@ import pytest
 from netem.ledger import LinkTrace
 from scenarios.checks.communication.heals import Heal, Heals
 from scenarios.checks.communication.neighbour_use import NeighbourUse, Uses
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 from scenarios.checks.communication.sent_states import SentStates
 
 T_C = 0.02

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 from scenarios.checks.communication.sent_states import SentStates
 from scenarios.checks.communication.state_window import StateWindow
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from netem.ledger import LinkTrace
-from scenarios.checks.communication.record_pass import SentState
+from scenarios.checks.communication.record_sink import SentState
 from scenarios.checks.communication.state_window import KEPT, StateWindow
 from tests.fuzz.journals import judged, link_report
 from wire.bounds import MOST_COUNT
