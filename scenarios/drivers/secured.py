@@ -9,7 +9,8 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
-from wire.trust.key_folder import KeysError, open_credentials
+from wire.trust.certificate_files import KeysError
+from wire.trust.key_folder import open_credentials
 
 
 def secured(

@@ -55,7 +55,8 @@ from tests.toy.toy_configs import agent_config
 from wire.codec import CRC, RejectedError, decode, encode
 from wire.keys import Keys, epoch_of, run_of_plant
 from wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
-from wire.trust.key_folder import KeysError, open_credentials
+from wire.trust.certificate_files import KeysError
+from wire.trust.key_folder import open_credentials
 
 LIFE = 2_000
 """Messages after which a core is made anew: a false one may have ended what it does."""

@@ -23,7 +23,8 @@ from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
 from wire.bounds import LONGEST_MESSAGE, MOST_COUNT
 from wire.messages import LinkReport
-from wire.trust.key_folder import KeysError, read_list
+from wire.trust.certificate_files import KeysError
+from wire.trust.member_list import read_list
 from wire.trust.site_authority import issue, make_site
 
 NO_UTF8 = b"\x81\xa4typ\xe5\x01"
@@ -75,7 +76,8 @@ def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -
     from cryptography.hazmat.primitives import serialization
     from cryptography.x509 import load_pem_x509_certificate
 
-    from wire.trust.key_folder import KeysError, open_credentials
+    from wire.trust.certificate_files import KeysError
+    from wire.trust.key_folder import open_credentials
     from wire.trust.site_authority import issue, make_site
 
     folder = tmp_path / "lab"

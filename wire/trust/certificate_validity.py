@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from wire.trust.key_folder import KeysError, own_certificate
+from wire.trust.certificate_files import KeysError, own_certificate
 from wire.trust.member import DATE_AND_TIME, Member
 
 

@@ -1,65 +1,27 @@
-"""The folder with a site's certificates and keys: what stands in it, and whether a process may use it.
+"""The folder with a site's certificates and keys: which member's a process takes, and whether it may use them.
 
 ``ca.pem`` is the certificate of the site's authority and ``ca.key`` its private key, which stays where certificates are
 issued. ``NAME.pem`` and ``NAME.key`` are those of a member. ``members.json`` lists all members, signed by the
 authority. A host needs ``ca.pem``, ``members.json`` and the two files of its own members, and no more.
-
-The package cryptography is imported where it is used: a run without certificates does without.
 """
 
 from __future__ import annotations
 
-import base64
-import stat
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-import msgspec
-
-from wire.bounds import is_name
-from wire.foreign_bytes import decode_foreign
 from wire.printable import printable
+from wire.trust.certificate_files import CA, KeysError, check_certificate, check_key, read_certificate
 from wire.trust.credentials import Credentials
 from wire.trust.member import DATE_AND_TIME, Member, Role
-
-if TYPE_CHECKING:
-    from cryptography import x509
-
-CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"
+from wire.trust.member_list import MemberList, read_list
 
 COMMANDING: tuple[Role, ...] = ("operator",)
 """Roles that may command a run."""
 
 SOON = timedelta(days=30)
 """Time before its end at which a certificate is said to end soon."""
-
-
-class KeysError(ValueError):
-    """Certificates or keys cannot be used; the message says which, why, and what to do."""
-
-
-class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All members of a site, revoked ones included."""
-
-    site: str
-    """Name of the site."""
-    version: int
-    """Number of changes so far; of two lists the greater is the later."""
-    members: tuple[Member, ...] = ()
-
-    def of(self, name: str) -> Member | None:
-        """Return the member of a name; None if there is none."""
-        return next((member for member in self.members if member.name == name), None)
-
-
-class SignedList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The content of ``members.json``."""
-
-    list: MemberList
-    signature: str
-    """Signature of the authority over the list as JSON (ECDSA with SHA-256, base64)."""
 
 
 def open_credentials(
@@ -108,9 +70,9 @@ def open_credentials(
             f"{folder}/{member.name}.pem: was revoked; gridpeers keys issue {member.name} gives {member.name} a new one"
         )
     certificate, key = folder / f"{member.name}.pem", folder / f"{member.name}.key"
-    ca, own = _certificate(folder / CA), _certificate(certificate)
-    ends = _check_certificate(own, ca, certificate, folder, member, now)
-    _check_key(key, own)
+    ca, own = read_certificate(folder / CA), read_certificate(certificate)
+    ends = check_certificate(own, ca, certificate, folder, member, now)
+    check_key(key, own)
     soon = (
         f"the certificate of {member.name} ends on {ends:{DATE_AND_TIME}}; gridpeers keys issue {member.name} renews it"
     )
@@ -121,85 +83,6 @@ def open_credentials(
         key=str(key.absolute()),
         members=known.members,
     ), soon if ends - now < SOON else ""
-
-
-def read_list(folder: Path) -> MemberList:
-    """Return the members of a site, if the list is whole and signed by the folder's authority."""
-    from cryptography.exceptions import InvalidSignature
-    from cryptography.hazmat.primitives import hashes
-    from cryptography.hazmat.primitives.asymmetric import ec
-
-    _require_folder(folder)
-    if not (folder / CA).exists() and not (folder / LIST).exists():
-        here = "the present folder" if folder == Path() else str(folder)
-        raise KeysError(
-            f"{here} has no certificates: neither {CA} nor {LIST} is there; name by --keys DIR the folder that "
-            "gridpeers keys init has made"
-        )
-    public = _certificate(folder / CA).public_key()
-    data = _bytes(folder / LIST)
-    try:
-        signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, data)
-        signature = base64.b64decode(signed.signature, validate=True)
-    except ValueError as error:
-        raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
-    try:
-        if not isinstance(public, ec.EllipticCurvePublicKey):  # no authority that gridpeers has made
-            raise InvalidSignature
-        public.verify(signature, msgspec.json.encode(signed.list), ec.ECDSA(hashes.SHA256()))
-    except InvalidSignature:
-        raise KeysError(
-            f"{folder / LIST}: is not signed by {CA} beside it; copy both from the same site, unchanged"
-        ) from None
-    if not all(is_name(member.name) for member in signed.list.members):
-        raise KeysError(f"{folder / LIST}: has a name that is none; copy it anew from the site")
-    return signed.list
-
-
-def own_certificate(folder: Path, member: Member) -> x509.Certificate | None:
-    """Return the certificate of a member if it is in the folder; None if it is not, or is of an earlier generation.
-
-    Raises
-    ------
-    KeysError
-        If the file is no certificate, or cannot be read.
-    """
-    path = folder / f"{member.name}.pem"
-    if not path.exists():
-        return None
-    certificate = _certificate(path)
-    return certificate if _common_name(certificate) == member.common_name else None
-
-
-def require_private(path: Path) -> None:
-    """Raise KeysError if anybody but its owner may read or write a file."""
-    mode = stat.S_IMODE(path.stat().st_mode)
-    if mode & 0o077:
-        raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
-
-
-def exposed_keys(folder: Path) -> list[str]:
-    """Return a sentence for each private key in a folder that others than its owner may read or change."""
-    sentences = []
-    for path in sorted(folder.glob("*.key")):
-        try:
-            require_private(path)
-        except KeysError as error:
-            sentences.append(str(error))
-        except OSError as error:
-            sentences.append(f"{path}: cannot be read: {error.strerror}")
-    return sentences
-
-
-def _require_folder(folder: Path) -> None:
-    try:
-        there = stat.S_ISDIR(folder.stat().st_mode)
-    except FileNotFoundError:
-        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one") from None
-    except OSError as error:
-        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
-    if not there:
-        raise KeysError(f"{folder}: is no folder; say the folder that gridpeers keys init has made")
 
 
 def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
@@ -225,85 +108,6 @@ def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
         f"{folder}: {viewer.name} has the role viewer, which may look at a run (status, watch, view) and not command "
         f"it; an {COMMANDING[0]} may: {way}"
     )
-
-
-def _check_certificate(
-    own: x509.Certificate, ca: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime
-) -> datetime:
-    """Raise KeysError unless a certificate is valid and names the member; return its end."""
-    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
-
-    try:
-        own.verify_directly_issued_by(ca)
-    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
-        raise KeysError(
-            f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
-        ) from None
-    common_name = _common_name(own)
-    if common_name != member.common_name:
-        raise KeysError(
-            f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
-            f"{member.name}, or issue it anew"
-        )
-    for certificate, what in ((own, path), (ca, folder / CA)):
-        begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
-        if now > ends:
-            renewal = f"gridpeers keys issue {member.name}" if certificate is own else "gridpeers keys init"
-            raise KeysError(f"{what}: expired on {ends:{DATE_AND_TIME}}; {renewal} makes a new one")
-        if now < begins:
-            raise KeysError(
-                f"{what}: is valid from {begins:{DATE_AND_TIME}}, and the clock of this host shows "
-                f"{now:%Y-%m-%d %H:%M}; set the clock"
-            )
-    first_end: datetime = min(own.not_valid_after_utc, ca.not_valid_after_utc)
-    return first_end
-
-
-def _common_name(certificate: x509.Certificate) -> str:
-    """Return the common name of a certificate; empty if it has none."""
-    from cryptography.x509.oid import NameOID
-
-    named = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    return str(named[0].value) if named else ""
-
-
-def _check_key(path: Path, certificate: x509.Certificate) -> None:
-    """Raise KeysError unless a private key is that of a certificate, and private."""
-    from cryptography.exceptions import UnsupportedAlgorithm
-    from cryptography.hazmat.primitives.serialization import load_pem_private_key
-
-    data = _bytes(path)
-    require_private(path)
-    try:
-        key = load_pem_private_key(data, None)
-    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
-        raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
-    if key.public_key() != certificate.public_key():
-        raise KeysError(f"{path}: is not the key of {path.with_suffix('.pem').name}; copy both from the same site")
-
-
-def _certificate(path: Path) -> x509.Certificate:
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
-
-    data = _bytes(path)
-    try:
-        certificate = x509.load_pem_x509_certificate(data)
-        certificate.public_key(), certificate.subject, certificate.not_valid_after_utc  # read when they are asked for
-        return certificate
-    except (ValueError, UnsupportedAlgorithm):
-        raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
-
-
-def _bytes(path: Path) -> bytes:
-    try:
-        if not path.is_dir() and path.exists() and not path.is_file():  # to read a pipe would take for ever
-            raise KeysError(f"{path}: is no file; copy it anew from the site")
-        return path.read_bytes()
-    except FileNotFoundError:
-        raise KeysError(f"{path}: is missing; copy it from the folder where the site issues certificates") from None
-    except OSError as error:
-        raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
 
 
 def _or(roles: Sequence[Role]) -> str:

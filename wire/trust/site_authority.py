@@ -17,8 +17,9 @@ import msgspec
 
 from wire.bounds import is_name
 from wire.printable import printable
-from wire.trust.key_folder import CA, CA_KEY, LIST, KeysError, MemberList, SignedList, read_list, require_private
+from wire.trust.certificate_files import CA, CA_KEY, KeysError, require_private
 from wire.trust.member import DATE_AND_TIME, LONGEST_COMMON_NAME, Member, Role
+from wire.trust.member_list import LIST, MemberList, SignedList, read_list
 
 if TYPE_CHECKING:
     from cryptography import x509

@@ -66,7 +66,8 @@ def issue(
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
     with _errors(days):
-        from wire.trust.key_folder import KeysError, read_list
+        from wire.trust.certificate_files import KeysError
+        from wire.trust.member_list import read_list
         from wire.trust.site_authority import issue, objections
 
         names = list(dict.fromkeys(names))
@@ -103,8 +104,9 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
+        from wire.trust.certificate_files import CA_KEY, exposed_keys
         from wire.trust.certificate_validity import validity
-        from wire.trust.key_folder import CA_KEY, LIST, exposed_keys, read_list
+        from wire.trust.member_list import LIST, read_list
 
         known, now = read_list(keys), datetime.now(UTC)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
@@ -124,7 +126,7 @@ def _errors(days: float = 1.0) -> Iterator[None]:
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
     if not 0.0 < days <= 3650.0:
         fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
-    from wire.trust.key_folder import KeysError
+    from wire.trust.certificate_files import KeysError
 
     try:
         yield

@@ -122,7 +122,7 @@ def usage_errors() -> Iterator[None]:
     from scenarios.results.run_files import FolderError
     from wire.driver.process import ConfigurationError
     from wire.driver.session import SessionError
-    from wire.trust.key_folder import KeysError
+    from wire.trust.certificate_files import KeysError
 
     try:
         yield

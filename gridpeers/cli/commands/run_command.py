@@ -116,7 +116,7 @@ def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
     from scenarios.drivers.secured import secured
     from scenarios.schema.configs import configs
     from scenarios.schema.participants import inverters_of
-    from wire.trust.key_folder import KeysError
+    from wire.trust.certificate_files import KeysError
 
     inverters = tuple(row.name for row in inverters_of(spec, feeder))
     notes: dict[str, None] = {}

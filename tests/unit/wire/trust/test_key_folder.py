@@ -15,7 +15,9 @@ import pytest
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
-from wire.trust.key_folder import KeysError, exposed_keys, open_credentials, read_list
+from wire.trust.certificate_files import KeysError, exposed_keys
+from wire.trust.key_folder import open_credentials
+from wire.trust.member_list import read_list
 from wire.trust.site_authority import issue, make_site, revoke
 
 NOW = datetime(2026, 11, 23, 12, tzinfo=UTC)
