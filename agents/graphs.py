@@ -21,6 +21,7 @@ from typing import Annotated, Any, Protocol
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, callable_objection, made
 from wire.plugins.registry import PluginError, Registry
+from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 from wire.schema.suggestion import suggestion
 
@@ -255,8 +256,9 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
     """Return each agent's in-neighbours as the rule has them."""
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
-        result = rule(ordered)
-        return {one: frozenset(result[one]) for one in result}
+        with unreplaced():
+            result = rule(ordered)
+            return {one: frozenset(result[one]) for one in result}
     except ANYTHING as error:  # a rule is foreign code
         raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
 

@@ -22,6 +22,7 @@ from netem.draws import Stream
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, class_objection, made
 from wire.plugins.registry import Registry
+from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 from wire.schema.table_reading import parameter_values
 
@@ -151,7 +152,8 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
             return 0.0
         why = ""
         try:
-            added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
+            with unreplaced():
+                added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
             if added is None:
                 return None
             if not isinstance(added, bool) and isfinite(added) and 0.0 <= added <= LONGEST:

@@ -28,6 +28,7 @@ from scenarios.results.findings import Findings
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import Plugin, made
 from wire.plugins.registry import PluginError
+from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
@@ -77,7 +78,8 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     verdicts = []
     for claim in claims:
         try:
-            verdicts.append(_verdict(claim, findings))
+            with unreplaced():
+                verdicts.append(_verdict(claim, findings))
         except ANYTHING as error:  # a claim is a user's code
             verdicts.append(
                 Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, findings)}")

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.plugin import KEYS, Plugin, callable_objection, made
 from wire.plugins.registry import PluginError, Registry
+from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 if TYPE_CHECKING:
@@ -82,9 +83,10 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     reasons: dict[str, str] = {}
     for name, metric in metrics:
         try:
-            result = metric(data)
-            several = dict(result) if isinstance(result, Mapping) else {"": result}
-            numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
+            with unreplaced():
+                result = metric(data)
+                several = dict(result) if isinstance(result, Mapping) else {"": result}
+                numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
         except ANYTHING as error:  # a metric is a user's code, and its result is too
             values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
             continue
