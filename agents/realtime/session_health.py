@@ -4,7 +4,8 @@ Each measurement lists the agents that the plant hears. If a neighbour on that l
 is not on it, the session fails (`wire.timing.session_deadline`).
 
 Both ends of a link see that it fails, and one new session mends it: that of the agent for which most others are silent.
-So an agent that misses only a few of many waits `YIELD` longer, and again if the name of the one it misses is smaller.
+So an agent that misses no more than half of the others waits `STAGGER` longer, and again if the name of the one it
+misses is smaller.
 
 Times are s of wall time on the agent's clock.
 """
@@ -20,9 +21,9 @@ from wire.timing.session_deadline import SessionDeadline
 SILENT = 1.0
 """Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""
 
-
-YIELD = 0.5
-"""Time (s) by which an agent waits longer where the other end may open the new session: one is heard after 0.1 s."""
+STAGGER = 0.5
+"""Time (s) between the agents that may open the new session, so that the first spares the others: one is heard after
+0.1 s."""
 
 
 class SessionHealth:
@@ -108,8 +109,8 @@ class SessionHealth:
         others = () if roster is None else _expected(roster, self._name, met, neighbours)
         silent = self._silent(roster, others, now)
         self._patience.whole |= roster is not None and not silent
-        few = 2 * len(silent) < len(others)
-        lost = self._patience.lost({name: self._yields(name) if few else 0.0 for name in silent}, now)
+        half = 2 * len(silent) <= len(others)
+        lost = self._patience.lost({name: self._stagger(name) if half else 0.0 for name in silent}, now)
         for name in silent:
             key, at = self._crossed.get(name, ("", -inf))
             if self._ran and now - at <= SILENT:
@@ -120,9 +121,9 @@ class SessionHealth:
             return "the plant is heard, but does not hear this agent"
         return f"the plant hears {lost}, but nothing comes from it here"
 
-    def _yields(self, missed: str) -> float:
-        """Return how much longer (s) to wait for one of few silent names, so that its agent goes first."""
-        return 0.0 if missed in (PLANT, self._name) else YIELD * (1 + (missed < self._name))
+    def _stagger(self, missed: str) -> float:
+        """Return how much longer (s) to wait for a silent name, so that its agent opens the new session first."""
+        return 0.0 if missed in (PLANT, self._name) else STAGGER * (1 + (missed < self._name))
 
     def _silent(self, roster: Sequence[str] | None, others: Sequence[str], now: float) -> tuple[str, ...]:
         """Return the silent names: the plant, agents that it hears, or the agent itself, if it is unheard there."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agents.realtime.session_health import YIELD, SessionHealth
+from agents.realtime.session_health import STAGGER, SessionHealth
 from wire.timing.session_deadline import PATIENCE
 
 NAMES = tuple(f"inv{i}" for i in range(1, 10))
@@ -29,19 +29,26 @@ def test_an_agent_that_nobody_hears_goes_before_all_others() -> None:
     everybody = tuple(name for name in NAMES if name != "inv9")
     assert lasted("inv9", everybody) == pytest.approx(PATIENCE, abs=0.02)
     for name in everybody:
-        assert lasted(name, ("inv9",)) >= PATIENCE + YIELD
+        assert lasted(name, ("inv9",)) >= PATIENCE + STAGGER
 
 
 def test_of_two_that_miss_only_each_other_the_one_with_the_smaller_name_goes_first() -> None:
     """The other one follows, should that not help."""
-    assert lasted("inv2", ("inv5",)) == pytest.approx(PATIENCE + YIELD, abs=0.02)
-    assert lasted("inv5", ("inv2",)) == pytest.approx(PATIENCE + 2.0 * YIELD, abs=0.02)
+    assert lasted("inv2", ("inv5",)) == pytest.approx(PATIENCE + STAGGER, abs=0.02)
+    assert lasted("inv5", ("inv2",)) == pytest.approx(PATIENCE + 2.0 * STAGGER, abs=0.02)
 
 
-def test_who_misses_half_of_the_others_or_is_unheard_waits_no_longer() -> None:
+def test_in_a_ring_too_one_of_two_that_miss_each_other_goes_first() -> None:
+    """Each hears its other neighbour, so either session may be to blame."""
+    ring = "inv1", "inv2", "inv3"
+    assert lasted("inv1", ("inv2",), ring) == pytest.approx(PATIENCE + STAGGER, abs=0.02)
+    assert lasted("inv2", ("inv1",), ring) == pytest.approx(PATIENCE + 2.0 * STAGGER, abs=0.02)
+
+
+def test_who_misses_more_than_half_of_the_others_or_is_unheard_waits_no_longer() -> None:
     """Its own session is to blame."""
-    assert lasted("inv5", ("inv1", "inv2", "inv3", "inv4")) == pytest.approx(PATIENCE, abs=0.02)
-    assert lasted("inv2", ("inv1",), ("inv1", "inv2", "inv3")) == pytest.approx(PATIENCE, abs=0.02)
+    assert lasted("inv5", ("inv1", "inv2", "inv3", "inv4", "inv6")) == pytest.approx(PATIENCE, abs=0.02)
+    assert lasted("inv2", ("inv1", "inv3"), ("inv1", "inv2", "inv3")) == pytest.approx(PATIENCE, abs=0.02)
     health = SessionHealth("inv5")
     for k in range(2000):
         for name in ("plant", *NAMES):
