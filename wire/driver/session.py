@@ -46,6 +46,9 @@ names as he likes."""
 _open_sessions: WeakSet[Session] = WeakSet()
 """Sessions of this process that are not closed."""
 
+_clearing = threading.Lock()
+"""Held while the links that a closed session left are ended: those of one that another thread opens look the same."""
+
 
 def load_zenoh(*, one_thread: bool = False) -> None:
     """Import Zenoh and choose its threads, which the first session starts; a ZENOH_RUNTIME of the user's own counts."""
@@ -141,7 +144,8 @@ class Session:
             star=star,
             credentials=credentials,
         )
-        _open_sessions.add(self)
+        with _clearing:
+            _open_sessions.add(self)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
         if star and not rendezvous:
@@ -343,10 +347,11 @@ class Session:
         # close() may raise when a peer has just gone; nothing can be done about it
         with contextlib.suppress(self._zenoh.ZError):
             self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        _open_sessions.discard(self)
-        if replaced and not _open_sessions:
-            end_left_links()
-            give_back_freed()
+        with _clearing:
+            _open_sessions.discard(self)
+            if replaced and not _open_sessions:
+                end_left_links()
+                give_back_freed()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
         """Run a callback in Zenoh's receiving thread: one hand-over less than through a thread of its own."""

@@ -62,7 +62,7 @@ def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
             """Stands for Zenoh."""
 
             id, misplaced, inbox = "1", False, Inbox()
-            subscribe = watch = close = staticmethod(lambda *_: None)
+            subscribe = watch = close = staticmethod(lambda *_, **__: None)
             peers = staticmethod(lambda: links)
             take = staticmethod(clock.take)
             take_lines = staticmethod(lambda: tuple(lines.pop(0) for _ in range(len(lines))))

@@ -51,7 +51,7 @@ class Line:
         return self.inbox.take(0, 0.0)
 
     def __getattr__(self, name: str) -> Any:
-        return lambda *_: None
+        return lambda *_, **__: None
 
 
 @pytest.fixture
