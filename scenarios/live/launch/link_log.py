@@ -30,9 +30,9 @@ LINKS_ALONE = (
 )
 """For the head of the file."""
 
-REWRITTEN_EVERY = 10
-"""The file is written anew after a tenth more commands, so after each of the first twenty: to write it takes as long as
-there are commands, of which an hour has hundreds."""
+COMMANDS_PER_NEW_ONE = 10
+"""The file is written anew once a new command has come for every ten that it has, so after each of the first twenty: to
+write it takes as long as there are commands, of which an hour has hundreds."""
 
 
 class LinkLog:
@@ -69,7 +69,7 @@ class LinkLog:
         self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
         count = len(self._commands)
         if count >= self._due:
-            self._due = count + max(1, count // REWRITTEN_EVERY)
+            self._due = count + max(1, count // COMMANDS_PER_NEW_ONE)
             self._write_replay(message.t)
 
     def close(self, t: float) -> list[str]:

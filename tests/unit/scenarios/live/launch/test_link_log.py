@@ -11,6 +11,8 @@ import pytest
 from agents.agent_config import MAX_AGE
 from netem.schema.change import Heal, schedule_of
 from netem.schema.fault import Fault
+from netem.schema.netem import Netem
+from netem.schema.partition import Partition
 from netem.schema.pattern import Link, links_among
 from scenarios.emulation.link_command import LinkCommand
 from scenarios.live.launch.link_log import LinkLog, replay_lines
@@ -82,6 +84,31 @@ def test_the_first_twenty_commands_are_written_at_once_and_later_ones_by_the_ten
             written.append(cuts_in(file))
             file.unlink()
     assert written == [*range(1, 21), 22, 24, 26, 28, 30, 33, 36, 39, 42, 46, 50, 55, 60]
+
+
+def test_a_command_that_the_plant_repeats_is_not_written_again(tmp_path: Path) -> None:
+    """It does so every second as long as an agent does not acknowledge it."""
+    log, file = a_log(tmp_path)
+    log(cut(1))
+    file.unlink()
+    log(cut(1))
+    assert not file.exists()
+
+
+def test_a_partition_by_islands_stays_one_and_another_becomes_cuts(tmp_path: Path) -> None:
+    """Islands follow the switches, which the replay operates as the scenario does."""
+    scenario, feeder = load_scenario(find_scenario("islanding"))
+    by_island = Partition(by="island", from_s=1.0)
+    scenario = msgspec.structs.replace(
+        scenario,
+        cases={"IV": scenario.cases["IV"]},
+        netem=Netem(partitions=(by_island, Partition(by="halves", from_s=2.0, to_s=3.0))),
+    )
+    (tmp_path / "again.toml").write_text("".join(replay_lines(scenario, feeder, (), 5.0)))
+    again = load_scenario(tmp_path / "again.toml")[0].netem
+
+    assert again.partitions == (by_island,)
+    assert {(entry.cut is not None, entry.from_s, entry.to_s) for entry in again.links} == {(True, 2.0, 3.0)}
 
 
 def test_the_end_writes_what_is_not_yet_written(tmp_path: Path) -> None:
