@@ -13,6 +13,7 @@ from typing import Any
 from agents.laws.call import LawError
 from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.unreplaced_output import unreplaced
 
 FIRST = 10.0
 """Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
@@ -43,7 +44,8 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
         If it took longer.
     """
     if threading.current_thread() is not threading.main_thread():
-        yield
+        with unreplaced():
+            yield
         return
     over = False
 
@@ -56,7 +58,8 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
-            yield
+            with unreplaced():
+                yield
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     except BaseException:

@@ -11,8 +11,8 @@ rich alike. There are two reactions:
   it. To leave as on SIGTERM would take an inverter off the network, or end the run for all, because a person
   quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
 
-Laws, metrics and checks of a user run in the process that writes: they cannot close its output, and what metrics,
-checks, benchmarks and graphs put in its place is gone when they return (`wire.plugins.unreplaced_output`).
+Laws, metrics and checks of a user run in the process that writes: they cannot close its output, and what they put in
+its place is gone when they return (`wire.plugins.unreplaced_output`).
 """
 
 from __future__ import annotations

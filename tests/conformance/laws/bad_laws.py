@@ -43,6 +43,9 @@ class Failing(gp.Law):
         match self.how:
             case "raises":
                 return 1 / 0
+            case "replaces the output":
+                sys.stdout = sys.stderr = 3  # type: ignore[assignment]
+                return None
             case "nan":
                 return gp.SetPoints(float("nan"), 1.0)
             case "nothing":

@@ -20,6 +20,7 @@ BAD = "tests.conformance.laws.bad_laws"
     ("raises", r"step at t = 1.2 s raised ZeroDivisionError: division by zero"),
     ("nan", r"step at t = 1.2 s returned P_set = nan; it must be a finite number \(pu\)"),
     ("nothing", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
+    ("replaces the output", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
     ("text", r"step at t = 1.2 s returned P_set = '0.5'; it must be a number"),
     ("a list", r"step at t = 1.2 s returned V_set = \[1.0\]; it must be a number"),
     ("too great a number", r"step at t = 1.2 s returned P_set = 10{96}...; it must be a number"),
