@@ -117,6 +117,8 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
         pattern = parse(text)
     except ValueError as error:
         return [str(error)]
+    if {*pattern.left.names, *pattern.right.names} == {PLANT}:
+        return [_one_end(text, PLANT, ANY)]
     if names is None:
         return []
     agents = list(names)
@@ -135,8 +137,18 @@ def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, 
             for name in dict.fromkeys(unknown)
         ]
     if not any(pattern.matches(src, dst, microgrids) for src, dst in links_among(agents)):
-        return [f'"{text}" matches nothing: a link has two different ends, and the plant has links to agents only']
+        for name in agents:
+            if pattern.left.holds(name, microgrids):
+                return [_one_end(text, name, ANY if len(agents) > 1 else PLANT)]
+        return [f'"{text}" matches nothing: there is no inverter']
     return []
+
+
+def _one_end(text: str, name: str, others: str) -> str:
+    return (
+        f'"{text}" matches nothing: both ends are {name} alone, which has no link to itself; write two different ends, '
+        f'e.g. "{name} <-> {others}"'
+    )
 
 
 def links_among(names: Iterable[str]) -> list[Link]:

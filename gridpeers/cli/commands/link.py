@@ -206,16 +206,14 @@ def _give(
     """Check a link command, give it, and print the receivers' answers."""
     from netem.schema.change import Heal
     from netem.schema.fault import Fault
-    from netem.schema.pattern import parse
+    from netem.schema.pattern import objections
     from scenarios.emulation.link_command import LinkCommand
     from scenarios.live.client.run_address import UsageError
     from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
-    try:
-        parse(on)
-    except ValueError as error:
-        raise UsageError(f"LINKS: {error}") from None
+    if wrong := objections(on, None, {}):
+        raise UsageError(f"LINKS: {wrong[0]}")
     command = LinkCommand(
         fault=None if fault is None else Fault(on=on, **fault),
         heal=Heal(on=on, from_s=0.0) if fault is None else None,
@@ -233,11 +231,11 @@ def _give(
         typer.echo(f"no agent yet, told when it comes: {', '.join(result.absent)}")
     if note := _age_note(command, agent):
         typer.echo(note)
-    wrong = [f"{name}: {why}" for name, why in result.refused.items()]
+    failed = [f"{name}: {why}" for name, why in result.refused.items()]
     if result.silent:
-        wrong.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
-    if wrong:
-        fail(wrong, BROKEN)
+        failed.append(f"not acknowledged by {', '.join(result.silent)}; is it frozen? It will be told again")
+    if failed:
+        fail(failed, BROKEN)
 
 
 def _age_note(command: LinkCommand, agent: AgentConfig) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -76,8 +78,9 @@ def test_a_newcomer_is_meant_by_patterns_written_before_it_came() -> None:
         ("inv1 ->", ["is no name"]),
         ("inv1 -> inv22", ['nobody is called "inv22"', 'did you mean "inv2"?']),
         ("MG7 -> inv1", ['nobody is called "MG7"', 'did you mean "MG']),
-        ("inv1 -> inv1", ["matches nothing", "two different ends"]),
-        ("plant -> plant", ["matches nothing"]),
+        ("inv1 -> inv1", ["matches nothing: both ends are inv1 alone", 'two different ends, e.g. "inv1 <-> *"']),
+        ("{inv1, inv1} <-> inv1", ["matches nothing: both ends are inv1 alone"]),
+        ("plant -> {plant, plant}", ["matches nothing: both ends are plant alone", 'e.g. "plant <-> *"']),
     ],
 )
 def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]) -> None:
@@ -85,3 +88,22 @@ def test_a_pattern_that_means_nothing_is_told_why(pattern: str, words: list[str]
     (text,) = objections(pattern, NAMES, MICROGRIDS)
 
     assert all(word in text for word in words), text
+
+
+@pytest.mark.parametrize(
+    ("pattern", "agents", "words"),
+    [
+        ("plant <-> plant", None, "both ends are plant alone"),
+        ("MG1 -> *", ["inv1"], 'both ends are inv1 alone, .* e.g. "inv1 <-> plant"'),
+        ("inv1 -> inv1", None, ""),
+        ("* -> *", [], "there is no inverter"),
+    ],
+)
+def test_only_what_is_no_link_in_any_run_is_refused_before_names_are_known(
+    pattern: str, agents: list[str] | None, words: str
+) -> None:
+    """A microgrid may have the name of an inverter."""
+    said = objections(pattern, agents, {"inv1": "MG1"})
+
+    assert len(said) == bool(words)
+    assert re.search(words, " ".join(said))

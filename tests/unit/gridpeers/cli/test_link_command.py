@@ -17,6 +17,7 @@ from tests.command_line import invoke
         (["set", "inv1", "inv4", "--jitter", "0.2"], "--jitter: is around a delay; give --delay too"),
         (["set", "inv1", "inv4", "--profile", "lt"], '--profile: there is no profile "lt"; did you mean "lte"?'),
         (["set", "inv1", "inv4", "--loss", "0.1", "--for", "-1"], "--for: a time of the run must be above 0, got -1 s"),
+        (["cut", "plant", "plant"], 'LINKS: "plant <-> plant" matches nothing: both ends are plant alone'),
         (["cut", "inv1"], 'LINKS: "inv1" names no links; write "inv4 <-> inv7"'),
         (["cut", "inv1", "inv4", "inv7"], 'LINKS: "inv1 inv4 inv7" is neither two names nor one pattern'),
         (["heal", "inv1", "-"], 'LINKS: the shell took the arrow for a redirection; put the pattern in quotes'),
