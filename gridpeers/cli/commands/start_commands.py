@@ -100,7 +100,7 @@ def _start(
         from scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from scenarios.results.metrics_file import RunMetrics
 
-        check_new("--record", record)
+        check_new(record)
         spec = chosen(spec, chosen_case(spec, case), None)
         options = LiveOptions(
             run=run,
@@ -125,12 +125,12 @@ def _start(
         sizes = file_sizes(spec, feeder, HOUR if duration is None else duration, "wall")
         if out is not None and duration is not None:
             require_room(out, sizes, "--out")
-        with folders(out, spec) as kept:
+        replay = None if out is None else out / "replay.toml"
+        link_log = LinkLog(scenario=spec, feeder=feeder, replay=record, replay_if_changed=replay)
+        with link_log.claimed(), folders(out, spec) as kept:
             say(f"run {run}: {spec.name}, case {', '.join(spec.cases)}; the plant listens on {endpoint}")
             if kept.whole is not None and sizes.sentence:
                 say(f"run {run}: {'an hour' if duration is None else f'{duration:g} s'} {sizes.sentence}")
-            replay = None if out is None else out / "replay.toml"
-            link_log = LinkLog(scenario=spec, feeder=feeder, replay=record, replay_if_changed=replay)
             info = live_record(spec, config, everyone, tuple(row.name for row in (*feeder.inverters, *feeder.spares)))
             if agents:
                 found_by = RunAddress(run=run, connect=(endpoint,), access=access).words

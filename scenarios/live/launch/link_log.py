@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
+import os
 import platform
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import msgspec
@@ -58,6 +59,33 @@ class LinkLog:
         self._commands: dict[int, Change] = {}
         self._due = 1
         """Number of commands with which the file is next written."""
+        self._closed = False
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Make the file of `--record` for a run, so that no other takes it; remove it again if the run does not begin.
+
+        It is a scenario from the beginning, for a run that is killed.
+
+        Raises
+        ------
+        UsageError
+            If it is there meanwhile, or cannot be made.
+        """
+        file, begun = self._replay, False
+        if file is None:
+            yield
+            return
+        try:
+            with _writable(file):
+                file.touch(exist_ok=False)
+                begun = True
+                self._write_replay(0.0)
+            yield
+        except BaseException:
+            if begun and not (self._closed or self._commands):
+                file.unlink(missing_ok=True)
+            raise
 
     @property
     def changes(self) -> tuple[Change, ...]:
@@ -75,6 +103,7 @@ class LinkLog:
     def close(self, t: float) -> list[str]:
         """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
         self._write_replay(t)
+        self._closed = True
         file = self._replay or (self._replay_if_changed if self._commands else None)
         return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
 
@@ -121,18 +150,27 @@ def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chan
     return toml_lines(replay, as_run, [LINKS_ALONE], links=replayed(netem, changes, microgrids))
 
 
-def check_new(option: str, file: Path | None) -> None:
-    """Raise UsageError if a file is there already, or cannot be made where it is to be."""
+def check_new(file: Path | None) -> None:
+    """Raise UsageError if the file of `--record` is there already, or cannot be made where it is to be."""
     if file is None:
         return
-    try:
-        if file.exists():
-            raise UsageError(f"{option} {file}: is there already; move it, or give another name")
+    with _writable(file):
+        if os.path.lexists(file):
+            raise FileExistsError
         if not file.absolute().parent.is_dir():
-            raise UsageError(f"{option} {file}: there is no folder {file.parent}; make it first")
-        with contextlib.suppress(FileExistsError):  # what another run was killed at
+            raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
+        with suppress(FileExistsError):  # what another run was killed at
             trial = file.with_name(f"{file.name}.partial")
             trial.touch(exist_ok=False)
             trial.unlink()
+
+
+@contextmanager
+def _writable(file: Path) -> Iterator[None]:
+    """Raise UsageError for what the system says of a file that is to be made."""
+    try:
+        yield
+    except FileExistsError:
+        raise UsageError(f"--record {file}: is there already; move it, or give another name") from None
     except OSError as error:
-        raise UsageError(f"{option} {file}: cannot be written: {error.strerror}; give another name") from None
+        raise UsageError(f"--record {file}: cannot be written: {error.strerror}; give another name") from None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -15,9 +16,11 @@ from netem.schema.netem import Netem
 from netem.schema.partition import Partition
 from netem.schema.pattern import Link, links_among
 from scenarios.emulation.link_command import LinkCommand
-from scenarios.live.launch.link_log import LinkLog, replay_lines
+from scenarios.live.client.run_address import UsageError
+from scenarios.live.launch.link_log import LinkLog, check_new, replay_lines
 from scenarios.schema import find_scenario, load_scenario
 from scenarios.schema.netem_tables import netem_of, setup_of
+from wire.driver.drive import StoppedError
 from wire.messages import PLANT, LinkRequest
 
 
@@ -144,3 +147,41 @@ def test_a_write_takes_the_memory_of_one_receivers_faults() -> None:
     tracemalloc.stop()
     assert written > 200_000
     assert peak < written
+
+
+def test_a_file_of_record_belongs_to_the_run_that_was_first(tmp_path: Path) -> None:
+    """A second run with the same name is refused, and leaves the first one's file as it is."""
+    first, file = a_log(tmp_path, record=True)
+    second, _ = a_log(tmp_path, record=True)
+    with first.claimed():
+        claim = file.read_bytes()
+        with pytest.raises(
+            UsageError, match=r"--record .*replay.toml: is there already; move it, or give another name"
+        ):
+            check_new(file)
+        with pytest.raises(UsageError, match=r"--record .*replay.toml: is there already"), second.claimed():
+            pytest.fail("two runs write one file")
+        assert (file.read_bytes(), cuts_in(file)) == (claim, 0)
+        first(cut(1))
+    assert cuts_in(file) == 1
+
+
+def test_a_run_that_does_not_begin_leaves_no_file_of_record(tmp_path: Path) -> None:
+    """What it was refused for is mended, and it is started with the same words."""
+    log, file = a_log(tmp_path, record=True)
+    with pytest.raises(RuntimeError), log.claimed():
+        raise RuntimeError
+    assert list(tmp_path.iterdir()) == []
+
+    with suppress(StoppedError), log.claimed():
+        log.close(3.0)
+        raise StoppedError
+    assert cuts_in(file) == 0, "of a run that has begun it stays"
+
+
+def test_a_link_that_leads_nowhere_is_no_new_file(tmp_path: Path) -> None:
+    """The file would take its place."""
+    link = tmp_path / "link.toml"
+    link.symlink_to("nowhere")
+    with pytest.raises(UsageError, match="is there already"):
+        check_new(link)
