@@ -78,6 +78,7 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
         ca = _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA)
         _write_key(new / CA_KEY, key)
         _write_pem(new / CA, ca)
+        (new / ".gitignore").write_text("*\n", encoding="utf-8")  # no key gets into a repository by `git add`
         _write_list(new, MemberList(site=site, version=0), key)
         for name, role in FIRST:
             issue(new, name, role, days=days, now=now)

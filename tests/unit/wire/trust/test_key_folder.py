@@ -43,8 +43,9 @@ def refusal(folder: Path, name: str = "inv1", now: datetime = NOW) -> str:
 
 
 def test_a_site_is_private_and_its_members_are_listed(lab: Path) -> None:
-    """The folder is 0700 and each key 0600; the list names plant, operator, viewer and the agents."""
+    """The folder is 0700 and each key 0600, and git ignores them; the list names all members."""
     assert lab.stat().st_mode & 0o777 == 0o700
+    assert (lab / ".gitignore").read_text(encoding="utf-8") == "*\n"
     assert {key.stat().st_mode & 0o777 for key in lab.glob("*.key")} == {0o600}
     assert [(member.name, member.role) for member in read_list(lab).members] == [
         ("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"), ("inv1", "agent"), ("inv2", "agent"),
