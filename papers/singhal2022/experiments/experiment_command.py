@@ -45,7 +45,7 @@ def experiment(
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
-            typer.echo(f"{known:14} {_title(source)}")
+            typer.echo(f"{known:22} {_title(source)}")
         return
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
