@@ -6,6 +6,8 @@ The package cryptography is imported where it is used: a run without certificate
 from __future__ import annotations
 
 import stat
+from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -59,6 +61,31 @@ def exposed_keys(folder: Path) -> list[str]:
     return sentences
 
 
+def mistaken_keys(folder: Path, members: Sequence[Member]) -> dict[str, str]:
+    """Return a sentence for each private key in a folder that is not that of the certificate beside it, by its file.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of a site, or what was copied of it.
+    members : Sequence[Member]
+        Members of its list; the authority's key is looked at in any case.
+    """
+    sentences = {}
+    pairs: list[tuple[str, x509.Certificate | None]] = [(CA_KEY, read_certificate(folder / CA))]
+    for member in members:
+        with suppress(KeysError):  # of a damaged certificate, which says so itself
+            pairs.append((f"{member.name}.key", own_certificate(folder, member)))
+    for file, certificate in pairs:
+        if certificate is None or not (folder / file).is_file():
+            continue
+        try:
+            _require_match(folder / file, certificate)
+        except KeysError as error:
+            sentences[file] = str(error)
+    return sentences
+
+
 def check_certificate(
     own: x509.Certificate, ca: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime
 ) -> datetime:
@@ -93,11 +120,17 @@ def check_certificate(
 
 def check_key(path: Path, certificate: x509.Certificate) -> None:
     """Raise KeysError unless a private key is that of a certificate, and private."""
+    read_file(path)
+    require_private(path)
+    _require_match(path, certificate)
+
+
+def _require_match(path: Path, certificate: x509.Certificate) -> None:
+    """Raise KeysError unless a private key is that of a certificate."""
     from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
     data = read_file(path)
-    require_private(path)
     try:
         key = load_pem_private_key(data, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:

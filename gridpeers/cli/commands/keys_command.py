@@ -99,25 +99,30 @@ def revoke(name: _Name, keys: _Keys = Path()) -> None:
 def show(keys: _Keys = Path()) -> None:
     """Show the members of a site: role, whether the certificate is valid, from when to when, whether its key is here.
 
-    A private key that others may read is warned of.
+    A private key that others may read, or that is not that of the certificate beside it, is warned of.
 
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from wire.trust.certificate_files import CA_KEY, exposed_keys
+        from wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys
         from wire.trust.certificate_validity import validity
         from wire.trust.member_list import LIST, read_list
 
         known, now = read_list(keys), datetime.now(UTC)
+        mistaken = mistaken_keys(keys, known.members)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
+        if CA_KEY in mistaken:
+            authority = f"; {CA_KEY} is here, but is not the authority's: no certificates can be issued here"
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
             state = validity(keys, member, now)
             here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
+            if here and f"{member.name}.key" in mistaken:
+                here += ", but not this certificate's"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
-        for exposed in exposed_keys(keys):
-            typer.echo(f"WARNING  {exposed}")
+        for warning in (*mistaken.values(), *exposed_keys(keys)):
+            typer.echo(f"WARNING  {warning}")
 
 
 @contextmanager

@@ -104,6 +104,32 @@ def test_show_says_to_the_minute_from_when_to_when_certificates_are_valid(elsewh
     assert rows["plant"].startswith("damaged  lab/plant.pem: is no certificate in PEM")
 
 
+def test_show_warns_of_a_key_that_is_not_that_of_the_certificate_beside_it(elsewhere: Path) -> None:
+    """No process can use the two together: one of another member or of a former issue, one that is none, and ca.key."""
+    lab = elsewhere / "lab"
+    assert invoke("keys", "init", "lab")[0] == 0
+    for name in ("inv1", "inv2"):
+        assert invoke("keys", "issue", name, "--keys", "lab")[0] == 0
+    (lab / "inv1.key").write_bytes((lab / "inv2.key").read_bytes())
+    (lab / "viewer.key").write_text("no PEM")
+    (lab / "operator.pem").unlink()
+    (lab / "ca.key").write_bytes((lab / "plant.key").read_bytes())
+
+    code, text = invoke("keys", "show", "--keys", "lab")
+    rows = text.splitlines()
+
+    assert code == 0, text
+    assert rows[0].endswith("; ca.key is here, but is not the authority's: no certificates can be issued here")
+    ends = {row.split()[1]: row.rpartition("UTC")[2] for row in rows[1:6]}
+    here, wrong = ", key here", ", key here, but not this certificate's"
+    assert ends == {"inv1": wrong, "inv2": here, "operator": here, "plant": here, "viewer": wrong}
+    assert sorted(rows[6:]) == [
+        "WARNING  lab/ca.key: is not the key of ca.pem; copy both from the same site",
+        "WARNING  lab/inv1.key: is not the key of inv1.pem; copy both from the same site",
+        next(row for row in rows if row.startswith("WARNING  lab/viewer.key: is no private key: ")),
+    ]
+
+
 def test_a_list_with_the_day_alone_is_read_as_the_whole_day() -> None:
     """Lists of sites that were made before have no time: such a certificate counts until the day is over."""
     from wire.trust.certificate_validity import validity
