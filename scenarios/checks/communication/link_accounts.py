@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from math import inf, nextafter
 
 from netem.ledger import LinkTrace
@@ -203,13 +204,15 @@ class ArrivalAccounts:
     def renewed(self, agent: str, t: float) -> None:
         """Note that an agent opened a new session after its state of a run time (s): its links are made anew."""
         there = self._there[agent]
-        place = next((i for i, one in enumerate(there) if one.since <= t <= one.until), None)
+        # from the latest on: a record may tell of a new session after each state
+        place = next((i for i in reversed(range(len(there))) if there[i].since <= t <= there[i].until), None)
         if place is None:
             return
         before, after = there[place], there[place + 1 :][:1]
         if before.until == t and after and after[0].epoch == before.epoch:
             return  # it is told twice
-        later = [state.t for state in self._states[agent] if state.t > t and state.epoch == before.epoch]
+        latest = takewhile(lambda state: state.t > t, reversed(self._states[agent]))
+        later = [state.t for state in latest if state.epoch == before.epoch]
         there.insert(place + 1, Presence(before.epoch, min(later, default=nextafter(t, inf)), before.until))
         before.until = t
 

@@ -118,6 +118,31 @@ def test_a_new_session_over_which_nothing_arrives_is_missed() -> None:
     assert min(second.late.values()) == pytest.approx(12.1)
 
 
+def test_a_new_session_after_each_state_costs_as_much_at_the_end_as_at_the_beginning() -> None:
+    """Whoever writes a journal may put a million of them into it: no search for the place of one goes through all."""
+
+    class Counted(float):
+        """Run time (s) that counts how often it was compared."""
+
+        compared = 0
+
+        def __le__(self, other: float) -> bool:
+            Counted.compared += 1
+            return float(self) <= float(other)
+
+    accounts = ArrivalAccounts(1.5, LINKED_WITHIN)
+    took = []
+    for k in range(400):
+        t = Counted(0.1 * k)
+        accounts.state("inv1", SentState(k, t, 1, idle=False, quiet=False))
+        Counted.compared = 0
+        accounts.renewed("inv1", t)
+        took.append(Counted.compared)
+        accounts.flush(t - 1.0)
+
+    assert sum(took[300:]) <= 2 * sum(took[:100])
+
+
 def test_a_short_pause_loses_nothing() -> None:
     """Silent for a second: its links stay, and what was sent before it must arrive."""
 
