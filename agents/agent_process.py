@@ -125,22 +125,44 @@ def _one_session_after_the_other(
     """One for each rule among the agents."""
     nodes: tuple[AnyAgent, ...] = ()
     core: AnyAgent | NodeGroup | None = None
+    session: Session | None = None
+    asked: StoppedError | KeyboardInterrupt | None = None
+    """Request to end that came between two sessions."""
     while core is None or core.session_broken:
-        session = _opened(first, credentials, again=core is not None)
         try:
-            if core is None:
-                nodes = tuple(
-                    _node(config, session.id, make_links, law, shared)
-                    for config, law in zip(configs, made, strict=True)
-                )
-                core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
-            if credentials is not None:
-                for node in nodes:
-                    node.vouches = session.vouches
-            _take_part(core, nodes, session, logging.getLogger(first.name))
-        finally:
-            session.close(replaced=core is not None and core.session_broken)
+            session = _opened(first, credentials, again=core is not None and asked is None)
+            try:
+                if core is None:
+                    nodes = tuple(
+                        _node(config, session.id, make_links, law, shared)
+                        for config, law in zip(configs, made, strict=True)
+                    )
+                    core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
+                if credentials is not None:
+                    for node in nodes:
+                        node.vouches = session.vouches
+                _take_part(core, nodes, session, logging.getLogger(first.name))
+            finally:
+                session.close(replaced=core is not None and core.session_broken)
+        except (StoppedError, KeyboardInterrupt) as stop:
+            if asked is not None or not any(node.between_sessions for node in _realtime(nodes)):
+                raise
+            asked = stop.with_traceback(None)  # which would keep the session
+            if session is not None:
+                session.close(replaced=True)  # the request may have come before that was done
+            for node in _realtime(nodes):
+                node.leave_over_new_session(f"asked to leave: {stop}")
+        except SessionError:
+            if asked is None:
+                raise
+            break
+    if asked is not None:
+        raise asked
     return nodes
+
+
+def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
+    return [node for node in nodes if isinstance(node, RealtimeAgent)]
 
 
 def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
@@ -189,7 +211,9 @@ def _take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: S
     try:
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
-        leaving = [node for node in nodes if isinstance(node, RealtimeAgent)]
+        leaving = _realtime(nodes)
+        if any(node.between_sessions for node in leaving):
+            raise  # the plant does not know this session, or not yet
         if leaving and isinstance(stop, StoppedOnLeashError):
             _go_on(core, session, log)
         for node in leaving:
