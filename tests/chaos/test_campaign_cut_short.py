@@ -148,6 +148,26 @@ def test_a_full_disk_is_told_and_the_folder_says_broken(elsewhere: Path, monkeyp
     assert "No space left on device after 1 of 2 runs" in status
 
 
+def test_a_disk_that_is_full_from_the_beginning_is_told_with_the_folder(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The command said '[Errno 28]' without any file, and the folder went on saying that it runs."""
+
+    def full(folder: ChaosFolder) -> None:
+        raise NO_SPACE
+
+    small(elsewhere)
+    monkeypatch.setattr(ChaosFolder, "write_table", full)
+    code, text = invoke("chaos", "small.toml", "--runs", "2", "--jobs", "1", "--out", "out")
+
+    assert code == 3
+    assert (
+        "gridpeers: out: the folder of the campaign cannot be written: No space left on device; mend that, or make "
+        "room; it has no run: remove it, and begin again" in text
+    )
+    assert (elsewhere / "out" / "status.txt").read_text(encoding="utf-8").startswith("broken: ")
+
+
 @pytest.mark.parametrize(
     ("error", "told"),
     [

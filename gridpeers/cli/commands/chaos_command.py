@@ -80,7 +80,7 @@ def chaos(
     from scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
     from scenarios.chaos.disturbed_scenario import ChaosBase
     from scenarios.results.run_files import RUNS as RUNS_FOLDER
-    from scenarios.results.run_files import FolderError, set_status, shown
+    from scenarios.results.run_files import FolderError, set_broken, set_status, shown
     from scenarios.sweep.workers import cores
     from wire.driver.command_line import command_line
 
@@ -107,12 +107,20 @@ def chaos(
     with _kept_if_ended(campaign, rows, resume, scenario):
         _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
+    path: Path | None = None
     try:
         path = opened()
         set_status(path, "running")
         folder = ChaosFolder(path, base, seed, command_line(*words), rows, runs)
-    except (FolderError, OSError) as error:
+    except FolderError as error:
         fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        where = shown(path) if path else f"--out {out or RUNS_FOLDER}" if resume is None else f"--resume {resume}"
+        why = f"{where}: the folder of the campaign cannot be written: {error.strerror}"
+        if path:
+            set_broken(path, why)
+        kept = "the runs that it has are kept" if rows else "it has no run: remove it, and begin again"
+        fail([f"{why}; mend that, or make room; {kept}"], BROKEN)
     summary = _carry_out(console, campaign, folder, scenario)
     for line in summary.lines():
         typer.echo(line)
