@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import takewhile
 from math import inf, nextafter
+from operator import attrgetter
 
 from netem.ledger import LinkTrace
 from scenarios.checks.communication.dropped_states import DroppedStates
@@ -21,6 +23,10 @@ WAIT = 1000
 
 MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
+
+OVERLAPPING = 64
+"""Times in which processes of one agent were there, on either side of the place by its begin, among which that of a run
+time is sought: a process that was frozen wakes beside the next one, and they may be out of order."""
 
 
 @dataclass
@@ -167,6 +173,9 @@ class ArrivalAccount:
         return min(end.until for end in self.ends)
 
 
+_since = attrgetter("since")
+
+
 class ArrivalAccounts:
     """Wall-clock time: every state that was sent arrives, from the first one on that does, or that should have.
 
@@ -204,8 +213,7 @@ class ArrivalAccounts:
     def renewed(self, agent: str, t: float) -> None:
         """Note that an agent opened a new session after its state of a run time (s): its links are made anew."""
         there = self._there[agent]
-        # from the latest on: a record may tell of a new session after each state
-        place = next((i for i in reversed(range(len(there))) if there[i].since <= t <= there[i].until), None)
+        place = self._place(agent, t)
         if place is None:
             return
         before, after = there[place], there[place + 1 :][:1]
@@ -277,10 +285,18 @@ class ArrivalAccounts:
 
     def _at(self, agent: str, t: float, epoch: int | None = None) -> Presence | None:
         """Return the time in which an agent, or one process of it, was there at a run time (s)."""
-        return next(
-            (one for one in reversed(self._there[agent]) if one.since <= t <= one.until and epoch in (None, one.epoch)),
-            None,
-        )
+        place = self._place(agent, t, epoch)
+        return None if place is None else self._there[agent][place]
+
+    def _place(self, agent: str, t: float, epoch: int | None = None) -> int | None:
+        """Return the place of that time among those of the agent; a record may tell of a new session a state."""
+        there = self._there[agent]
+        after = bisect_right(there, t, key=_since)
+        for i in range(min(len(there), after + OVERLAPPING) - 1, max(-1, after - 1 - OVERLAPPING), -1):
+            one = there[i]
+            if one.since <= t <= one.until and epoch in (None, one.epoch):
+                return i
+        return None
 
     def _account(self, link: Link, ends: tuple[Presence, Presence]) -> ArrivalAccount:
         for account in reversed(self._open[link]):
