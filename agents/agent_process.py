@@ -4,38 +4,20 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from contextlib import ExitStack, closing, suppress
-from threading import Timer
-from time import monotonic, sleep
+from contextlib import ExitStack, closing
 
 from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
+from agents.agent_sessions import AgentSessions
 from agents.carriers.make import make_law
-from agents.known_agents import KnownAgents
 from agents.laws.law import Law
-from agents.lockstep_agent import LockstepAgent
-from agents.realtime.realtime_agent import RealtimeAgent
-from wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
 from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from wire.driver.scheduling import schedule_as_batch
-from wire.driver.session import Session, SessionError
 from wire.keys import check_name
-from wire.node_group import NodeGroup
-from wire.trust.credentials import Credentials
 
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
-
-AnyAgent = RealtimeAgent | LockstepAgent
-
-OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
-"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
-are copied, or files closed."""
-
-RUN_ENDS = 0.1
-"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
-does so first, and an agent that was still there has not left."""
 
 
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
@@ -68,7 +50,7 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     else:
         schedule_as_batch()
     with ExitStack() as laws:
-        nodes = _one_session_after_the_other(configs, make_links, laws)
+        nodes = AgentSessions(configs, _made_laws(configs, laws), make_links).run()
     failures = []
     for config, node in zip(configs, nodes, strict=True):
         log = logging.getLogger(config.name)
@@ -109,125 +91,12 @@ def _check(configs: Sequence[AgentConfig]) -> None:
         raise ConfigurationError(f"agents {', '.join(twice)} stand twice in the configuration")
 
 
-def _one_session_after_the_other(
-    configs: Sequence[AgentConfig], make_links: MakeLinks, laws: ExitStack
-) -> tuple[AnyAgent, ...]:
-    """Take part with one session, and open a new one whenever the last was broken."""
-    first = configs[0]
-    credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
+def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
+    """Return the law of each agent, which ends with the stack."""
     made: list[Law] = []
     for config in configs:
         try:
             made.append(laws.enter_context(closing(make_law(config.control))))
         except ValueError as error:
             raise ConfigurationError(f"{config.name}: {error}") from None
-    shared: list[KnownAgents] = []
-    """One for each rule among the agents."""
-    nodes: tuple[AnyAgent, ...] = ()
-    core: AnyAgent | NodeGroup | None = None
-    session: Session | None = None
-    asked: StoppedError | KeyboardInterrupt | None = None
-    """Request to end that came between two sessions."""
-    while core is None or core.session_broken:
-        try:
-            session = _opened(first, credentials, again=core is not None and asked is None)
-            try:
-                if core is None:
-                    nodes = tuple(
-                        _node(config, session.id, make_links, law, shared)
-                        for config, law in zip(configs, made, strict=True)
-                    )
-                    core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
-                if credentials is not None:
-                    for node in nodes:
-                        node.vouches = session.vouches
-                _take_part(core, nodes, session, logging.getLogger(first.name))
-            finally:
-                session.close(replaced=core is not None and core.session_broken)
-        except (StoppedError, KeyboardInterrupt) as stop:
-            if asked is not None or not any(node.between_sessions for node in _realtime(nodes)):
-                raise
-            asked = stop.with_traceback(None)  # which would keep the session
-            if session is not None:
-                session.close(replaced=True)  # the request may have come before that was done
-            for node in _realtime(nodes):
-                node.leave_over_new_session(f"asked to leave: {stop}")
-        except SessionError:
-            if asked is None:
-                raise
-            break
-    if asked is not None:
-        raise asked
-    return nodes
-
-
-def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
-    return [node for node in nodes if isinstance(node, RealtimeAgent)]
-
-
-def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
-    """Open a session; one in place of another is tried again for a while, as its certificate may just be renewed."""
-    until = monotonic() + (OPENED_WITHIN if again else 0.0)
-    told = ""
-    while True:
-        try:
-            return Session(
-                config.name,
-                listen=config.listen,
-                connect=config.connect,
-                clock=config.clock,
-                star=config.star,
-                credentials=credentials,
-            )
-        except SessionError as error:
-            if monotonic() >= until:
-                raise
-            if str(error) != told:
-                told = str(error)
-                logging.getLogger(config.name).warning("%s; tries again for up to %g s", told, OPENED_WITHIN)
-        sleep(OPENED_AGAIN)
-
-
-def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AnyAgent:
-    try:
-        links = make_links(config.name, config.links)
-        if config.clock == "wall":
-            return RealtimeAgent(config, instance, links, law)
-        known = next((each for each in shared if each.control == config.control), None)
-        if known is None:
-            known = KnownAgents(config.control)
-            shared.append(known)
-        return LockstepAgent(config, instance, links, law, known)
-    except ValueError as error:
-        raise ConfigurationError(str(error)) from None
-
-
-def _take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Session, log: logging.Logger) -> None:
-    """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
-    for node in nodes:
-        session.answer(*node.nameplate)
-        for key in node.publications:
-            session.prepare(key)
-    try:
-        drive(core, session, log)
-    except (StoppedError, KeyboardInterrupt) as stop:
-        leaving = _realtime(nodes)
-        if any(node.between_sessions for node in leaving):
-            raise  # the plant does not know this session, or not yet
-        if leaving and isinstance(stop, StoppedOnLeashError):
-            _go_on(core, session, log)
-        for node in leaving:
-            node.asked_to_leave(f"asked to leave: {stop}")
-        if leaving:
-            serve(core, session, log)  # until the plant has acknowledged
-        raise
-
-
-def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
-    """Serve for `RUN_ENDS` more, or until the core has finished."""
-    over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
-    over.daemon = True
-    over.start()
-    with suppress(StoppedError):
-        serve(core, session, log)
-    over.cancel()
+    return made
