@@ -15,15 +15,10 @@ from pathlib import Path
 from types import MappingProxyType
 
 from netem.ledger import LinkCounts, LinkTrace
+from scenarios.checks.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
 from scenarios.checks.communication.dropped_states import DroppedStates
 from scenarios.checks.communication.heals import Heal, Heals
-from scenarios.checks.communication.link_accounts import (
-    ArrivalAccount,
-    ArrivalAccounts,
-    Missing,
-    TickAccounts,
-    VerdictAccounts,
-)
+from scenarios.checks.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
 from scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
 from scenarios.checks.communication.record_pass import end_of, opened, read_into
 from scenarios.checks.communication.record_sink import Link, SentState

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection
 
 import pytest
 
-from scenarios.checks.communication.link_accounts import MOST_WAITING, ArrivalAccounts
+from scenarios.checks.communication.arrival_accounts import MOST_WAITING, ArrivalAccounts
 from scenarios.checks.communication.record_sink import SentState
 
 LINK = ("inv1", "inv2")

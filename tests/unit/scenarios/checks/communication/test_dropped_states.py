@@ -15,9 +15,9 @@ import pytest
 from scenarios.checks.check_verdict import NotJudgedError
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.account_check import MessageAccount
+from scenarios.checks.communication.arrival_accounts import ArrivalAccounts
 from scenarios.checks.communication.communication_summary import summarise
 from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.checks.communication.link_accounts import ArrivalAccounts
 from scenarios.checks.communication.record_content import read_content
 from scenarios.checks.communication.record_sink import SentState
 from scenarios.record.record_info import FILE
