@@ -14,7 +14,16 @@ def test_tests_compute_as_the_pins_did() -> None:
     if "OPENBLAS_CORETYPE" not in os.environ:
         pytest.skip("this processor cannot run the kernels of the pins")
 
-    assert environment()["blas"] == read()[1]["blas"]
+    assert environment()["blas"] == read().environment["blas"]
+
+
+def test_pins_that_a_processor_has_otherwise_differ_in_the_last_digits_alone() -> None:
+    """Two processors show the same run: what moves a pin by more is a change of behaviour, on all of them."""
+    pinned = read()
+    for pins in pinned.otherwise.values():
+        for key, pin in pins.items():
+            assert pin.sha256 != pinned.pins[key].sha256
+            assert pin.last == pytest.approx(pinned.pins[key].last, rel=1e-9)
 
 
 def test_a_processor_without_them_is_left_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,7 @@
-"""Pin the catalogue anew, with the reason: `python -m tests.golden.catalogue.pin "why the numbers moved"`."""
+"""Pin the catalogue anew, with the reason: `python -m tests.golden.catalogue.pin "why the numbers moved"`.
+
+With `--otherwise` in place of a reason the pins stay, and those that are others on this processor are added.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,19 @@ from tests.pinned_kernels import choose
 
 choose()  # before numpy is imported
 
-from tests.golden.catalogue.pins import FILE, QUANTITIES, Pin, cases, environment, read, run_case  # noqa: E402
+from tests.golden.catalogue.pins import (  # noqa: E402
+    FILE,
+    QUANTITIES,
+    Pin,
+    Pinned,
+    cases,
+    environment,
+    read,
+    run_case,
+    vector_level,
+)
+
+OTHERWISE = "--otherwise"
 
 HEADER = (
     "# SHA-256 of history.csv of every case of the catalogue, and the last row of its first inverter:\n"
@@ -19,8 +34,8 @@ HEADER = (
 
 def main(reason: str) -> None:
     """Run the catalogue, print what moved, and write the pins."""
-    old, moved = ({}, []) if not FILE.exists() else (lambda whole: (whole[0], whole[2]))(read())
-    new: dict[tuple[str, str], Pin] = {}
+    pinned = read()
+    old, new = pinned.here(), dict[tuple[str, str], Pin]()
     for name, case in cases():
         pin = new[name, case] = run_case(name, case)
         before = old.get((name, case))
@@ -28,12 +43,22 @@ def main(reason: str) -> None:
             print(f"{name} {case}: {'new' if before is None else _difference(before, pin)}")
     for name, case in sorted(old.keys() - new.keys()):
         print(f"{name} {case}: gone")
-    changed = sorted({name for name, case in new.keys() | old.keys() if old.get((name, case)) != new.get((name, case))})
+    changed = {key for key in new.keys() | old.keys() if old.get(key) != new.get(key)}
     if not changed:
         print("nothing moved; the pins stay as they are")
         return
-    moved.append({"date": datetime.now(UTC).date().isoformat(), "scenarios": " ".join(changed), "reason": reason})
-    FILE.write_text(_toml(new, moved), encoding="utf-8")
+    if reason == OTHERWISE:
+        here = pinned.otherwise.get(vector_level(), {}) | {key: pin for key, pin in new.items() if key in changed}
+        pinned.otherwise[vector_level()] = here
+        _write(pinned)
+        return
+    scenarios = " ".join(sorted({name for name, _ in changed}))
+    pinned.moved.append({"date": datetime.now(UTC).date().isoformat(), "scenarios": scenarios, "reason": reason})
+    stay = {key: pin for key, pin in pinned.pins.items() if key in new and key not in changed}
+    otherwise = {
+        level: {key: pin for key, pin in pins.items() if key in stay} for level, pins in pinned.otherwise.items()
+    }
+    _write(Pinned(new | stay, otherwise, environment(), pinned.moved))
 
 
 def _difference(before: Pin, after: Pin) -> str:
@@ -41,16 +66,24 @@ def _difference(before: Pin, after: Pin) -> str:
     return ", ".join(f"{name} {old:.6g} -> {new:.6g}" for name, old, new in pairs)
 
 
-def _toml(pins: dict[tuple[str, str], Pin], moved: list[dict[str, str]]) -> str:
-    lines = [HEADER, "[environment]", *(f'{key} = "{value}"' for key, value in environment().items())]
-    for entry in moved:
+def _write(pinned: Pinned) -> None:
+    lines = [HEADER, "[environment]", *(f'{key} = "{value}"' for key, value in pinned.environment.items())]
+    for entry in pinned.moved:
         lines += ["", "[[moved]]", *(f"{key} = {_quoted(value)}" for key, value in entry.items())]
+    lines += _tables("pin", pinned.pins)
+    for level, pins in pinned.otherwise.items():
+        lines += _tables(f"otherwise.{level}", pins)
+    FILE.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _tables(table: str, pins: dict[tuple[str, str], Pin]) -> list[str]:
+    lines = []
     for name in dict.fromkeys(name for name, _ in pins):
-        lines += ["", f"[pin.{name}]"]
+        lines += ["", f"[{table}.{name}]"]
         for (of, case), pin in pins.items():
             if of == name:
                 lines.append(f'{case} = {{ sha256 = "{pin.sha256}", last = {list(pin.last)} }}')
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def _quoted(text: str) -> str:

@@ -6,7 +6,7 @@ import tomllib
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_info
@@ -64,12 +64,42 @@ def environment() -> dict[str, str]:
     return {**versions, "blas": " ".join(sorted(kernels))}
 
 
-def read() -> tuple[dict[tuple[str, str], Pin], dict[str, str], list[dict[str, str]]]:
-    """Read the pins by (scenario, case), their environment, and the reasons for which they moved, oldest first."""
+def vector_level() -> str:
+    """Return the highest level of vector instructions that numpy uses here, e.g. "X86_V3" (AVX2) or "X86_V4" (AVX-512).
+
+    Its functions differ by it in the last digit, and no setting makes a processor without AVX-512 do as one with it.
+    """
+    found = np.show_config(mode="dicts")["SIMD Extensions"]["found"]  # type: ignore[call-overload,index]
+    return max((level for level in found if level.startswith("X86_V")), default="")
+
+
+class Pinned(NamedTuple):
+    """The file of the pins."""
+
+    pins: dict[tuple[str, str], Pin]
+    """By scenario and case."""
+    otherwise: dict[str, dict[tuple[str, str], Pin]]
+    """Pins that are others on processors of a vector level, by that level."""
+    environment: dict[str, str]
+    """Versions that decide the last digits."""
+    moved: list[dict[str, str]]
+    """When, where and why the pins moved, oldest first."""
+
+    def here(self) -> dict[tuple[str, str], Pin]:
+        """Return the pins that hold on this processor."""
+        return self.pins | self.otherwise.get(vector_level(), {})
+
+
+def read() -> Pinned:
+    """Read the file of the pins."""
     whole = tomllib.loads(FILE.read_text(encoding="utf-8"))
-    pins = {
+    otherwise = {level: _pins(tables) for level, tables in whole.get("otherwise", {}).items()}
+    return Pinned(_pins(whole["pin"]), otherwise, whole["environment"], whole["moved"])
+
+
+def _pins(tables: dict[str, dict[str, dict[str, Any]]]) -> dict[tuple[str, str], Pin]:
+    return {
         (name, case): Pin(pin["sha256"], tuple(pin["last"]))
-        for name, of_cases in whole["pin"].items()
+        for name, of_cases in tables.items()
         for case, pin in of_cases.items()
     }
-    return pins, whole["environment"], whole["moved"]

@@ -8,7 +8,7 @@ import pytest
 from tests.golden.catalogue.pins import read
 
 ROOT = Path(__file__).parents[3]
-PINS = read()[0]
+PINS = read().pins
 HASH = re.compile(r"\b[0-9a-f]{64}\b")
 SHOWN = re.compile(r"(?P<sha256>[0-9a-f]{64})  [^ ]*?(?P<case>[^/ ]+)/history\.csv")
 """A line of the output of sha256sum."""

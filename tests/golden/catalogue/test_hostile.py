@@ -2,7 +2,7 @@
 
 from tests.golden.catalogue.pins import read
 
-PINS = read()[0]
+PINS = read().pins
 
 
 def f_error(case: str) -> float:

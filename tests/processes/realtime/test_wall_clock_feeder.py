@@ -62,9 +62,9 @@ class Feeder:
     def restored(self, since: float, of: set[int], until: float = float("inf")) -> float:
         """Time (s) after `since` from which these inverters are within 0.01 Hz and share within 0.02 pu for 0.2 s.
 
-        Infinite if that is not so before `until`.
+        Infinite if that is not so by `until`: the row at the time of an event is of before it.
         """
-        rows = [row for row in self.run.rows if since <= row[0] < until]
+        rows = [row for row in self.run.rows if since <= row[0] <= until]
         held = [(row[0], self._in_band(row, of)) for row in rows]
         began = since
         for t, ok in held:
