@@ -80,7 +80,7 @@ def mistaken_keys(folder: Path, members: Sequence[Member]) -> dict[str, str]:
         if certificate is None or not (folder / file).is_file():
             continue
         try:
-            _require_match(folder / file, certificate)
+            _require_match(folder / file, read_file(folder / file), certificate)
         except KeysError as error:
             sentences[file] = str(error)
     return sentences
@@ -120,17 +120,16 @@ def check_certificate(
 
 def check_key(path: Path, certificate: x509.Certificate) -> None:
     """Raise KeysError unless a private key is that of a certificate, and private."""
-    read_file(path)
+    data = read_file(path)
     require_private(path)
-    _require_match(path, certificate)
+    _require_match(path, data, certificate)
 
 
-def _require_match(path: Path, certificate: x509.Certificate) -> None:
-    """Raise KeysError unless a private key is that of a certificate."""
+def _require_match(path: Path, data: bytes, certificate: x509.Certificate) -> None:
+    """Raise KeysError unless the private key in a file is that of a certificate."""
     from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives.serialization import load_pem_private_key
 
-    data = read_file(path)
     try:
         key = load_pem_private_key(data, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:

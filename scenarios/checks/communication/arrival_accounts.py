@@ -103,7 +103,7 @@ class ArrivalAccounts:
         place = self._place(agent, t)
         if place is None:
             return
-        before, after = there[place], there[place + 1 :][:1]
+        before, after = there[place], there[place + 1 : place + 2]
         if before.until == t and after and after[0].epoch == before.epoch:
             return  # it is told twice
         latest = takewhile(lambda state: state.t > t, reversed(self._states[agent]))

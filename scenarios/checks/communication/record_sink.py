@@ -1,4 +1,4 @@
-"""What a pass over a record hands on: states, decisions and arrivals, and what is known of the record at its end."""
+"""Interface between a pass over a record and the checks: states, decisions and arrivals, and totals at the end."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ class RecordSink(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class PassEnd:
-    """What is known of a record once it was gone through."""
+    """Totals of a pass over a whole record."""
 
     unreadable: int
     """Number of messages, entries, reports and parts of the file that could not be read, or cannot be true."""

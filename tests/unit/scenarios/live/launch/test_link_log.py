@@ -167,7 +167,7 @@ def test_a_file_of_record_belongs_to_the_run_that_was_first(tmp_path: Path) -> N
 
 
 def test_a_run_that_does_not_begin_leaves_no_file_of_record(tmp_path: Path) -> None:
-    """What it was refused for is mended, and it is started with the same words."""
+    """The reason for the refusal is gone, and the same command starts the run."""
     log, file = a_log(tmp_path, record=True)
     with pytest.raises(RuntimeError), log.claimed():
         raise RuntimeError
