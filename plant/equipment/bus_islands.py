@@ -11,6 +11,11 @@ SwitchOperations = tuple[Iterable[str], Iterable[str]]
 """Switches that open, and switches that close, by any of their names."""
 
 
+def switch_names(feeder: Feeder) -> dict[str, str]:
+    """Return the name of each switch in the tables, by each of its names."""
+    return {name: switch.name for switch in feeder.switches for name in switch.names}
+
+
 def switch_name(feeder: Feeder, text: str) -> str:
     """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables.
 
@@ -19,7 +24,7 @@ def switch_name(feeder: Feeder, text: str) -> str:
     ValueError
         If no switch has this name.
     """
-    known = {name: switch.name for switch in feeder.switches for name in switch.names}
+    known = switch_names(feeder)
     if text not in known:
         shown = [switch.alias or switch.name for switch in feeder.switches]
         hint = suggestion(text, shown, "switches", also=known)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 
 from plant.equipment import Feeder
-from plant.equipment.bus_islands import switch_name
+from plant.equipment.bus_islands import switch_name, switch_names
 from scenarios.schema.scenario_model import ScenarioModel
 from wire.messages import PlantEvent
 
@@ -43,18 +43,18 @@ def closed_switches(
     before : Collection[str], optional
         Names of the switches that are closed before; when left out, those that are closed at the start of a run.
     """
-    names = {each: switch.name for switch in feeder.switches for each in (*switch.names, switch.event_name)}
+    names = switch_names(feeder)
     closed = {switch.name for switch in feeder.switches if switch.closed} if before is None else set(before)
     for event in events:
         if event.subject not in names:
             continue  # an outside plant may have others
-        if _is_closed(event):
+        if is_closed(event):
             closed.add(names[event.subject])
         else:
             closed.discard(names[event.subject])
     return frozenset(closed)
 
 
-def _is_closed(event: PlantEvent) -> bool:
+def is_closed(event: PlantEvent) -> bool:
     """Return the position of a switch from its event on; of a table of events, by its words."""
     return " closed" in event.text if event.closed is None else event.closed

@@ -9,12 +9,13 @@ from math import inf
 from typing import NamedTuple
 
 from plant.equipment import Feeder
-from plant.equipment.bus_islands import switch_name
+from plant.equipment.bus_islands import switch_names
 from plant.equipment.named_loads import load_name, named_loads
 from scenarios.live.numbers.expected_silence import ExpectedSilence
 from scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
 from scenarios.live.show.snapshot import line_of
 from scenarios.results.event_windows import Window, windows
+from scenarios.results.switch_positions import is_closed
 from scenarios.schema import ScenarioModel
 from scenarios.schema.netem_tables import netem_of
 from wire.messages import PlantEvent
@@ -115,18 +116,26 @@ def compare(
 
 def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
     """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
+    switches, loads = switch_names(feeder), named_loads(feeder)
+    timeout = scenario.plant.sync_check.timeout
     planned = [
-        ("switch", event.t_s, switch_name(feeder, name))
+        (f"switch {closes}", switches[name], event.t_s, event.t_s + (timeout if closes and event.synchronised else 0.0))
         for event in scenario.events
-        for name in (*event.open, *event.close)
+        for names, closes in ((event.open, False), (event.close, True))
+        for name in names
     ]
-    loads = named_loads(feeder)
-    planned += [("load", event.t_s, load_name(loads, text)) for event in scenario.events for text in event.load]
+    planned += [
+        ("load", load_name(loads, text), event.t_s, event.t_s) for event in scenario.events for text in event.load
+    ]
     for event in events:
         if event.kind not in ("switch", "load") or event.text.endswith(" already"):
             continue
+        if event.kind == "switch":
+            done = f"switch {is_closed(event)}", switches.get(event.subject, event.subject)
+        else:
+            done = "load", event.subject
         if not any(
-            event.kind == kind and abs(event.t - t) < NEAR and event.subject == name for kind, t, name in planned
+            done == (what, name) and since - NEAR < event.t < until + NEAR for what, name, since, until in planned
         ):
             yield event
 

@@ -87,6 +87,33 @@ def test_what_the_scenario_does_not_tell_is_found(
     assert all(words in line for words, line in zip(said, lines, strict=True))
 
 
+@pytest.mark.parametrize("planned", ["632-671", "632~a-632", "632-632~a"])
+def test_a_planned_switch_is_recognised_by_each_of_its_names(planned: str) -> None:
+    """The plant's events have the alias of an imported switch; the scenario may name its buses in either order."""
+    scenario, feeder = one_case("islanding")
+    row = next(each for each in feeder.switches if each.name == "13-152")
+    imported = msgspec.structs.replace(row, name="632-632~a", alias="632-671", from_bus="632", to_bus="632~a")
+    feeder = msgspec.structs.replace(feeder, switches=(imported,))
+    scenario = msgspec.structs.replace(scenario, events=(Event(label="islanding", t_s=1.0, open=(planned,)),))
+    event = told("switch", 1.0, imported.event_name, f"switch {imported.full_name} opened")
+    later = msgspec.structs.replace(event, t=2.0)
+
+    assert compare(scenario, feeder, [event], 9.0).events == ()
+    assert compare(scenario, feeder, [event, later], 9.0).events == (later,)
+
+
+def test_a_planned_switch_may_wait_for_synchronism() -> None:
+    """It closes late, up to its timeout; an opening meanwhile, or a later closing, is of people."""
+    scenario, feeder = one_case("ieee34-islanding")
+    row = next(each for each in feeder.switches if each.alias == "sw1_2")
+    closed, opened, late = (
+        told("switch", t, row.event_name, f"switch {row.full_name} {what}")
+        for t, what in ((10.5, "closed"), (11.0, "opened"), (18.5, "closed"))
+    )
+
+    assert compare(scenario, feeder, [closed, opened, late], 20.0).events == (opened, late)
+
+
 def test_a_load_that_the_scenario_sets_is_none_of_the_people() -> None:
     """At its time, by its bus; the same load at another time, and another one then, are of people."""
     scenario, feeder = one_case("islanding")
