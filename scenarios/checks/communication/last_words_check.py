@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Annotated
 
 import msgspec
@@ -46,19 +46,22 @@ class LastWords:
             for _, last in epochs.values():
                 if last >= end - self.silent_s or self._explained(case, agent, last, killed):
                     continue
+                later = [max(0.0, first - last) for first, then in epochs.values() if then > last]
                 yield Violation(
-                    text="sends nothing more, and no event says why",
+                    text="its process ends, and no event says why; its next one sends after"
+                    if later
+                    else "sends nothing more, and no event says why",
                     agent=agent,
                     t=last,
-                    value=end - last,
+                    value=min(later, default=end - last),
                     unit="s",
-                    limit=self.silent_s,
+                    limit=None if later else self.silent_s,
                 )
         require_longer(end, "silent_s", self.silent_s)
 
-    def _explained(self, case: CheckedCase, agent: str, last: float, killed: dict[str, float]) -> bool:
+    def _explained(self, case: CheckedCase, agent: str, last: float, killed: Collection[tuple[str, float]]) -> bool:
         """Whether an event, or a fault of the scenario, explains that an agent ends at a time (s)."""
-        if agent in killed and abs(last - killed[agent]) <= self.silent_s + 2.0 * case.T_c:
+        if any(name == agent and abs(last - t) <= self.silent_s + 2.0 * case.T_c for name, t in killed):
             return True
         return any(_ends(event, agent) and abs(event.t - last) <= self.silent_s for event in case.events)
 
@@ -67,13 +70,13 @@ def _ends(event: PlantEvent, agent: str) -> bool:
     return event.kind == "roster" and event.subject == agent and bool(_SAID.match(event.text))
 
 
-def _killed(found: CommunicationSummary) -> dict[str, float]:
-    """Return when (s) the scenario kills agents."""
+def _killed(found: CommunicationSummary) -> Collection[tuple[str, float]]:
+    """Return the agents that the scenario kills, and when (s)."""
     for tree in (found.info.plant.links, *(config.links for config in found.info.agents)):
         if not tree:
             continue
         try:
-            return {node.name: node.from_s for node in EmulationConfig.of_tree(tree).netem.nodes if node.kill}
+            return [(node.name, node.from_s) for node in EmulationConfig.of_tree(tree).netem.nodes if node.kill]
         except msgspec.ValidationError:
             continue
-    return {}
+    return ()

@@ -33,6 +33,25 @@ def test_an_agent_that_falls_silent_is_caught(sound: CheckedCase) -> None:
     assert found.violations[0].value == pytest.approx(4.0, abs=0.05)
 
 
+def test_an_agent_whose_process_was_replaced_is_not_called_silent(sound: CheckedCase) -> None:
+    """A process ends at 3 s without an event, and the next one sends to the end from 3.5 s on: so long it was away."""
+    content = sound.content
+    states = dict(content.states)
+    first, second = {}, {}
+    for (_, number), state in states["inv7"].items():
+        if state.t <= 3.0:
+            first[0, number] = state._replace(epoch=0)
+        elif state.t >= 3.5:
+            second[1, number] = state._replace(epoch=1)
+    states["inv7"] = first | second
+    found = verdict(with_content(sound, replace(content, states=states)), "last_words")
+
+    assert (found.count, found.violations[0].value) == (1, pytest.approx(0.5, abs=0.03))
+    assert found.violations[0].sentence == (
+        "its process ends, and no event says why; its next one sends after: inv7 0.5 s at t = 3.00 s"
+    )
+
+
 def test_an_agent_that_never_speaks_is_caught(sound: CheckedCase) -> None:
     """It was configured, and nobody heard of it."""
     states = {name: of for name, of in sound.content.states.items() if name != "inv7"}
