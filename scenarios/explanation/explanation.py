@@ -122,7 +122,7 @@ def _accounts(
     seen = {each.name: each for each in decision.neighbours_used}
     accounts = []
     for each in decision.neighbours:
-        why = "; ".join(filter(None, (reason(decision, each), each.lie)))
+        why = "; ".join(filter(None, (reason(record, decision, each), each.lie)))
         if any(each is other for other in old):
             why = "; ".join(filter(None, (why, missed(record, decision, each, fates, rejected))))
         accounts.append(NeighbourAccount(name=each.name, input=each, seen=seen.get(each.name), why=why))

@@ -119,7 +119,7 @@ def _fate(message: MessageOnWire, now: float, fates: Fates) -> str:
     return "late" if isfinite(min(sound, default=inf)) else "kept"
 
 
-def reason(decision: RecordedDecision, each: NeighbourInput) -> str:
+def reason(record: RunRecord, decision: RecordedDecision, each: NeighbourInput) -> str:
     """Return in words why a neighbour was left out of the sums; empty if it was not."""
     options = decision.config.control.degraded_communication
     if each.unused == "silent":
@@ -135,8 +135,19 @@ def reason(decision: RecordedDecision, each: NeighbourInput) -> str:
             return "its inverter is out of service"
         if options.islands == "frequency" or each.state is None:
             return "in another island: its angle drifts"
+        if _island_at(record, decision, each.state.t) == each.state.island:
+            return f"its last state is from before the own island changed from {each.state.island} to {here}"
         return f"in another island: {each.state.island}, not {here}"
     return "" if each.weight > 0.0 else "its state is not new: weight 0"
+
+
+def _island_at(record: RunRecord, decision: RecordedDecision, t: float) -> str:
+    """Return the own island at an earlier time (s of run time), as the agent's own states have it."""
+    island = ""
+    for message in record.messages(decision.agent, since=max(0.0, t - decision.config.T_c), until=t, kind="State"):
+        if isinstance(message.message, State):
+            island = message.message.island
+    return island
 
 
 def absence(decision: RecordedDecision, name: str, events: tuple[PlantEvent, ...]) -> str:

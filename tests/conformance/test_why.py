@@ -136,6 +136,19 @@ def test_an_island_change(tmp_path: Path) -> None:
     assert any(event.kind == "island" for event in apart.events)
 
 
+def test_an_outage_that_began_before_the_island_formed(tmp_path: Path) -> None:
+    """The last state that was heard is from the grid-connected time: the cut link is the cause, not another island."""
+    record = run(tmp_path, '[[link]]\non = "inv2 -> *"\ncut = true\nfrom_s = 0.1\n')
+
+    explanation = explain(record, "inv4", 0.5)
+
+    assert_adds_up(explanation)
+    assert account(explanation, "inv2").why == (
+        "its last state is from before the own island changed from grid to inv1; "
+        "20 states since: 20 cut off by a cut link"
+    )
+
+
 def test_a_rejected_message(tmp_path: Path) -> None:
     """States with a flipped bit arrive and are rejected; the last sound one counts."""
     more = '[[link]]\non = "inv7 -> inv4"\ncorrupt = { p = 1.0, checksum = false }\nfrom_s = 0.5\n'

@@ -18,6 +18,7 @@ from wire.journal import MessageReference, ReceivedMessage, RejectedCount
 from wire.messages import OFF
 
 EVERY = decision(neighbour("inv2", 5), state=None)
+NOBODY = record_of(messages=lambda *words, **more: iter(()))
 
 
 def sent(name: str, *numbers: int, **changes: Any) -> list[MessageOnWire]:
@@ -130,6 +131,16 @@ def test_each_reason_has_its_words() -> None:
         (by_switches, neighbour("inv2", 9, weight=0.0), "its state is not new: weight 0"),
         (by_switches, neighbour("inv2", 9), ""),
     ):
-        assert reason(decided, each) == words
+        assert reason(NOBODY, decided, each) == words
     off = neighbour("inv2", 9, unused="island", state=state("inv2", 9, island=OFF))
-    assert reason(by_switches, off) == "its inverter is out of service"
+    assert reason(NOBODY, by_switches, off) == "its inverter is out of service"
+
+
+def test_a_state_from_before_the_island_changed_is_not_of_another_island() -> None:
+    """Both were connected to the grid when it was sent; what kept the later ones back is told beside it."""
+    old = neighbour("inv2", 5, unused="island", state=state("inv2", 5, island="grid"))
+    words = "its last state is from before the own island changed from grid to inv1"
+
+    for own, told in (("grid", words), ("inv1", "in another island: grid, not inv1")):
+        record = record_of(messages=lambda *of, own=own, **more: iter(sent("inv1", 4, 5, island=own)))
+        assert reason(record, EVERY, old) == told
