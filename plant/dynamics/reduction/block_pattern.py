@@ -35,7 +35,7 @@ class BlockPattern:
     Parameters
     ----------
     Y
-        Admittances between the nodes (S), in the order of elimination.
+        Admittances between the nodes (S), in the order of elimination; neither symmetric nor without stored zeros.
     C
         Incidence of the load branches, real: at most two nodes each.
 
@@ -52,7 +52,8 @@ class BlockPattern:
         self._Y = self._blocks(Y)
         self.first, self.second, self.a_first, self.a_second = _ends(C)
         both = (self.first >= 0) & (self.second >= 0)
-        self._across = np.where(both, self._entry(self.first, self.second), -1)
+        self._across = np.full(both.size, -1, np.int64)
+        self._across[both] = self._entry(self.first[both], self.second[both])
 
     def matrix(self, A: Complex, B: Complex, y: Complex | None = None) -> BlockFactors:
         """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place.
@@ -74,12 +75,16 @@ class BlockPattern:
         """Return the entries of `later` that couple these nodes."""
         n = self.start.size - 1
         owner = np.repeat(np.arange(n), np.diff(self.start))
-        return np.searchsorted(owner * n + self.later, np.minimum(i, j) * n + np.maximum(i, j))
+        held, wanted = owner * n + self.later, np.minimum(i, j) * n + np.maximum(i, j)
+        at = np.searchsorted(held, wanted)
+        assert np.array_equal(held.take(at, mode="clip"), wanted), "nodes are coupled that the pattern does not couple"
+        return at
 
     def _blocks(self, Y: sp.csc_array) -> BlockFactors:
         n, count = Y.shape[0], self.later.size
         D, L, U = np.zeros((n, 4)), np.zeros((count, 4)), np.zeros((count, 4))
         entries = sp.coo_array(Y)
+        entries.sum_duplicates()  # of two values of one entry its slot would keep the last
         values: Real = np.column_stack([entries.data.real, -entries.data.imag, entries.data.imag, entries.data.real])
         row, column = entries.row.astype(np.int64), entries.col.astype(np.int64)
         on, below, above = row == column, row > column, row < column
@@ -90,10 +95,11 @@ class BlockPattern:
 
 
 def _links(Y: sp.csc_array, C: sp.csc_array) -> sp.csc_array:
-    """Return which nodes are coupled, by admittances or by a branch; all entries are 1."""
-    incidence = abs(C)
-    link = (abs(Y) + abs(Y).T + incidence @ incidence.T).tocsc()
-    link.data = np.ones(link.data.size)
+    """Return which nodes are coupled, by admittances or by a branch, whatever their values; all entries are 1."""
+    coupled, incidence = Y.astype(bool), abs(C)
+    coupled.data[:] = True  # a stored zero is an entry, and needs its slot
+    link = (coupled + coupled.T + incidence @ incidence.T).astype(float).tocsc()
+    link.data[:] = 1.0
     return link
 
 

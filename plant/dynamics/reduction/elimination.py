@@ -18,7 +18,7 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     Parameters
     ----------
     Y
-        Admittances (S); wherever it has an entry, it has its transposed one.
+        Admittances (S), symmetric or not.
     keep
         Nodes to keep: those with a load, a terminal or a link to a source.
 
@@ -27,13 +27,16 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     kept : int64[k]
         The nodes that are left, ascending.
     Y_kept : csc_array, complex, k x k
-        What they see of the network, to rounding.
+        What they see of the network, to rounding; terms that cancel leave no entry.
     """
     n = Y.shape[0]
     rows = [
         dict(zip(Y.indices[begin:end].tolist(), Y.data[begin:end].tolist(), strict=True))
         for begin, end in zip(Y.indptr[:-1].tolist(), Y.indptr[1:].tolist(), strict=True)
     ]
+    for node, own in enumerate(rows):  # coupling need not be mutual: y_ij may be 0 where y_ji is not
+        for neighbour in own:
+            rows[neighbour].setdefault(node, 0.0)
     waiting = [(len(rows[node]), node) for node in np.flatnonzero(~keep).tolist()]
     heapq.heapify(waiting)
     gone = np.zeros(n, bool)
@@ -59,4 +62,6 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     columns = [other for node in kept.tolist() for other in rows[node]]
     values = [value for node in kept.tolist() for value in rows[node].values()]
     where = (np.repeat(np.arange(kept.size), count), place[np.array(columns, np.int64)])
-    return kept, sp.csc_array((np.array(values, complex), where), shape=(kept.size, kept.size))
+    reduced = sp.csc_array((np.array(values, complex), where), shape=(kept.size, kept.size))
+    reduced.eliminate_zeros()
+    return kept, reduced

@@ -1,0 +1,86 @@
+"""Nodes taken out of a network, and the pattern of what is left, against the matrix as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
+from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
+from plant.dynamics.reduction.elimination import eliminated
+
+NONE = np.zeros(0, complex)
+
+
+def solved(Y: sp.csc_array, right: np.ndarray) -> np.ndarray:
+    """Return the solution by block factors, in the order of elimination."""
+    order = elimination_order(Y, sp.csc_array((Y.shape[0], 0)))
+    factors = BlockPattern(Y[order][:, order].tocsc(), sp.csc_array((Y.shape[0], 0))).matrix(NONE, NONE)
+    factorise_blocks(factors)
+    x = np.ascontiguousarray(right[order]).view(float).copy()
+    solve_blocks(factors, x)
+    solution = np.empty_like(right)
+    solution[order] = x.view(complex)
+    return solution
+
+
+def meshed(rng: np.random.Generator, nodes: int) -> np.ndarray:
+    """Return admittances (S) of which a third are missing, where y_ij is not y_ji and may be 0 where y_ji is not."""
+    Y = (rng.normal(size=(nodes, nodes)) + 1j * rng.normal(size=(nodes, nodes))) * (rng.random((nodes, nodes)) < 0.3)
+    return Y + np.diag(20.0 + np.abs(Y).sum(axis=0))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_stored_zeros_and_one_way_couplings_have_entries_of_their_own(seed: int) -> None:
+    """The factors solve a matrix that stores zeros, at random places, as LAPACK does."""
+    rng = np.random.default_rng(seed)
+    Y = meshed(rng, 12)
+    at = [(i, j) for i in range(12) for j in range(12) if Y[i, j] or rng.random() < 0.2]
+    stored = sp.csc_array(([Y[i, j] for i, j in at], tuple(zip(*at, strict=True))), shape=(12, 12))
+    assert (stored.data == 0).any(), "no zero is stored, so nothing is tested"
+    right = rng.normal(size=12) + 1j * rng.normal(size=12)
+
+    np.testing.assert_allclose(solved(stored, right), np.linalg.solve(Y, right), rtol=1e-10)
+
+
+def test_two_values_of_one_entry_count_both() -> None:
+    """A matrix that stores an entry twice is the one with their sum."""
+    Y = sp.csc_array((3, 3), dtype=complex)
+    Y.indptr, Y.indices = np.array([0, 3, 6, 7]), np.array([0, 1, 1, 0, 0, 1, 2])
+    Y.data = np.array([5.0, -1.0, -0.5, -2.0, 1.0, 4.0, 2.0], complex)
+    right = np.array([1.0, 2.0, 3.0], complex)
+
+    np.testing.assert_allclose(solved(Y, right), np.linalg.solve(Y.toarray(), right), rtol=1e-12)
+
+
+def test_terms_that_cancel_leave_no_entry_and_no_neighbour_is_touched() -> None:
+    """Two ways between two kept nodes that cancel exactly: the rest of the network has its admittances still."""
+    Y = np.diag([4.0, 6.0, 8.0, 2.0, 2.0]).astype(complex)
+    for i, j, y in ((0, 1, -1.0), (0, 2, -1.0), (1, 2, -2.0), (0, 3, -1.0), (3, 1, -1.0), (0, 4, 1.0), (4, 1, -1.0)):
+        Y[i, j] = Y[j, i] = y
+    Y[0, 1] = Y[1, 0] = 0.0
+    keep = np.array([True, True, True, False, False])
+
+    kept, reduced = eliminated(sp.csr_array(Y), keep)
+
+    want = Y[:3, :3] - Y[:3, 3:] @ np.linalg.inv(Y[3:, 3:]) @ Y[3:, :3]
+    assert kept.tolist() == [0, 1, 2]
+    assert want[0, 1] == 0.0, "the ways do not cancel, so nothing is tested"
+    np.testing.assert_allclose(reduced.toarray(), want, rtol=1e-12)
+    assert (reduced.data != 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_elimination_is_that_of_the_matrix_where_couplings_are_not_mutual(seed: int) -> None:
+    """What is left of a network with y_ij unlike y_ji, or 0 where y_ji is not, is its Schur complement."""
+    rng = np.random.default_rng(seed)
+    Y = meshed(rng, 10)
+    keep = np.arange(10) < 6
+
+    kept, reduced = eliminated(sp.csr_array(Y), keep)
+
+    gone = np.setdiff1d(np.arange(10), kept)
+    assert gone.size, "nothing is eliminated"
+    want = Y[np.ix_(kept, kept)] - Y[np.ix_(kept, gone)] @ np.linalg.solve(Y[np.ix_(gone, gone)], Y[np.ix_(gone, kept)])
+    np.testing.assert_allclose(reduced.toarray(), want, atol=1e-12)
