@@ -91,7 +91,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         leave_out: Sequence[str] = (),
         switches: Sequence[str] = (),
     ) -> Feeder:
-        """Return the feeder of a model for GridLAB-D, as it is at the model's first moment; needs the extra `gridlabd`.
+        """Return the feeder of a model for GridLAB-D, once its controls rest; needs the extra `gridlabd`.
 
         Parameters
         ----------
@@ -226,13 +226,14 @@ class Feeder(Tables, frozen=True, kw_only=True):
         )
 
     def plot(self, *, voltages: bool = False) -> Figure:
-        """Return a one-line diagram with microgrids, or coloured by the lowest phase's voltage at each bus."""
+        """Return a one-line diagram with microgrids, or coloured by each bus's lowest energised phase."""
         from scenarios.results.plots.feeder_diagram import feeder_diagram
 
         V: Any = None
         if voltages:
             table = self.solve()
-            V = table[table["phase"].isin(list("ABC"))].groupby("bus")["V_pu"].min().to_dict()
+            live = table[table["phase"].isin(list("ABC")) & (table["V"] > 0.0)]
+            V = dict.fromkeys(table["bus"], 0.0) | live.groupby("bus")["V_pu"].min().to_dict()
         return feeder_diagram(self, V)
 
     def save(self, folder: str | Path) -> Path:

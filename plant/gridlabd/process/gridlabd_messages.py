@@ -16,7 +16,7 @@ LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")
 FOLLOWING = re.compile(
     r"load failed at or near|#include failed|unable to load '|failed to load model file|model initialization failed"
     r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
-    r"|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
+    r"|Failed to initialize simulation|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
 )
 """Messages that only repeat that something failed."""
 

@@ -1,11 +1,13 @@
 """GridLAB-D's own power flow of a model: a program for a process of its own, as GridLAB-D's state is global.
 
-It loads the model, solves the power flow at the model's first moment by Newton's method, and prints what the solver
-then holds, as one JSON object: buses, branches with their admittance matrices as the solver uses them, and the powers,
-currents and admittances that every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so
-they are read from its tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
+It loads the model and solves the power flow by Newton's method at the model's first moment. Where regulators or
+capacitors have a control, GridLAB-D goes on until they rest. Then it writes what the solver holds, as one JSON object:
+buses, branches with their admittance matrices as the solver uses them, and the powers, currents and admittances that
+every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its
+tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
 
-Usage: `python -m plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT PARENT`
+Usage: `python -m plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not beyond the first
+moment.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.gridlabd.process.delta_mode import NotImportableError, end_with, gridlabd_package
-from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS
+from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS, WATCHING
 from plant.imports.gridlabd.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
 
 TOLERANCE = "1e-10"
@@ -37,6 +39,15 @@ PV, SWING = 1, 2
 WYE, AROUND, LEGS = ("A", "B", "C"), ("AB", "BC", "CA"), ("1", "2", "12")
 """Branches of a load: to ground, between phases, of a split-phase service."""
 
+POSITIONS = {"regulator": "tap_", "capacitor": "switch"}
+"""Classes that a control moves, and the names of their positions, one a phase."""
+
+DELAYS = ("time_delay", "dwell_time", "lockout_time", "regulator_delay", "capacitor_delay")
+"""Properties (s) that let a control wait."""
+
+LONGEST_SETTLING = 3600
+"""Time (s) that GridLAB-D goes on at most."""
+
 KINDS = {"P": "power", "I": "current", "Y": "shunt"}
 """Kinds of a load's demand (VA, A, S), and the word in the names of GridLAB-D's properties."""
 
@@ -50,10 +61,12 @@ class PowerFlowModel:
         The GLM; the working folder is its own.
     scratch
         Folder for what GridLAB-D writes by itself.
+    settles
+        Whether to go on until regulators and capacitors rest.
     """
 
-    def __init__(self, path: str, scratch: Path) -> None:
-        self._scratch = scratch
+    def __init__(self, path: str, scratch: Path, *, settles: bool) -> None:
+        self._scratch, self._settles = scratch, settles
         self._module = gridlabd_package()
         self._gridlabd = self._module.DirectGridLabD()
         if self._gridlabd.load_glm([path]) != self._module.GLDErrorCode.SUCCESS:
@@ -66,7 +79,7 @@ class PowerFlowModel:
         }
 
     def solve(self) -> dict[str, Any]:
-        """Solve the power flow at the model's first moment."""
+        """Solve the power flow at the model's first moment, or when its regulators and capacitors rest."""
         result: dict[str, Any] = {
             "objects": self._objects(),
             "has_powerflow": self._gridlabd.get_global("powerflow::nominal_frequency") != "",
@@ -92,12 +105,67 @@ class PowerFlowModel:
         self._keep_quiet()
         if result["method"] != "NR":
             self._give_a_swing()
+        moved = self._controlled() if self._settles else []
+        if moved:
+            self._core.stop_after(LONGEST_SETTLING)
         self._gridlabd.setup_after_load()
-        result["solved"] = self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS
+        if moved:
+            result["settling"] = self._settle(moved)
+            result["solved"] = result["settling"]["solved"]
+        else:
+            result["solved"] = self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS
         if result["solved"]:
             result |= self._solver_tables()
             result["takes"] = [self._takes(name, kind) for name, kind in self._classes.items() if kind in CHILD_OF_BUS]
         return result
+
+    def _controlled(self) -> list[str]:
+        """Return the regulators and capacitors that a control of their own, or one of the model, may move."""
+        found = [name for name, kind in self._classes.items() if kind in POSITIONS]
+        if "volt_var_control" in self._classes.values():
+            return found
+        return [name for name in found if self._control_of(name) not in ("MANUAL", "")]
+
+    def _control_of(self, name: str) -> str:
+        if self._classes[name] == "capacitor":
+            return str(self._gridlabd.get_object_properties(name)["control"])
+        configuration = self._core.object_of(name, "configuration")
+        return str(self._gridlabd.get_object_properties(configuration)["Control"]) if configuration else ""
+
+    def _settle(self, moved: list[str]) -> dict[str, Any]:
+        """Go on until the positions have been the same for longer than any control waits, or for an hour.
+
+        Returns
+        -------
+        dict
+            Whether the power flow was `solved` all the time; whether they `rest`; the `time` as GridLAB-D writes it,
+            and the `seconds` since the first moment; positions at the `first` moment and the `last`, by object.
+        """
+        wait = 2.0 * max(
+            (self._core.doubles(name, key)[0] for name in self._classes for key in DELAYS if self._core.has(name, key)),
+            default=0.0,
+        )
+        start = changed = later = self._core.clock()
+        first = last = self._positions(moved)
+        solved = True
+        while solved and later - changed <= wait and later <= start + LONGEST_SETTLING:
+            now, time = later, self._gridlabd.get_global("clock")
+            solved = self._gridlabd.step()[0] == self._module.GLDErrorCode.SUCCESS
+            before, last = last, self._positions(moved)
+            later = max(self._core.clock(), now)
+            if now == start:
+                first = last
+            elif last != before:
+                changed = now
+        rest = min(later, start + LONGEST_SETTLING) - changed > wait
+        return {"solved": solved, "rest": rest, "time": time, "seconds": now - start, "first": first, "last": last}
+
+    def _positions(self, names: list[str]) -> dict[str, list[str]]:
+        found = {}
+        for name in names:
+            own = self._gridlabd.get_object_properties(name)
+            found[name] = [str(own[f"{POSITIONS[self._classes[name]]}{phase}"]) for phase in WYE]
+        return found
 
     def _objects(self) -> list[dict[str, Any]]:
         found = []
@@ -115,6 +183,8 @@ class PowerFlowModel:
             for key in self._gridlabd.get_object_properties(name):
                 if key in WRITTEN and kind != "player":
                     self._gridlabd.set_property(name, key, os.devnull)
+                elif key == "interval" and kind in WATCHING:  # each of their moments would be a step
+                    self._gridlabd.set_property(name, key, str(LONGEST_SETTLING))
             if kind.endswith("assert"):
                 self._gridlabd.set_property(name, "status", "ASSERT_NONE")
             if kind in CHILD_OF_BUS and self._core.has(name, "maximum_voltage_error"):
@@ -218,7 +288,7 @@ def main() -> None:
     model, result = sys.argv[1], Path(sys.argv[2])
     end_with(int(sys.argv[3]))
     try:
-        answer = PowerFlowModel(model, result.parent).solve()
+        answer = PowerFlowModel(model, result.parent, settles="first" not in sys.argv[4:]).solve()
     except NotImportableError as error:
         answer = {"not_importable": str(error)}
     except Exception as error:

@@ -30,6 +30,9 @@ LONGEST = 600.0
 def solved_model(path: Path) -> dict[str, Any]:
     """Return what GridLAB-D's solver holds of a model (`plant.imports.gridlabd.gridlabd_power_flow`).
 
+    Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
+    no solution on the way, its `solved` is false, and all else is of the first moment.
+
     Raises
     ------
     FeederError
@@ -37,9 +40,26 @@ def solved_model(path: Path) -> dict[str, Any]:
     """
     if importlib.util.find_spec("gridlabd") is None:
         raise FeederError(path.name, (MISSING,))
+    answer, printed = _asked(path)
+    settling = answer.get("settling", {})
+    if settling and not settling["solved"] and settling["seconds"]:
+        answer, printed = _asked(path, "first")
+        answer["settling"] = settling
+    if not answer.get("solved", True):
+        said = messages(printed) or [f"{path.name}: GridLAB-D's power flow does not converge"]
+        if answer["method"] != "NR":
+            said.append(
+                f"{path.name}: has solver_method {answer['method']}, and is solved with NR here; try NR there, too"
+            )
+        raise FeederError(path.name, tuple(said))
+    return answer
+
+
+def _asked(path: Path, *options: str) -> tuple[dict[str, Any], str]:
+    """Return the answer of GridLAB-D's process, and the lines that it printed."""
     with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
         result = folder.path / "result.json"
-        command = program(POWER_FLOW, path.name, str(result), str(os.getpid()))
+        command = program(POWER_FLOW, path.name, str(result), str(os.getpid()), *options)
         try:
             done = subprocess.run(
                 command,
@@ -68,11 +88,4 @@ def solved_model(path: Path) -> dict[str, Any]:
         raise FeederError(path.name, (damaged("gridlabd", printable(answer["not_importable"]), USER),))
     if "error" in answer:
         raise FeederError(path.name, tuple(messages(printed)) or (f"GridLAB-D: {printable(answer['error'])}",))
-    if not answer.get("solved", True):
-        said = messages(printed) or [f"{path.name}: GridLAB-D's power flow does not converge"]
-        if answer["method"] != "NR":
-            said.append(
-                f"{path.name}: has solver_method {answer['method']}, and is solved with NR here; try NR there, too"
-            )
-        raise FeederError(path.name, tuple(said))
-    return answer
+    return answer, printed

@@ -1,16 +1,18 @@
 """Read a feeder that is written for GridLAB-D.
 
-GridLAB-D itself reads the model and solves its power flow at the first moment. Then every branch comes over by the
-admittances that its solver uses, with regulators at their taps; loads come over as what they take: constant power,
-current or impedance. What comes out is solved here, too, and must have GridLAB-D's voltages.
+GridLAB-D itself reads the model and solves its power flow at the first moment, or where its controls rest. Then every
+branch comes over by the admittances that its solver uses, with regulators at their taps; loads come over as what they
+take: constant power, current or impedance. What comes out is solved here, too, and must have GridLAB-D's voltages.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from plant.equipment import Feeder, Source
@@ -30,12 +32,23 @@ from plant.imports.gridlabd.glm_loads import BusLoads
 from plant.imports.gridlabd.glm_text import GlmText
 from plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
 from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.import_checks import BEYOND, left_out_by, path_problems, refuse_if, refuse_unsolvable, report_powers
+from plant.imports.import_checks import (
+    BEYOND,
+    left_out_by,
+    path_problems,
+    refuse_if,
+    refuse_unsolvable,
+    report_powers,
+    without_unfed,
+)
 from plant.imports.import_comparison import MATCH, difference
 from wire.schema.suggestion import suggestion
 
 FAR = 1.3
 """Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""
+
+LIVE = 0.5
+"""Part of a bus's highest phase voltage below which a phase is de-energised, and has what others induce in it."""
 
 BALANCED = 1e-7
 """Largest unbalance (pu) of the substation's voltage that is rounding."""
@@ -88,6 +101,7 @@ class _GlmReader:
                 f"write nominal_frequency {f_nom:g}; in its module powerflow, or leave f_nom out"
             )
         self._refuse_classes()
+        self._tell_settling()
         known = len(problems)
         self._mend_nominal_voltages()
         if len(problems) > known:
@@ -100,6 +114,9 @@ class _GlmReader:
             hint = suggestion(name.rpartition(".")[2], self._names_of(LINES), "lines")
             problems.append(f'switches: there is no line "{name}"; {hint}')
         shunts, parts = self._loads()
+        report_powers(parts, problems)
+        self._report_no_solution()
+        refuse_if(self._path, problems)
         source = self._source(elements)
         refuse_if(self._path, problems)
         assert source is not None
@@ -116,9 +133,9 @@ class _GlmReader:
             f_nom=model["f_nom"],
             elements=tuple(rows),
             load_parts=tuple(parts),
-            notes=tuple(self._notes),
         )
-        report_powers(feeder.load_parts, problems)
+        feeder = without_unfed(feeder, self._notes, str)
+        feeder = msgspec.structs.replace(feeder, notes=tuple(self._notes))
         refuse_unsolvable(self._path, feeder, problems, UNGROUNDED, str)
         if all(self._classes[name] == "player" for name in self._left_out):
             self._compare(feeder)
@@ -131,11 +148,40 @@ class _GlmReader:
     def _called(self, name: str) -> str:
         return f"{self._text.at(name)}{self._classes[name]}.{name}"
 
+    def _tell_settling(self) -> None:
+        """Note how far GridLAB-D has gone on, and what its regulators and capacitors have done."""
+        settling = self._model.get("settling")
+        if not settling:
+            return
+        file, time = self._path.name, settling["time"]
+        if not settling["solved"]:
+            self._notes.append(
+                f"{file}: regulators and capacitors stay as at the first moment; GridLAB-D has no solution at {time}, "
+                "before they rest"
+            )
+            return
+        if not settling["rest"]:
+            self._notes.append(
+                f"{file}: regulators and capacitors still move at {time}, an hour after the first moment; they stay as "
+                "then"
+            )
+        elif settling["seconds"]:
+            self._notes.append(f"{file}: as GridLAB-D has it at {time}, when its regulators and capacitors rest")
+        for name, positions in settling["last"].items():
+            before = settling["first"][name]
+            if positions != before:
+                self._notes.append(
+                    f"{self._classes[name]}.{name}: {', '.join(positions)} in A, B, C, and {', '.join(before)} at the "
+                    "first moment"
+                )
+
     def _mend_nominal_voltages(self) -> None:
         """Take the voltage that a bus has for its nominal one, where the model states another one by mistake."""
         for bus in self._model["buses"]:
             V = [abs(voltage_of(bus, letter)) for letter in letters_of(bus["phases"])]
-            usual = sum(V) / max(len(V), 1)
+            V = [each for each in V if isfinite(each)]  # `_report_no_solution` names the others
+            live = [each for each in V if each > LIVE * max(V)]
+            usual = sum(live) / max(len(live), 1)
             stated = bus["V_nom"] > 0.0
             if not stated and not usual > 0.0:
                 self._problems.append(
@@ -147,6 +193,17 @@ class _GlmReader:
                     "flow; the latter is taken"
                 )
                 bus["V_nom"] = usual
+
+    def _report_no_solution(self) -> None:
+        """Note a problem if a voltage of GridLAB-D is no number, unless a value that is none explains it."""
+        nodes = [(bus, letter) for bus in self._model["buses"] for letter in letters_of(bus["phases"])]
+        lost = [(bus, letter) for bus, letter in nodes if not isfinite(abs(voltage_of(bus, letter)))]
+        if lost and not self._problems:
+            (bus, letter), more = lost[0], f", and so at {len(lost) - 1} nodes more" if len(lost) > 1 else ""
+            self._problems.append(
+                f"{self._called(bus['name'])}: GridLAB-D found no solution: it has {abs(voltage_of(bus, letter)):g} V "
+                f"in phase {letter}{more}; look for a value that is no number, or an impedance of 0, there or before it"
+            )
 
     def _refuse_classes(self) -> None:
         """Note a problem for each object that cannot be represented."""

@@ -91,6 +91,11 @@ class ModelCore(GridlabdCore):
         address: int | None = self._library.object_find_name(name)
         return address
 
+    def stop_after(self, seconds: int) -> None:
+        """Let the simulation end so long (s) after its first moment."""
+        start, stop = (ctypes.c_int64.in_dll(self._library, f"global_{which}time") for which in ("start", "stop"))
+        stop.value = start.value + seconds
+
     def head(self, name: str) -> Any:
         """Return an object's head; RuntimeError if this GridLAB-D lays it out in another way."""
         head = ObjectHead.from_address(self.find(name.encode()) or 0)

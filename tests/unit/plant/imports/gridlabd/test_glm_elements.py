@@ -127,3 +127,24 @@ def test_a_nominal_voltage_that_is_wrong_is_told_and_mended(tmp_path: Path) -> N
     assert any(note.startswith("load.ne: nominal_voltage 12470 V, and 72") for note in feeder.notes)
     assert next(bus.V_nom for bus in feeder.buses if bus.name == "ne") == pytest.approx(7250.0, rel=0.01)
     assert sum(feeder.load_by_bus().values()) == pytest.approx(2.9e5)
+
+
+@pytest.mark.parametrize("stated", [7200, 12470])
+@pytest.mark.parametrize(
+    "feeding",
+    [
+        "object switch { name sw; phases ABCN; from b; to x; operating_mode INDIVIDUAL; phase_B_state OPEN; }",
+        "object fuse { name f; phases ABCN; from b; to x; current_limit 1000; phase_B_status BLOWN; "
+        "phase_A_status GOOD; phase_C_status GOOD; }",
+    ],
+    ids=["switch", "fuse"],
+)
+def test_a_de_energised_phase_has_no_part_in_a_nominal_voltage(tmp_path: Path, stated: int, feeding: str) -> None:
+    """A right nominal voltage stays where a phase is open; in place of a wrong one comes that of the live phases."""
+    load = f"object load {{ name x; phases ABCN; nominal_voltage {stated}; constant_impedance_A 300+50j; "
+    model = HEAD + feeding + load + "constant_impedance_B 300+50j; constant_impedance_C 300+50j; }\n"
+
+    feeder = read_glm(write(tmp_path, model))
+
+    assert next(bus.V_nom for bus in feeder.buses if bus.name == "x") == pytest.approx(7250.0, rel=0.01)
+    assert any("nominal_voltage" in note for note in feeder.notes) == (stated != 7200)

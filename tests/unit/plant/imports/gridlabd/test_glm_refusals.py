@@ -80,6 +80,10 @@ ONE_LINE = {
         HEAD.replace("7200", "nan"),
         "feeder.glm:8: node.b: nominal_voltage must be above 0 V, got nan V",
     ),
+    "voltages that are no numbers": (
+        HEAD.replace("voltage_A 7300", "voltage_A nan") + LOAD,
+        "feeder.glm:3: node.sub: GridLAB-D found no solution: it has nan V in phase A, and so at 3 nodes more",
+    ),
     "no solution": (HEAD + LOAD.replace("1e4", "1e9"), "convergence iteration limit reached"),
 }
 
@@ -95,13 +99,16 @@ def test_one_line_says_what_is_refused(tmp_path: Path, what: str) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
 
 
-def test_floating_sections_and_lone_loads_are_named(tmp_path: Path) -> None:
-    """A section without a source is one problem, with its first bus."""
+def test_floating_sections_are_left_out(tmp_path: Path) -> None:
+    """A section without a source is one note, with its first bus; if it has most of the load, it is a problem."""
     model = HEAD + LOAD + NODE.replace("NAME", "d1") + NODE.replace("NAME", "d2") + line("l2", "d1", "d2")
 
-    said = problems(write(tmp_path, model))
+    feeder = read_glm(write(tmp_path, model))
 
-    assert any("d1" in problem for problem in said)
+    assert {bus.name for bus in feeder.buses} == {"sub", "b"}
+    assert any("d1, d2 (first d1.A, d1.B, d1.C): no path to the source; left out" in note for note in feeder.notes)
+    heavy = LOAD.replace("l1", "heavy").replace("parent b", "parent d1").replace("power_A 1e4", "impedance_A 50+0j")
+    assert any("d1" in problem for problem in problems(write(tmp_path, model + heavy)))
 
 
 def test_all_that_is_not_supported_comes_at_once(tmp_path: Path) -> None:
