@@ -127,10 +127,10 @@ class Backlog:
         first = self._losses.get((key, kind))
         self._losses[key, kind] = Loss(key, kind, text, 1) if first is None else first._replace(number=first.number + 1)
 
-    def emptied(self) -> None:
-        """Note that nothing waits any more."""
+    def emptied(self, bytes_left: int = 0) -> None:
+        """Note that nothing waits any more, but for so many bytes of messages behind tokens."""
         self._beyond.clear()
-        self._bytes = 0
+        self._bytes = bytes_left
 
     @property
     def has_losses(self) -> bool:

@@ -3,6 +3,7 @@
 Anybody may hold tokens, as many as he likes, and each costs the process that notes it a question. So
 
 - of the tokens that appear, `AT_ONCE` come in at once and as many after each `PAUSE`; the others wait, in their order;
+- a message whose sender is not known waits behind the tokens that came before it: one of them may be its sender's;
 - up to `MOST_WAITING` of strangers wait; one more is dropped and counted. One of a noted holder always waits;
 - a token that vanishes comes in at once if its holder is noted, and is of no use if not; a waiting one is forgotten.
 
@@ -14,14 +15,21 @@ is noted only once the process has handled it, so until then it is remembered he
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import count
 from math import inf
-from typing import Literal, NamedTuple
+from typing import Literal
 
 from wire.backlog import Loss
 from wire.bounds import MOST_INVERTERS
 from wire.membership import MOST_PROCESSES
 
 TokenEvent = Literal["appeared", "vanished"]
+
+Kind = Literal["message", "appeared", "vanished", "word"]
+"""A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
+
+Stamped = tuple[Kind, str, bytes, float]
+"""Kind, key and payload of an event, and its time of arrival (s, monotonic): it may wait for its owner."""
 
 AT_ONCE, PAUSE = 20, 0.01
 """Appearing tokens that come in at once, and time (s) after which as many more do: 2,000 a second, of which each costs
@@ -32,14 +40,6 @@ MOST_WAITING = MOST_PROCESSES * MOST_INVERTERS
 
 TOKENS = "alive/**"
 """Key under which all tokens that are dropped are counted, as there are as many of their own as anybody likes."""
-
-
-class Arrival(NamedTuple):
-    """A token that has waited and comes in now."""
-
-    key: str
-    at: float
-    """Time (s) at which it appeared."""
 
 
 class TokenQueue:
@@ -54,13 +54,16 @@ class TokenQueue:
     True
     >>> queue.put("vanished", "who20", 0.0, lambda key: False)
     False
-    >>> queue.due, [key for key, _ in queue.taken(PAUSE)]
+    >>> queue.due, [event[1] for event in queue.taken(PAUSE)]
     (0.01, ['who21'])
     """
 
     def __init__(self) -> None:
-        self._waiting: dict[str, float] = {}
-        """Tokens that wait, and when they appeared (s), in their order."""
+        self._waiting: dict[str | int, Stamped] = {}
+        """What waits, in its order: tokens by their keys, messages by a number."""
+        self._numbers = count()
+        self.messages = self.message_bytes = 0
+        """Messages that wait, and their bytes."""
         self._came: dict[str, bool] = {}
         """Whether each token is there, as the owner will see by what has come in since it took the last events."""
         self._handled: dict[str, bool] = {}
@@ -97,21 +100,33 @@ class TokenQueue:
         if self._room and not self._waiting:
             self._come(key)
             return True
-        if len(self._waiting) < MOST_WAITING or there is False or (there is None and is_noted(key)):
-            self._waiting[key] = at
+        if self._waiting_tokens < MOST_WAITING or there is False or (there is None and is_noted(key)):
+            self._waiting[key] = "appeared", key, b"", at
         else:
             self._lose()
         return False
 
-    def taken(self, now: float) -> list[Arrival]:
+    def put_behind(self, message: Stamped) -> None:
+        """Let a message wait until all tokens that wait now have come in."""
+        self._waiting[next(self._numbers)] = message
+        self.messages += 1
+        self.message_bytes += len(message[2])
+
+    def taken(self, now: float) -> list[Stamped]:
         """Note that the owner has handled what it took before, and has taken all that came in; let more come in."""
         self._handled, self._came = self._came, {}
         self._renew(now)
-        arrivals = []
-        while self._room and self._waiting:
-            key = next(iter(self._waiting))
-            arrivals.append(Arrival(key, self._waiting.pop(key)))
-            self._come(key)
+        arrivals: list[Stamped] = []
+        while self._waiting:
+            first = next(iter(self._waiting))
+            if isinstance(first, str):
+                if not self._room:
+                    break
+                self._come(first)
+            else:
+                self.messages -= 1
+                self.message_bytes -= len(self._waiting[first][2])
+            arrivals.append(self._waiting.pop(first))
         self._handled.update(self._came)
         self._came = {}
         return arrivals
@@ -128,8 +143,12 @@ class TokenQueue:
 
     @property
     def waiting(self) -> int:
-        """Number of tokens that wait."""
+        """Number of tokens and messages that wait."""
         return len(self._waiting)
+
+    @property
+    def _waiting_tokens(self) -> int:
+        return len(self._waiting) - self.messages
 
     @property
     def has_loss(self) -> bool:
@@ -147,7 +166,7 @@ class TokenQueue:
 
     def _lose(self) -> None:
         if self._loss is None:
-            self._loss = Loss(TOKENS, "excess", f"{len(self._waiting)} tokens were waiting, of others", 0)
+            self._loss = Loss(TOKENS, "excess", f"{self._waiting_tokens} tokens were waiting, of others", 0)
         self._loss = self._loss._replace(number=self._loss.number + 1)
 
     def _come(self, key: str) -> None:

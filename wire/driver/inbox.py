@@ -9,20 +9,13 @@ from collections.abc import Callable
 from contextlib import suppress
 from math import inf
 from time import monotonic
-from typing import Literal
 
 from wire.backlog import ROOM, SMALL, Backlog, Loss
 from wire.bounds import LONGEST_MESSAGE
-from wire.token_queue import TokenEvent, TokenQueue
-
-Kind = Literal["message", "appeared", "vanished", "word"]
-"""A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
+from wire.token_queue import Kind, Stamped, TokenEvent, TokenQueue
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
-
-Stamped = tuple[Kind, str, bytes, float]
-"""The same with its time of arrival (s, monotonic): it may wait here for its owner."""
 
 HELD = 1.0
 """Longest time (s) for which a known sender's message waits for room where none may be lost. Its sender waits
@@ -90,7 +83,7 @@ class Inbox:
         elif event[0] != "message":
             self._events.append((*event, monotonic()))
             self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
-        elif len(self._events) < ROOM and len(event[2]) <= SMALL:
+        elif len(self._events) < ROOM and len(event[2]) <= SMALL and not self._tokens.waiting:
             self._events.append((*event, monotonic()))
         else:
             self._put_if_admitted(event, asked=asked)
@@ -110,7 +103,10 @@ class Inbox:
                 self._urgent = True
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
-        """Put a message in that is one of many, or long, if it may wait."""
+        """Put a message in that is one of many, long, or behind tokens, if it may wait.
+
+        One whose sender is not known stays behind the tokens: rejected before its sender's token, it would be lost.
+        """
         _, key, payload = event
         size, known = len(payload), asked or self.is_known(key, payload)
         if size > LONGEST_MESSAGE and not asked:
@@ -120,10 +116,13 @@ class Inbox:
             if known and self._holds:
                 self._wait_for_room(key, size)
                 self._backlog.add(key, size, waiting=len(self._events))
-            elif not self._backlog.admits(key, size, known=known, waiting=len(self._events)):
+            elif not self._backlog.admits(key, size, known=known, waiting=len(self._events) + self._tokens.messages):
                 return
             self._counted = True  # before it is put in: `take` looks for it afterwards
-            self._events.append((*event, monotonic()))
+            if self._tokens.waiting and not known:
+                self._tokens.put_behind((*event, monotonic()))
+            else:
+                self._events.append((*event, monotonic()))
 
     def _wait_for_room(self, key: str, size: int) -> None:
         """Wait until there is room, at most `HELD`; the guard is held, but for the wait."""
@@ -177,10 +176,9 @@ class Inbox:
                 while events:  # none that is counted waits any more, and no token that comes in now
                     taken.append(events.popleft())
                 self._counted = False
-                self._backlog.emptied()
+                taken += self._tokens.taken(monotonic())
+                self._backlog.emptied(self._tokens.message_bytes)
                 self._emptied.notify_all()
-                arrivals = self._tokens.taken(monotonic())
-            taken += [("appeared", key, b"", at) for key, at in arrivals]
         return taken
 
     def _longest(self, timeout: float | None) -> float:

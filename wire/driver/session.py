@@ -16,13 +16,14 @@ from weakref import WeakSet
 
 from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
-from wire.driver.inbox import Inbox, Stamped
+from wire.driver.inbox import Inbox
 from wire.driver.large_blocks import give_back_freed
 from wire.driver.left_links import end_left_links
 from wire.driver.lingering import do_not_linger
 from wire.driver.open_files import limit
 from wire.driver.zenoh_settings import ONE_THREAD, PROFILES, RUNTIME, Clock, as_client, zenoh_settings
 from wire.keys import LATEST_ONLY, is_token
+from wire.token_queue import Stamped
 from wire.trust.credentials import Credentials
 from wire.trust.link_certificates import LinkCertificates
 

@@ -20,10 +20,11 @@ from agents.realtime.session_health import SessionHealth
 from tests.toy.toy_configs import agent_config
 from wire.codec import encode
 from wire.driver.drive import StoppedError, StoppedOnLeashError
-from wire.driver.inbox import Inbox, Stamped
+from wire.driver.inbox import Inbox
 from wire.driver.session import Session, SessionError
 from wire.keys import Keys
 from wire.messages import Measurement, Stop
+from wire.token_queue import Stamped
 
 KEYS = Keys("toy")
 PLANT_TOKEN = KEYS.alive_plant(1)

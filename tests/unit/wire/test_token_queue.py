@@ -10,6 +10,7 @@ from unittest.mock import patch
 from hypothesis import given
 from hypothesis import strategies as st
 
+from wire.backlog import ROOM as ROOM_OF_ALL
 from wire.driver.inbox import Inbox
 from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TOKENS, TokenEvent, TokenQueue
 
@@ -82,7 +83,7 @@ class Process:
             elif kind == "vanished":
                 self.noted.discard(key)
         self.taken, self.pending = self.pending, []
-        for key, at in self.queue.taken(self.now):
+        for _, key, _, at in self.queue.taken(self.now):
             assert at <= self.now
             self._come("appeared", key, True)
         self.taken, self.pending = self.taken + self.pending, []
@@ -176,7 +177,7 @@ def test_who_restarts_in_a_flood_of_strangers_is_seen_to_go_at_once_and_to_come_
     assert not queue.put("appeared", "inv2", 0.0, lambda key: key == "inv2")
     came, now = [], 0.0
     while queue.waiting:
-        came += [key for key, _ in queue.taken(now)]
+        came += [key for _, key, _, _ in queue.taken(now)]
         now += PAUSE
     assert came[-1] == "inv2"
     assert len(came) == MOST_WAITING + 1
@@ -228,3 +229,40 @@ def test_an_owner_that_has_said_nothing_of_whom_it_notes_loses_no_token() -> Non
 
     assert kinds.count("appeared") == AT_ONCE + 2
     assert inbox.take_losses() == ()
+
+
+def test_a_message_waits_behind_the_tokens_that_came_before_it() -> None:
+    """Its sender's token may be the last of them; messages of known senders and answers to own questions pass."""
+    inbox = Inbox()
+    inbox.is_known = lambda key, payload: key == "state/inv1"
+    inbox.is_noted = lambda key: False
+    tokens = [f"who{i}" for i in range(AT_ONCE + 4)] + ["plant"]
+    for token in tokens:
+        inbox.put(("appeared", token, b""))
+    inbox.put(("message", "control", b"Prepare"))
+    for i in range(AT_ONCE):
+        inbox.put(("appeared", f"later{i}", b""))
+    inbox.put(("message", "state/inv1", b"State"))
+    inbox.put(("message", "nameplate/inv2", b"Nameplate"), asked=True)
+    first = [key for _, key, _, _ in inbox.take(10**9, None)]
+    rest: list[str] = []
+    while len(rest) < 5 + 1 + AT_ONCE - len(first[AT_ONCE + 2 :]):
+        rest += [key for _, key, _, _ in inbox.take(10**9, None)]
+
+    assert first[: AT_ONCE + 2] == [*tokens[:AT_ONCE], "state/inv1", "nameplate/inv2"]
+    assert (first[AT_ONCE + 2 :] + rest)[:6] == [*tokens[AT_ONCE:], "control"]
+
+
+def test_messages_behind_tokens_take_their_part_of_the_room() -> None:
+    """Strangers who send behind their own tokens cannot fill the memory: beyond the room all is lost and counted."""
+    inbox = Inbox()
+    inbox.is_noted = lambda key: False
+    for i in range(AT_ONCE + 1):
+        inbox.put(("appeared", f"who{i}", b""))
+    for _ in range(ROOM_OF_ALL + 5):
+        inbox.put(("message", "control", b"x"))
+
+    assert [loss.number for loss in inbox.take_losses()] == [AT_ONCE + 5]
+    taken = 0
+    while taken < ROOM_OF_ALL + 1:
+        taken += len(inbox.take(10**9, None))
