@@ -4,7 +4,8 @@
 subscribes to each in-neighbour by the graph, and then asks for the nameplate once more: subscription and query
 take the same way in the same order, so the answer proves that the neighbour's publications will come. For graphs that
 look at pairs this happens at once; for a ring, when `Prepare` has named the roster. The agent sends `Ready` to the
-plant when it has met the whole roster and all in-neighbours are proven.
+plant when it has met the whole roster and all in-neighbours are proven. The plant sends `Prepare` again as long as a
+`Ready` is missing: then the agent sends its own again, or asks again for what it misses.
 
 **Ticks.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
 computes and sends State(k). It keeps a State(k) that overtakes the own Measurement(k) until tick k is done, so the used
@@ -34,6 +35,7 @@ from agents.topology import in_neighbours, is_pairwise
 from wire.codec import RejectedError, decode, encode
 from wire.journal import JournalBuffer
 from wire.links import REPORT_TICKS, Links
+from wire.membership import ASKED_AT_ONCE
 from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
 from wire.node import Route
 from wire.timing.clock import time_of
@@ -95,6 +97,8 @@ class LockstepAgent(AgentNode):
         """Whether the agent is ready for this roster. It stays so if an agent dies: the next roster changes it."""
         self._proofs: dict[tuple[str, str], bool] = {}
         """Processes asked for proof that they know of the subscription to them; True once they have answered."""
+        self._answered = False
+        """Whether a nameplate has come since the last `Prepare`: then others may be on their way."""
         self._unproven: dict[str, str] | None = None
         """In-neighbours on the roster whose processes have not answered; None until the whole roster has been met."""
         self._roster_neighbours: tuple[str, ...] = ()
@@ -160,7 +164,7 @@ class LockstepAgent(AgentNode):
 
     def expire(self, now: float) -> None:
         """Give up if the deadline has passed."""
-        if self.finished or self.deadline is None or now < self.deadline:
+        if self.finished or not self._barrier.is_over(now):
             return
         if self._ending:
             self._report_the_last()
@@ -243,10 +247,23 @@ class LockstepAgent(AgentNode):
     def _on_control(self, message: Prepare | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
             self._end(message.reason, now)
+        elif message == self._roster:
+            self._barrier.renew(now)
+            self._ask_again()
         else:
             self._prepare(message)
             self._barrier.renew(now)
             self._get_ready(now)
+
+    def _ask_again(self) -> None:
+        """Answer a `Prepare` that is sent again: with `Ready` once more, or by questions if no answer comes."""
+        if self._ready:
+            self._send_ready()
+        elif not self._answered:
+            unproven = list((self._unproven or {}).items())[:ASKED_AT_ONCE]
+            for name, instance in unproven or self.members.next_unmet():
+                self._ask(name, instance)
+        self._answered = False
 
     def _on_stop_request(self, message: Stop, payload: bytes, now: float) -> None:
         if message.refused:
@@ -273,6 +290,7 @@ class LockstepAgent(AgentNode):
 
     def _on_nameplate(self, instance: str, nameplate: Nameplate, payload: bytes, now: float) -> None:
         super()._on_nameplate(instance, nameplate, payload, now)
+        self._answered = True
         name = nameplate.sender
         process = name, instance
         if process in self._proofs:
@@ -341,6 +359,10 @@ class LockstepAgent(AgentNode):
             self._barrier.wait_for({PLANT: "Measurement(0)"}, now)
         else:
             self._barrier.renew(now)
+        self._send_ready()
+
+    def _send_ready(self) -> None:
+        assert self._roster is not None
         t = time_of(self._tick or 0, self._config.T_c)
         ready = Ready(sender=self._name, epoch=self._config.epoch, seq=self._roster.seq, t=t)
         self._publish(self.keys.ready(self._name), encode(ready))

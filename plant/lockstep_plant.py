@@ -8,6 +8,8 @@ to k+1 and sends Measurement(k+1). A change of the roster goes through *preparin
 once, as awaited. Because the tick is held, no number depends on how long a process took to start.
 *closing*: from `Stop`, until all tokens are gone, as proof that every node has heard it.
 
+What may be lost is asked again every `AGAIN`: for nameplates, and by the same `Prepare` for each `Ready`.
+
 At a scheduled leave the plant sends the agent a stop request and disconnects its inverter; at a join it connects the
 inverter at no load. At a scheduled death it sends the stop request, but the inverter stays. When an agent dies by
 itself, the plant removes it from the roster and the run continues, marked not reproducible; a death before tick 0
@@ -17,6 +19,7 @@ ends the run, because it would be another run. `agents.lockstep_agent` explains 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import inf
 from typing import Literal
 
 from plant.plant_config import PlantConfig
@@ -34,6 +37,9 @@ Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over
 
 TELEMETRY_TICKS = 10
 """Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
+
+AGAIN = 1.0
+"""Time (s) after which a question without an answer is asked again."""
 
 
 class LockstepPlant(PlantNode):
@@ -68,6 +74,10 @@ class LockstepPlant(PlantNode):
         """Newcomers that the held tick waits for: they may appear although the run has begun."""
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._last_heard = self._barrier.last_heard
+        self._ask_at = inf
+        """When open questions are asked again (s on the driver's clock)."""
+        self._prepare_bytes = b""
+        """The last roster sent."""
         self._states: dict[str, State] = {}
         for name in self._everyone:
             self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
@@ -100,12 +110,14 @@ class LockstepPlant(PlantNode):
 
     @property
     def deadline(self) -> float | None:
-        """End of the present wait (s on the driver's clock)."""
-        return self._barrier.deadline
+        """End of the present wait, or time to ask again (s on the driver's clock)."""
+        deadline = self._barrier.deadline
+        return deadline if deadline is None else min(deadline, self._ask_at)
 
     def start(self, now: float) -> None:
         """Start to wait for the agents."""
         self._barrier.renew(now)
+        self._ask_at = now + AGAIN
         self._gather(now)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
@@ -121,8 +133,10 @@ class LockstepPlant(PlantNode):
         return ()
 
     def expire(self, now: float) -> None:
-        """End the run if the deadline has passed."""
-        if self.deadline is not None and now >= self.deadline:
+        """Ask again, and end the run if the deadline has passed."""
+        if now >= self._ask_at:
+            self._ask_again(now)
+        if self._barrier.is_over(now):
             if self.phase == "closing":
                 self._be_over()
             elif missing := self.missing_messages():  # else the last awaited message has just arrived
@@ -162,7 +176,18 @@ class LockstepPlant(PlantNode):
         self._gather(now)
 
     def _met(self, nameplate: Nameplate, now: float) -> None:
+        if self.phase == "gathering":
+            self._barrier.renew(now)
         self._gather(now)
+
+    def _ask_again(self, now: float) -> None:
+        """Ask again for the nameplates, or for the `Ready`, that have not come."""
+        self._ask_at = now + AGAIN
+        if self.phase == "preparing":
+            self._publish(self.keys.control, self._prepare_bytes)
+        else:
+            for name, instance in self.members.next_unmet():
+                self._ask(name, instance)
 
     def _agent_gone(self, name: str, now: float) -> None:
         if self.phase in ("closing", "over"):
@@ -199,9 +224,11 @@ class LockstepPlant(PlantNode):
             self._states[state.sender] = state
 
     def _on_ready(self, ready: Ready, payload: bytes, now: float) -> None:
-        if self.phase != "preparing" or ready.seq != self._roster_number:
+        if ready.seq != self._roster_number:
             raise RejectedError("stale", f"Ready({ready.seq}) of {ready.sender} in phase {self.phase}")
-        self._barrier.came(ready.sender)
+        if self.phase == "preparing":  # else it is the answer to a Prepare that was sent again
+            self._barrier.came(ready.sender)
+            self._barrier.renew(now)
 
     # ---------------------------------------------------------------- the roster
 
@@ -228,7 +255,8 @@ class LockstepPlant(PlantNode):
             roster=self._roster,
             instances=tuple(self.members.instance(name) for name in self._roster),
         )
-        self._publish(self.keys.control, encode(prepare))
+        self._prepare_bytes, self._ask_at = encode(prepare), now + AGAIN
+        self._publish(self.keys.control, self._prepare_bytes)
 
     def _let_leave_and_join(self, now: float) -> None:
         """Perform the scheduled leaves and deaths of this tick, and start to wait for its newcomers."""
@@ -245,6 +273,7 @@ class LockstepPlant(PlantNode):
         if joining and not self.outcome:
             self._joining, self.phase = joining, "joining"
             self._barrier.renew(now)
+            self._ask_at = now + AGAIN
             self._report(final=False, missing_agents=joining)
 
     def _dismiss(self, name: str, text: str) -> None:
@@ -297,7 +326,7 @@ class LockstepPlant(PlantNode):
 
     def _grant(self, now: float) -> None:
         """Send every agent its measurement, and with it the grant of this tick."""
-        self.phase = "ticking"
+        self.phase, self._ask_at = "ticking", inf
         self._barrier.wait_for(dict.fromkeys(self._roster, f"State({self.tick})"), now)
         for measurement in self._measurements():
             self._publish(self._measurement_keys[measurement.to], encode(measurement))
@@ -343,7 +372,7 @@ class LockstepPlant(PlantNode):
         if self._tick_traffic is not None:
             self._tick_traffic.ticked(self.tick)
         self._tell_the_end(reason)
-        self.phase = "closing"
+        self.phase, self._ask_at = "closing", inf
         self._barrier.wait_for({}, now)
         self._barrier.deadline = now + CLOSING
         self._close_if_alone()

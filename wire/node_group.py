@@ -253,12 +253,12 @@ class NodeGroup:
             listeners.append(node)
 
     def _fetch(self, node: GroupedNode, key: str, actions: list[Action | Log]) -> None:
-        """Answer from inside, or by a query that proves as much, or query."""
+        """Answer from inside, or by a query that proves as much, or query; a node that asks again has had no answer."""
         own = self.nameplates.get(key)
         query = self._queries.get(key)
         if own is not None:
             node.received(key, own, self._now)
-        elif query is None or query.declared != len(self._declared):
+        elif query is None or query.declared != len(self._declared) or (node in query.askers and not query.answer):
             self._asked += 1
             query = self._queries[key] = _Query(len(self._declared), [node], [])
             reply_key = f"{key}#{self._asked}"

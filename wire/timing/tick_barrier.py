@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+STOOD_STILL = 1.0
+"""Time (s) after a deadline beyond which a process that looks has stood still itself, with its clock running on."""
+
 
 class Awaited(NamedTuple):
     """One message that a node waits for."""
@@ -80,6 +83,19 @@ class TickBarrier:
     def renew(self, now: float) -> None:
         """Note progress: the deadline restarts from now."""
         self.deadline = now + self._timeout
+
+    def is_over(self, now: float) -> bool:
+        """Whether the deadline has passed.
+
+        A process that is woken much later than it asked for has stood still itself, as after Ctrl-Z or a closed lid.
+        Messages may wait for it, so it waits anew.
+        """
+        if self.deadline is None or now < self.deadline:
+            return False
+        if now > self.deadline + STOOD_STILL:
+            self.renew(now)
+            return False
+        return True
 
     def rest(self) -> None:
         """Wait without a deadline."""

@@ -120,10 +120,49 @@ def test_of_two_processes_of_a_name_the_one_on_the_roster_speaks() -> None:
     assert lab.node.admission.epoch("inv2") == 5
 
 
+def test_a_prepare_that_comes_again_is_answered_again() -> None:
+    """Its first `Ready` may be lost; the roster and the wait for the first measurement stay as they are."""
+    lab = Lab()
+    lab.meet("inv2")
+    lab.prepare(0, "inv2")
+    assert lab.take()[-1] == ("ready", "0")
+    lab.prepare(0, "inv2")
+
+    assert lab.take() == [("ready", "0")]
+    assert lab.node.rejects.counts == {}
+    lab.measure(0)
+    assert [state.seq for state in lab.decided] == [0]
+
+
+def test_a_lost_nameplate_is_asked_for_again_when_the_prepare_comes_again() -> None:
+    """First as a nameplate, then as the proof of a subscription; not while answers still come."""
+    lab = Lab()
+    lab.token("inv2")
+    lab.token("inv3")
+    lab.prepare(0, "inv2", "inv3")
+    lab.take()
+    lab.answer("inv3")
+    lab.take()
+    lab.prepare(0, "inv2", "inv3")
+    assert lab.take() == []
+
+    lab.prepare(0, "inv2", "inv3")
+    assert lab.take() == [("ask", "inv2")]
+    lab.answer("inv2")
+    lab.answer("inv3")
+    lab.take()
+    lab.prepare(0, "inv2", "inv3")
+    lab.prepare(0, "inv2", "inv3")
+    assert lab.take() == [("ask", "inv2")]
+    lab.answer("inv2")
+    assert lab.take() == [("ready", "0")]
+
+
 @pytest.mark.parametrize(
     ("number", "roster", "kind"),
     [
-        (3, {"inv1": "me", "inv2": "inv2"}, "stale"),
+        (2, {"inv1": "me", "inv2": "inv2"}, "stale"),
+        (3, {"inv1": "me"}, "stale"),
         (4, {"inv1": "another"}, "unexpected"),
         (4, {"inv1": "another", "inv2": "b"}, "unexpected"),
     ],
@@ -253,7 +292,7 @@ def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
     lab.state("inv3", 4)
 
     assert lab.missing == [("State(4)", "inv2")]
-    lab.node.expire(100.0)
+    lab.node.expire(lab.node.deadline or 0.0)
     assert lab.node.failed.startswith("inv1: no State(4) from inv2 within 20 s; last heard of inv2: tick ")
 
 

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
-from plant.lockstep_plant import LockstepPlant
+from plant.lockstep_plant import AGAIN, LockstepPlant
 from plant.plant_config import ScheduledAction
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -72,6 +72,15 @@ class Lab:
         """A message comes in."""
         self.node.received(key, encode(message), self.now)
         self.do()
+
+    def wait(self, seconds: float) -> None:
+        """Time passes, and the node is woken when it asks for it."""
+        end = self.now + seconds
+        while (due := self.node.deadline) is not None and due <= end:
+            self.now = due
+            self.node.expire(self.now)
+            self.do()
+        self.now = end
 
     def join(self, *names: str) -> None:
         """Agents come, and answer for their nameplates."""
@@ -225,6 +234,56 @@ def test_a_state_that_is_not_awaited_is_refused(k: int, kind: str) -> None:
     lab.state(k, "inv1")
 
     assert lab.node.rejects.counts == {kind: 1}
+
+
+def test_a_prepare_is_sent_again_until_all_are_ready() -> None:
+    """The same one, as it or a `Ready` may be lost; each answer is progress; a late second `Ready` is no mistake."""
+    lab = Lab()
+    lab.join(*NAMES)
+    lab.ready(0, *NAMES[:3])
+    lab.wait(AGAIN)
+    assert [message for _, message in lab.sent if isinstance(message, Prepare)] == [lab.last(Prepare)] * 2
+
+    lab.ready(0, *NAMES)
+    lab.ready(0, "inv1")
+    lab.wait(5.0)
+    assert lab.node.phase == "ticking"
+    assert lab.node.rejects.counts == {}
+    assert lab.missing == [("State(0)", name) for name in NAMES]
+    assert len([message for _, message in lab.sent if isinstance(message, Prepare)]) == 2
+
+
+def test_a_nameplate_is_asked_for_again_until_it_comes() -> None:
+    """Before the start, and of a newcomer; the deadline counts from the last that came."""
+    lab = Lab((0.02, "inv4", "join"), spares=("inv4",), deadline=10.0)
+    for name in NAMES[:3]:
+        lab.token(name)
+    lab.wait(AGAIN)
+    assert lab.asked == [(name, name) for name in NAMES[:3]] * 2
+    lab.join("inv1")
+    lab.wait(9.5)
+    assert lab.node.outcome == ""
+
+    lab.join("inv2", "inv3")
+    lab.ready(0, *NAMES[:3])
+    lab.tick(1)
+    lab.token("inv4")
+    lab.asked.clear()
+    lab.wait(AGAIN)
+    assert lab.asked == [("inv4", "inv4")]
+    lab.wait(10.0)
+    assert lab.node.outcome.startswith("plant: no nameplate from inv4 within 10 s")
+
+
+def test_a_plant_that_stood_still_itself_blames_nobody() -> None:
+    """Its clock ran on while messages waited for it: it waits anew, and complains only after that."""
+    lab = ticking(deadline=10.0)
+    lab.now += 60.0
+    lab.node.expire(lab.now)
+    assert (lab.node.outcome, lab.node.deadline) == ("", lab.now + 10.0)
+
+    lab.wait(10.0)
+    assert lab.node.outcome.startswith("plant: no State(0) from inv1 within 10 s")
 
 
 def test_the_deadline_names_who_is_missing() -> None:

@@ -123,6 +123,22 @@ def test_a_query_is_shared_unless_a_subscription_was_declared_in_between() -> No
     assert len(b.heard) == 3
 
 
+def test_a_node_that_asks_again_has_a_query_of_its_own() -> None:
+    """The answer to the first is lost; another node that asks again shares the second query."""
+    first, second = Node("inv1"), Node("inv2")
+    made = group(first, second)
+    for node in (first, second):
+        node.to_do = [Fetch("nameplate/inv9")]
+    assert len(made.take_actions()) == 1
+    for node in (first, second):
+        node.to_do = [Fetch("nameplate/inv9")]
+    (again,) = made.take_actions()
+    assert isinstance(again, Fetch)
+    made.received(again.reply_key, b"I am inv9", 1.0)
+
+    assert first.heard == second.heard == [("nameplate/inv9", b"I am inv9")]
+
+
 def test_nodes_inside_meet_without_the_session() -> None:
     """Each knows the tokens of the others from the start, and has their nameplates at once."""
     a, b = Node("a"), Node("b")

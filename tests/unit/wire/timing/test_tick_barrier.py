@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wire.timing.tick_barrier import Awaited, TickBarrier
+from wire.timing.tick_barrier import STOOD_STILL, Awaited, TickBarrier
 
 
 def barrier() -> TickBarrier:
@@ -54,3 +54,17 @@ def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
         "plant: no State(4) from inv1 within 10 s; last heard of inv1: tick 3, 13.0 s ago. "
         "no State(4) from inv2 within 10 s; nothing was ever heard from inv2"
     )
+
+
+def test_who_looks_long_after_the_deadline_has_stood_still_itself() -> None:
+    """A deadline has passed at its time or a little later; much later it counts anew, once for each standstill."""
+    made = barrier()
+    made.renew(0.0)
+    due = made.deadline or 0.0
+
+    assert [made.is_over(due - 0.1), made.is_over(due), made.is_over(due + STOOD_STILL)] == [False, True, True]
+    assert not made.is_over(due + 600.0)
+    assert made.deadline == 2.0 * due + 600.0
+    assert made.is_over(made.deadline)
+    made.rest()
+    assert not made.is_over(1e9)
