@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from plant.build import build_plant
-from plant.dynamics.kernel.compiled import FOLDER
-from plant.dynamics.kernel.machine_code import SUFFIX
+from plant.dynamics.kernel.compiled import is_compiled
 from plant.dynamics.kernel.step import run_steps
 from plant.plant_config import PlantConfig, PlantSettings
 
@@ -15,7 +14,7 @@ def load_kernels() -> None:
     The first compilation takes up to a minute; it is for the plant's own process, which says that it compiles.
     """
     # a check compiles the operating point alone
-    if next(FOLDER.glob(f"{run_steps.__name__}-*{SUFFIX}"), None) is None:
+    if not is_compiled(run_steps.__name__):
         return
     settings = PlantSettings()
     config = PlantConfig(

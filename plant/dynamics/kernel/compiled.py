@@ -2,18 +2,20 @@
 
 To load numba and what its own cache keeps takes 0.6 s, twice as long as a case in one process. So the machine code of
 each function that Python calls is kept as it is (`machine_code`), and numba is imported only where some is missing.
+It is kept in the user's cache folder. Where that cannot be written, each process compiles for itself.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from plant.dynamics.kernel.call_arguments import UnpackableError, described, pack
-from plant.dynamics.kernel.machine_code import MachineCode, file_name
+from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode, file_name
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -21,31 +23,47 @@ _R = TypeVar("_R")
 _HERE = Path(__file__).parent
 
 
-def cache_folder() -> str:
-    """Folder of this source's machine code: beside the source, or the user's cache where that is read-only.
+def kernel_folders() -> tuple[Path | None, Path]:
+    """Return where machine code of these sources is kept, and where a packager may have put it: beside the sources.
 
-    An edit in `gfm.py` changes the code of what calls it in `step.py`, so the folder carries a hash of all files here.
+    The first is `NUMBA_CACHE_DIR`, or the user's cache; None where the user has no home. An edit of `gfm.py` changes
+    the code of its callers in `step.py`, so the name of both folders carries a hash of all files here.
     """
     digest = hashlib.sha256()
     for source in sorted(_HERE.glob("*.py")):
         digest.update(source.read_bytes())
-    beside = _HERE / "__pycache__"
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        base = Path(chosen)
-    elif os.access(beside if beside.exists() else _HERE, os.W_OK):
-        base = beside
-    elif chosen := os.environ.get("XDG_CACHE_HOME"):
-        base = Path(chosen) / "gridpeers"
+    name = f"kernels-{digest.hexdigest()[:16]}"
+    chosen = os.environ.get("NUMBA_CACHE_DIR")
+    base = Path(chosen) if chosen else user_cache()
+    return base / name if base else None, _HERE / "__pycache__" / name
+
+
+def user_cache() -> Path | None:
+    """Return the user's cache folder for gridpeers, as the system has it; None where the user has no home."""
+    if os.name == "nt":
+        variable, within = "LOCALAPPDATA", "AppData/Local"
     else:
-        try:
-            base = Path.home() / ".cache" / "gridpeers"
-        except RuntimeError:  # nobody's home: nothing is kept
-            base = beside
-    return str(base / f"kernels-{digest.hexdigest()[:16]}")
+        variable, within = "XDG_CACHE_HOME", "Library/Caches" if sys.platform == "darwin" else ".cache"
+    try:
+        folder = Path(os.environ.get(variable) or Path.home() / within)
+    except RuntimeError:  # no HOME, and no entry in the list of users
+        return None
+    return folder / "gridpeers" if folder.is_absolute() else None
 
 
-FOLDER = Path(cache_folder())
-"""Where the machine code of this source is."""
+FOLDER, BESIDE = kernel_folders()
+"""Where machine code of these sources is kept, and where it may be too."""
+
+
+def read_code(file: str) -> MachineCode | None:
+    """Return the machine code of a file's name; None if no folder has it."""
+    found = (MachineCode.read(folder / file) for folder in (FOLDER, BESIDE) if folder)
+    return next(filter(None, found), None)
+
+
+def is_compiled(function: str) -> bool:
+    """Whether machine code of a function is on disk."""
+    return any(True for folder in (FOLDER, BESIDE) if folder for _ in folder.glob(f"{function}-*{SUFFIX}"))
 
 
 class Kernel(Generic[_P, _R]):
@@ -86,14 +104,15 @@ class Kernel(Generic[_P, _R]):
 
     def _link(self, args: tuple[Any, ...], types: str) -> Callable[[bytes], Any] | None:
         """Link the machine code for arguments of these types, compiled first where there is none on disk."""
-        file = FOLDER / file_name(f"{self.function.__module__}.{self.function.__name__}", types)
-        code = MachineCode.read(file)
+        file = file_name(f"{self.function.__module__}.{self.function.__name__}", types)
+        code = read_code(file)
         try:
             if code is None:
                 from plant.dynamics.kernel.compiling import compile_call
 
                 code = compile_call(self.dispatcher, args)
-                code.keep(file)
+                if FOLDER:
+                    code.keep(FOLDER / file)
             return code.linked(self.__name__, locked=self._locked)
         except RuntimeError:  # of llvmlite: on a system, or with a version of it, where this was never tried
             return None
@@ -108,7 +127,7 @@ class Kernel(Generic[_P, _R]):
         if self._dispatcher is None:
             from plant.dynamics.kernel.compiling import dispatcher_of
 
-            self._dispatcher, namespace = dispatcher_of(self.function, str(FOLDER))
+            self._dispatcher, namespace = dispatcher_of(self.function, FOLDER)
             seen = {name: each.dispatcher for name, each in namespace.items() if isinstance(each, Kernel)}
             namespace.update(seen)
         return self._dispatcher

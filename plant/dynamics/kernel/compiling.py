@@ -7,6 +7,9 @@ writes the words of the results. Numba's own arrays need memory whose references
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryFile
 from types import FunctionType
 from typing import Any, cast
 
@@ -16,6 +19,9 @@ from numba import types
 from numba.extending import intrinsic
 
 from plant.dynamics.kernel.machine_code import MachineCode
+
+ROOM = 10_000_000
+"""Free bytes that numba's cache needs: twice what it takes for all functions."""
 
 _MEMORY = """
 declare ptr @malloc(i64)
@@ -79,14 +85,33 @@ define void @NRT_Free(ptr %memory) {
 use; address and size of the data; one for allocators of others. Then the data, aligned."""
 
 
-def dispatcher_of(function: Callable[..., Any], folder: str) -> tuple[Any, dict[str, Any]]:
-    """Return numba's form of a function, and the names that it sees, to be changed before its first call."""
-    numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]  # numba.config fills itself at import
+def dispatcher_of(function: Callable[..., Any], folder: Path | None) -> tuple[Any, dict[str, Any]]:
+    """Return numba's form of a function, and the names that it sees, to be changed before its first call.
+
+    Numba keeps what it compiles in the folder, if that has room for it; elsewhere numba would write beside the source.
+    """
+    kept = has_room(folder)
+    if kept:
+        numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]  # numba.config fills itself at import
     plain = cast("FunctionType", function)
     namespace = dict(plain.__globals__)
     copy = FunctionType(plain.__code__, namespace, plain.__name__, plain.__defaults__, plain.__closure__)
     copy.__qualname__, copy.__module__ = plain.__qualname__, plain.__module__
-    return cast("Any", numba.njit)(cache=True, error_model="numpy")(copy), namespace
+    return cast("Any", numba.njit)(cache=kept, error_model="numpy")(copy), namespace
+
+
+@cache
+def has_room(folder: Path | None) -> bool:
+    """Whether a folder, made if it does not exist, can be written and has room for what numba keeps."""
+    if folder is None:
+        return False
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder) as file:
+            file.write(bytes(ROOM))
+    except OSError:
+        return False
+    return True
 
 
 def compile_call(dispatcher: Any, args: tuple[Any, ...]) -> MachineCode:

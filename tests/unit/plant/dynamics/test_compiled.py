@@ -1,3 +1,4 @@
+import resource
 import shutil
 import subprocess
 import sys
@@ -6,11 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
+from numba.core.caching import CacheImpl
 from numpy.typing import NDArray
 
 from plant.build import build_plant
 from plant.dynamics import Dynamics
-from plant.dynamics.kernel import compiled
+from plant.dynamics.kernel import compiled, compiling
 from plant.dynamics.kernel.compiled import Kernel
 from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode
 from scenarios.schema import load_scenario
@@ -68,12 +70,12 @@ def test_an_edit_of_compiled_code_renames_its_cache(
     """Whichever file with compiled code is edited, machine code of the text before is not loaded again."""
     folder = Path(shutil.copytree(source.parent, tmp_path / "dynamics", ignore=shutil.ignore_patterns("__pycache__")))
     monkeypatch.setattr(compiled, "_HERE", folder)
-    before = compiled.cache_folder()
+    before = compiled.kernel_folders()
 
     with (folder / source.name).open("a") as file:
         file.write("\n")
 
-    assert compiled.cache_folder() != before
+    assert not set(compiled.kernel_folders()) & set(before)
 
 
 def test_machine_code_gives_what_the_function_gives(folder: Path) -> None:
@@ -148,15 +150,82 @@ def test_a_damaged_file_is_compiled_anew(folder: Path) -> None:
     assert MachineCode.read(file) is not None
 
 
-def test_a_folder_that_cannot_be_written_costs_time_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The function runs, and is compiled again by the next process."""
+@pytest.mark.parametrize("place", ["none", "file"])
+def test_without_a_folder_to_write_functions_run_and_nothing_is_kept(
+    place: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No home, or a folder that cannot be made: the process compiles for itself, and numba seeks no other place."""
     (tmp_path / "file").write_text("no folder")
-    monkeypatch.setattr(compiled, "FOLDER", tmp_path / "file" / "kernels")
+    monkeypatch.setattr(compiled, "FOLDER", None if place == "none" else tmp_path / "file" / "kernels")
+    monkeypatch.setattr(CacheImpl, "_locator_classes", [])  # numba's places: a read-only installation has none of them
     into = np.zeros(2)
 
     Kernel(fill)(into, 3.0)
 
     assert into.tolist() == [3.0, 3.0]
+
+
+def test_numba_keeps_nothing_where_its_cache_has_no_room(folder: Path) -> None:
+    """A full home: numba would end the start with an error where it cannot write its own cache."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (compiling.ROOM // 2, hard))
+    try:
+        Kernel(fill)(np.zeros(2), 3.0)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+    assert [path.suffix for path in folder.rglob("*")] == [SUFFIX]
+
+
+def test_machine_code_in_a_folder_that_is_read_alone_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An image whose builder left a warm cache beside the sources starts without the compiler, and writes nothing."""
+    Kernel(fill)(np.zeros(2), 1.0)
+    monkeypatch.setattr(compiled, "FOLDER", None)
+    monkeypatch.setattr(compiled, "BESIDE", folder)
+    monkeypatch.setattr(compiling, "compile_call", None)
+    into = np.zeros(2)
+
+    Kernel(fill)(into, 3.0)
+
+    assert into.tolist() == [3.0, 3.0]
+    assert compiled.is_compiled("fill")
+
+
+@pytest.mark.parametrize(
+    ("system", "environment", "expected"),
+    [
+        ("linux", {"XDG_CACHE_HOME": "/cache", "HOME": "/home/me"}, "/cache/gridpeers"),
+        ("linux", {"XDG_CACHE_HOME": "", "HOME": "/home/me"}, "/home/me/.cache/gridpeers"),
+        ("darwin", {"HOME": "/Users/me"}, "/Users/me/Library/Caches/gridpeers"),
+        ("linux", {"HOME": "me"}, None),
+        ("linux", {"XDG_CACHE_HOME": "cache", "HOME": "/home/me"}, None),
+    ],
+)
+def test_compiled_kernels_go_into_the_users_cache(
+    system: str, environment: dict[str, str], expected: str | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each system has its own place for it; a relative path would be another folder in each working directory."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(compiled.sys, "platform", system)
+
+    kept, _ = compiled.kernel_folders()
+
+    assert (kept and str(kept.parent)) == expected
+
+
+def test_a_user_without_a_home_has_no_cache_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A user id that the system does not know, as containers have: nothing is kept."""
+
+    def unknown() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    monkeypatch.setattr(Path, "home", unknown)
+
+    assert compiled.user_cache() is None
 
 
 def test_where_machine_code_cannot_be_linked_numba_runs_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
