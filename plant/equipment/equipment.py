@@ -250,6 +250,8 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """Loads of such feeders."""
     notes: tuple[str, ...] = ()
     """Notes of the import of such a feeder: commands that were not run, protection that was left out."""
+    places: dict[str, str] = {}
+    """File and line of each element, load and "bus NAME" of such a feeder, where its import knows them."""
     spares: tuple[InverterRow, ...] = ()
     """Inverters that stay off until an agent joins for them; a run with a fixed roster leaves them out."""
     parameter_sets: dict[str, OwnParameters] = {}

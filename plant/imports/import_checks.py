@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import fnmatch
-from collections.abc import Callable, Collection, Sequence
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -12,7 +14,7 @@ import numpy as np
 
 from plant.equipment import NODES, PHASES, Feeder
 from plant.equipment.connectivity import Connectivity, Node, by_bus
-from plant.equipment.imported_equipment import LoadPart
+from plant.equipment.imported_equipment import BEHIND, LoadPart
 from plant.tables.feeder_columns import PART_CURRENT, power_of
 from plant.tables.read import FeederError
 from wire.schema.suggestion import first_of
@@ -39,10 +41,62 @@ def path_problems(path: Path) -> list[str]:
     return [f"{path}: is a folder; name the file in it" if path.is_dir() else f"{path}: there is no such file"]
 
 
-def refuse_if(path: Path, problems: Collection[str]) -> None:
-    """Raise a FeederError if there are problems."""
+def refuse_if(path: Path, problems: Collection[str], places: Mapping[str, str] | None = None) -> None:
+    """Raise a FeederError if there are problems, each with its file and line where `places` has them."""
     if problems:
-        raise FeederError(path.name, tuple(problems))
+        raise FeederError(path.name, tuple(placed(problem, places or {}) for problem in problems))
+
+
+def placed(problem: str, places: Mapping[str, str]) -> str:
+    """Return a problem behind the file and line of what it begins with, the first of several, if they are known.
+
+    Examples
+    --------
+    >>> places = {"load.a": "x.dss:7", "bus n 1": "x.dss:3"}
+    >>> placed("load.a, load.b: constant power to ground", places), placed("buses n 1, n2 (first n 1.A): apart", places)
+    ('x.dss:7: load.a, load.b: constant power to ground', 'x.dss:3: buses n 1, n2 (first n 1.A): apart')
+    """
+    at = problem.find(":")
+    while at >= 0:
+        several = problem[:at].replace("buses ", "bus ", 1)
+        for name in (several, several.partition(", ")[0], several.partition(" (")[0], several.partition(BEHIND)[0]):
+            if name in places:
+                return f"{places[name]}: {problem}"
+        at = problem.find(":", at + 1)
+    return problem
+
+
+def of_script(problem: str, folder: Path, script: str, places: Mapping[str, str]) -> str:
+    """Return a problem of an imported feeder's tables as one of the script, with the file and line if they are known.
+
+    Parameters
+    ----------
+    problem
+        As `plant.tables.read_feeder` has it: "buses.csv row 3: ...".
+    folder
+        Folder of the tables.
+    script
+        Name of the script.
+    places
+        Those of the feeder (`Feeder.places`).
+    """
+    found = re.match(r"(?P<file>\w+\.\w+)(?: row (?P<row>\d+))?: ", problem)
+    if not found:
+        return problem
+    text = problem[found.end() :]
+    if not found["row"]:
+        return f"{script}: {text}"
+    with (folder / found["file"]).open(newline="", encoding="utf-8") as stream:
+        reader = csv.DictReader(stream)
+        cells = next(cells for cells in reader if reader.line_num == int(found["row"]))
+    name = (
+        cells.get("element")
+        or cells.get("load")
+        or cells.get("alias")
+        or f"bus {cells.get('bus', '').partition(BEHIND)[0]}"
+    )
+    subject = next((each for each in places if each in (name, f"bus {name}") or each.endswith(f".{name}")), name)
+    return f"{places.get(subject, script)}: {subject}: {text}"
 
 
 def left_out_by(names: Sequence[str], patterns: Sequence[str], problems: list[str], example: str) -> set[str]:
@@ -181,9 +235,9 @@ def refuse_unsolvable(
         Name of a node in the imported program, from its letter.
     """
     _report_unconnected(feeder, problems, name_node)
-    refuse_if(path, problems)
-    _report_undetermined(feeder, problems, remedy)
-    refuse_if(path, problems)
+    refuse_if(path, problems, feeder.places)
+    _report_undetermined(path, feeder, problems, remedy)
+    refuse_if(path, problems, feeder.places)
 
 
 def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable[[str], str]) -> None:
@@ -207,14 +261,14 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
         )
 
 
-def _report_undetermined(feeder: Feeder, problems: list[str], remedy: str) -> None:
+def _report_undetermined(path: Path, feeder: Feeder, problems: list[str], remedy: str) -> None:
     """Add a problem for each bus whose voltage to ground nothing determines: without load it is beyond all bounds."""
     from plant.network import Network  # a process that only reads loads no compiler of the plant's steps
 
     try:
         network = Network(feeder)
     except RuntimeError:  # of the factorisation
-        problems.append(f"nothing determines some bus's voltage to ground; {remedy}")
+        problems.append(f"{path.name}: nothing determines some bus's voltage to ground; {remedy}")
         return
     far = np.flatnonzero(np.abs(network.nominal) > BEYOND * network.V_nom)
     for bus in dict.fromkeys(network.nodes[i][0] for i in far):

@@ -63,7 +63,7 @@ def import_(
     folder = out or Path(folder_of(feeder.name))
     try:
         with whole_folder(folder):
-            save_readable(feeder, folder)
+            save_readable(feeder, folder, file.name)
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     _describe(feeder)
@@ -199,15 +199,17 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
         refuse(error)
 
 
-def save_readable(feeder: Feeder, folder: Path) -> None:
-    """Write a feeder's tables and read them again; end with every problem if a run could not."""
+def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
+    """Write the tables of a script's feeder and read them again; end with every problem if a run could not."""
+    from plant.imports.import_checks import of_script
     from plant.tables import FeederError
 
     feeder.save(folder)
     try:
         feeder.read(folder)
     except FeederError as error:
-        refuse(error)
+        problems = dict.fromkeys(of_script(problem, folder, script, feeder.places) for problem in error.problems)
+        refuse(FeederError(script, tuple(problems)))
 
 
 def folder_of(name: str) -> str:

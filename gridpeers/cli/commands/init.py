@@ -175,7 +175,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     except NoProposalError as error:
         fail([f"{script}: {error}"], BAD_INPUT)
     name = folder_of(feeder.name)
-    save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name)
+    save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name, script.name)
     graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
 
     def written(part: float, gfl: str = "") -> tuple[ScenarioModel, Tables]:

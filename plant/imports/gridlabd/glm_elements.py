@@ -94,6 +94,10 @@ class GlmElements:
         self.rows.append(LinearElement(name=f"swing.{bus}", nodes=nodes, Y=rows))
         return stiff
 
+    def behind(self) -> dict[str, str]:
+        """Return the buses that are not in the model, and the bus before each."""
+        return {name: str(self._buses[at]["name"]) for name, (at, _) in self.added.items()}
+
     def bus_rows(self, used: set[str], places: dict[str, tuple[float, float]]) -> tuple[Bus, ...]:
         """Return the buses in the solver's order, each with those that switches have behind it."""
         behind: dict[int, list[tuple[str, str]]] = {}

@@ -2,28 +2,34 @@
 
 from __future__ import annotations
 
-import codecs
 import re
-import shlex
 from pathlib import Path
 
-INCLUDE = re.compile(r'^\s*#include\s+["<]([^">]+)[">]', re.IGNORECASE)
+from plant.imports.script_encoding import decoded
+
+INCLUDE = re.compile(r'^(\s*#include\s+["<])([^">]+)([">])', re.IGNORECASE)
 
 RUNNING = re.compile(r"^\s*(?:#(?:system|exec|start|wget|option)|script\s+\w+)|^link(?=\s)", re.IGNORECASE)
 """Commands that run a program, load one, or fetch a file."""
 
-NAMED = re.compile(r'(?:^|[{;\s])name\s+"?([^";]+?)"?\s*;')
+COMMENT = re.compile(r'//(?=(?:[^"]*"[^"]*")*[^"]*$)')
+"""The mark of a comment, not within quotes."""
+
+OBJECT = re.compile(r"(?:^|[{};\s])object\s+(\w+)(?::(?:(\d*)\.\.(\d+)|\w*))?(?=[\s{]|$)")
+"""The beginning of an object, or of several: class, first and last number."""
+
+NAMED = re.compile(r"""(?:^|[{;\s])name\s+(?:"([^"]+)"|'([^']+)'|([^";\s]+))\s*;""")
 """An object's name."""
 
-UTF_16 = codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE
-"""How a file in UTF-16 begins; in every other encoding of text no byte is zero."""
+UNNAMED = re.compile(r"(\w+)_auto_(\d+)")
+"""The name that GridLAB-D gives an object without one: its class and its number among all objects."""
 
 DEEPEST = 40
 """Models within models; more is one that includes itself."""
 
 
 class GlmText:
-    """A model and all that it includes.
+    """A model and all that it includes, in whatever encoding they are.
 
     Parameters
     ----------
@@ -38,12 +44,41 @@ class GlmText:
 
     def __init__(self, path: Path) -> None:
         self.problems: list[str] = []
+        self._path, self._texts = path, dict[Path, str]()
+        self._recoded = False
         self._places: dict[str, str] = {}
+        self._objects: list[tuple[str, str]] = []
+        """Class and place of each object."""
         self._read(path, path.parent, 0)
 
-    def at(self, name: str) -> str:
-        """Return the beginning of a problem with an object: its file and line, if it has a name of its own."""
-        return f"{self._places[name]}: " if name in self._places else ""
+    def place(self, name: str) -> str:
+        """Return the file and line of an object by the name that GridLAB-D has for it; "" if they are not known."""
+        unnamed = UNNAMED.fullmatch(name)
+        if name in self._places or not unnamed:
+            return self._places.get(name, "")
+        kind, number = unnamed[1], int(unnamed[2])
+        there = self._objects[number] if number < len(self._objects) else ("", "")
+        return there[1] if there[0] == kind else ""
+
+    def readable(self, folder: Path) -> Path:
+        """Return a model that GridLAB-D can read, as it knows UTF-8 alone: this one, or a copy in a folder."""
+        if not self._recoded:
+            return self._path
+        copies = {path: folder / str(k) / path.name for k, path in enumerate(self._texts)}
+
+        def copy_of(match: re.Match[str]) -> str:
+            copy = copies.get(self._included(match))
+            return f"{match[1]}{copy}{match[3]}" if copy else match[0]
+
+        for path, copy in copies.items():
+            copy.parent.mkdir()
+            lines = [INCLUDE.sub(copy_of, line) for line in self._texts[path].split("\n")]
+            copy.write_bytes("\n".join(lines).encode())
+        return copies[self._path]
+
+    def _included(self, match: re.Match[str]) -> Path:
+        # GridLAB-D seeks it from its working folder, which is that of the first model
+        return self._path.parent / match[2].replace("\\", "/")
 
     def _read(self, path: Path, folder: Path, depth: int) -> None:
         if depth > DEEPEST:
@@ -53,48 +88,21 @@ class GlmText:
             data = path.read_bytes()
         except OSError:
             return  # GridLAB-D says so, with the line that includes it
-        if objection := encoding_objection(data, path.name):
-            self.problems.append(f"{path.name}: {objection}")
+        text = self._texts[path] = decoded(data)
+        if "\0" in text:
+            self.problems.append(f"{path.name}: has bytes that are zero: it is no text; name a model")
             return
-        text = data.decode("utf-8", errors="replace")
-        for number, line in enumerate(text.splitlines(), start=1):
-            bare = line.partition("//")[0] if '"' not in line else line
-            where = f"{path.name}:{number}"
-            if command := RUNNING.match(bare):
-                self.problems.append(f"{where}: {command[0].strip()} would run or load a program; take this line out")
-            for name in NAMED.findall(bare):
-                self._places.setdefault(name.strip(), where)
-            if included := INCLUDE.match(bare):
-                # GridLAB-D seeks it from its working folder, which is that of the first model
-                self._read(folder / included[1].replace("\\", "/"), folder, depth + 1)
+        self._recoded |= data != text.encode()
+        for number, line in enumerate(text.split("\n"), start=1):
+            self._note(COMMENT.split(line, maxsplit=1)[0], f"{path.name}:{number}")
+            if included := INCLUDE.match(line):
+                self._read(self._included(included), folder, depth + 1)
 
-
-def encoding_objection(data: bytes, name: str) -> str:
-    r"""Return why GridLAB-D cannot read a file of these bytes, and what to do; "" if it can.
-
-    Its reader takes bytes for letters: it stops at a zero, and a byte order mark is an unknown word to it.
-
-    Examples
-    --------
-    >>> encoding_objection("clock {}".encode("utf-8-sig"), "x.glm")
-    'begins with a byte order mark, which GridLAB-D cannot read; take it off: tail -c +4 x.glm > plain-x.glm'
-    >>> encoding_objection("clock {}".encode("utf-16"), "x.glm")
-    'is in UTF-16, which GridLAB-D cannot read; write it in UTF-8: iconv -f UTF-16 -t UTF-8 x.glm > plain-x.glm'
-    >>> encoding_objection("// München\nclock {}".encode("latin-1"), "x.glm")
-    ''
-    """
-    file, plain = shlex.quote(name), shlex.quote(f"plain-{name}")
-    if data.startswith(codecs.BOM_UTF8):
-        return f"begins with a byte order mark, which GridLAB-D cannot read; take it off: tail -c +4 {file} > {plain}"
-    if data.startswith(UTF_16):
-        encoding = "UTF-16"
-    elif b"\0" not in data:
-        return ""
-    else:  # Latin letters have a zero as every second byte: the second of two where the small byte comes first
-        encoding = "UTF-16LE" if data[1::2].count(0) > data[::2].count(0) else "UTF-16BE"
-        if data.count(0) < len(data) // 4:
-            return "has bytes that are zero: it is no text, and GridLAB-D cannot read it; name a model"
-    return (
-        f"is in {encoding}, which GridLAB-D cannot read; write it in UTF-8: "
-        f"iconv -f {encoding} -t UTF-8 {file} > {plain}"
-    )
+    def _note(self, line: str, where: str) -> None:
+        """Note what stands on a line without its comment."""
+        if command := RUNNING.match(line):
+            self.problems.append(f"{where}: {command[0].strip()} would run or load a program; take this line out")
+        for kind, first, last in OBJECT.findall(line):
+            self._objects += [(kind, where)] * (int(last) - int(first or 1) + 1 if last else 1)
+        for name in NAMED.findall(line):
+            self._places.setdefault("".join(name).strip(), where)

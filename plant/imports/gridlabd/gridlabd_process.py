@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from plant.gridlabd.process.gridlabd_messages import messages
+from plant.imports.gridlabd.glm_text import GlmText
 from plant.request_process import program
 from plant.tables.read import FeederError
 from plant.transient_folder import TransientFolder, no_room
@@ -27,7 +28,7 @@ LONGEST = 600.0
 """Time (s) after which a model that does not end is given up."""
 
 
-def solved_model(path: Path) -> dict[str, Any]:
+def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
     """Return what GridLAB-D's solver holds of a model (`plant.imports.gridlabd.gridlabd_power_flow`).
 
     Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
@@ -40,10 +41,10 @@ def solved_model(path: Path) -> dict[str, Any]:
     """
     if importlib.util.find_spec("gridlabd") is None:
         raise FeederError(path.name, (MISSING,))
-    answer, printed = _asked(path)
+    answer, printed = _asked(path, text)
     settling = answer.get("settling", {})
     if settling and not settling["solved"] and settling["seconds"]:
-        answer, printed = _asked(path, "first")
+        answer, printed = _asked(path, text, "first")
         answer["settling"] = settling
     if not answer.get("solved", True):
         said = messages(printed) or [f"{path.name}: GridLAB-D's power flow does not converge"]
@@ -55,11 +56,12 @@ def solved_model(path: Path) -> dict[str, Any]:
     return answer
 
 
-def _asked(path: Path, *options: str) -> tuple[dict[str, Any], str]:
+def _asked(path: Path, text: GlmText, *options: str) -> tuple[dict[str, Any], str]:
     """Return the answer of GridLAB-D's process, and the lines that it printed."""
     with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
         result = folder.path / "result.json"
-        command = program(POWER_FLOW, path.name, str(result), str(os.getpid()), *options)
+        model = text.readable(folder.path)
+        command = program(POWER_FLOW, str(model), str(result), str(os.getpid()), *options)
         try:
             done = subprocess.run(
                 command,

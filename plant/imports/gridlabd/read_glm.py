@@ -7,6 +7,7 @@ take: constant power, current or impedance. What comes out is solved here, too, 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Sequence
 from math import isfinite
 from pathlib import Path
@@ -42,6 +43,8 @@ from plant.imports.import_checks import (
     without_unfed,
 )
 from plant.imports.import_comparison import MATCH, difference
+from plant.imports.plain_names import with_plain_names
+from plant.tables.read import FeederError
 from wire.schema.suggestion import suggestion
 
 FAR = 1.3
@@ -52,6 +55,9 @@ LIVE = 0.5
 
 BALANCED = 1e-7
 """Largest unbalance (pu) of the substation's voltage that is rounding."""
+
+OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")
+"""An object in a message of GridLAB-D's."""
 
 UNGROUNDED = "ground a winding"
 """Remedy where nothing determines a voltage to ground."""
@@ -73,7 +79,11 @@ def read_glm(
     refuse_if(path, path_problems(path))
     text = GlmText(path)
     refuse_if(path, text.problems)
-    model = solved_model(path)
+    try:
+        model = solved_model(path, text)
+    except FeederError as error:
+        refuse_if(path, [_placed(problem, text) for problem in error.problems])
+        raise
     if not model["has_powerflow"]:
         refuse_if(path, [f"{path.name}: does not load GridLAB-D's powerflow; a feeder has a line module powerflow;"])
     return _GlmReader(path, text, model, leave_out).read(f_nom, switches)
@@ -83,12 +93,18 @@ class _GlmReader:
     """Makes a feeder of what GridLAB-D's solver holds of a model."""
 
     def __init__(self, path: Path, text: GlmText, model: dict[str, Any], leave_out: Sequence[str]) -> None:
-        self._path, self._text, self._model = path, text, model
+        self._path, self._model = path, model
         self._problems: list[str] = []
         self._notes: list[str] = []
         self._classes = {row["name"]: row["class"] for row in model["objects"]}
         self._parents = {row["name"]: row["parent"] for row in model["objects"]}
         names = [f"{kind}.{name}" for name, kind in self._classes.items()]
+        self._places = {
+            each: place
+            for name, kind in self._classes.items()
+            if (place := text.place(name))
+            for each in (f"{kind}.{name}", f"bus {name}")
+        }
         left_out = left_out_by(names, leave_out, self._problems, "house.h1")
         self._left_out = {name.partition(".")[2] for name in left_out}
 
@@ -105,7 +121,7 @@ class _GlmReader:
         known = len(problems)
         self._mend_nominal_voltages()
         if len(problems) > known:
-            refuse_if(self._path, problems)  # all that follows is per unit
+            refuse_if(self._path, problems, self._places)  # all that follows is per unit
         elements = GlmElements(model["buses"], switches, problems)
         for branch in model["branches"]:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
@@ -116,9 +132,9 @@ class _GlmReader:
         shunts, parts = self._loads()
         report_powers(parts, problems)
         self._report_no_solution()
-        refuse_if(self._path, problems)
+        refuse_if(self._path, problems, self._places)
         source = self._source(elements)
-        refuse_if(self._path, problems)
+        refuse_if(self._path, problems, self._places)
         assert source is not None
         rows = [*elements.rows, *shunts]
         used = {bus for row in rows for bus, _ in row.nodes} | {part.bus for part in parts} | {source.bus}
@@ -133,20 +149,21 @@ class _GlmReader:
             f_nom=model["f_nom"],
             elements=tuple(rows),
             load_parts=tuple(parts),
+            places=self._places,
         )
         feeder = without_unfed(feeder, self._notes, str)
         feeder = msgspec.structs.replace(feeder, notes=tuple(self._notes))
         refuse_unsolvable(self._path, feeder, problems, UNGROUNDED, str)
         if all(self._classes[name] == "player" for name in self._left_out):
             self._compare(feeder)
-        refuse_if(self._path, problems)
-        return feeder
+        refuse_if(self._path, problems, self._places)
+        return with_plain_names(feeder, elements.behind())
 
     def _names_of(self, classes: Collection[str]) -> list[str]:
         return [name for name, kind in self._classes.items() if kind in classes]
 
     def _called(self, name: str) -> str:
-        return f"{self._text.at(name)}{self._classes[name]}.{name}"
+        return f"{self._classes[name]}.{name}"
 
     def _tell_settling(self) -> None:
         """Note how far GridLAB-D has gone on, and what its regulators and capacitors have done."""
@@ -294,8 +311,8 @@ class _GlmReader:
             alone = [name for name in buses if name not in V_nom]
             hint = f"nothing leads to bus {', '.join(alone[:3])}" if alone else "some section has no source"
             self._problems.append(
-                f"{self._path.name}: GridLAB-D's power flow has {abs(theirs[highest]) / V_nom[highest[0]]:.2g} pu at "
-                f"bus {highest[0]}: {hint}; take it out of the model, or connect it"
+                f"bus {highest[0]}: GridLAB-D's power flow has {abs(theirs[highest]) / V_nom[highest[0]]:.2g} pu: "
+                f"{hint}; take it out of the model, or connect it"
             )
             return
         try:
@@ -305,9 +322,16 @@ class _GlmReader:
             return
         if worst > MATCH:
             self._problems.append(
-                f"{self._path.name}: our power flow differs from GridLAB-D's by {worst:.2g} pu, most at bus {bus}, "
-                f"phase {phase}; something there acts that is not taken over"
+                f"bus {bus}: our power flow differs from GridLAB-D's by {worst:.2g} pu in phase {phase}, more than "
+                "anywhere else; something there acts that is not taken over"
             )
+
+
+def _placed(problem: str, text: GlmText) -> str:
+    """Return a problem of GridLAB-D's behind the file and line of the object that it names, if they are known."""
+    named = OBJECT.search(problem)
+    place = text.place(named[1]) if named else ""
+    return f"{place}: {problem}" if place else problem
 
 
 def voltage_of(bus: dict[str, Any], letter: str) -> complex:

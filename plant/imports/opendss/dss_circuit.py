@@ -52,6 +52,8 @@ class DssCircuit(NamedTuple):
     """Whether something was left out, so that the engine's voltages are those of another circuit."""
     V: dict[tuple[str, str], complex]
     """The engine's voltages (V) by bus and letter of the node."""
+    added: dict[str, str]
+    """Buses that are not in the script, and the bus before each."""
 
 
 def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], None]) -> DssCircuit:
@@ -73,9 +75,9 @@ def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], No
     """
     path, f_nom, leave_out, switches = request
     engine = DssEngine(tell)
-    refuse_if(path, engine.read(path, scratch))
+    refuse_if(path, engine.read(path, scratch), engine.places)
     circuit = engine.circuit
-    refuse_if(path, _too_many_nodes(circuit))
+    refuse_if(path, _too_many_nodes(circuit), engine.places)
     notes, problems = engine.notes, list[str]()
     everything = _elements(circuit)
     left_out = left_out_by([name for name, _ in everything], leave_out, problems, "PVSystem.pv1")
@@ -113,7 +115,7 @@ def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], No
     if all(kind != "vsource" for _, kind in there):
         problems.append("no Vsource: a circuit has one, its substation")
     if not elements.source:
-        refuse_if(path, problems)
+        refuse_if(path, problems, engine.places)
     report_powers(load_parts, problems)
     V = dict(zip(nodes_of(circuit), complex_of(circuit.YNodeVarray).tolist(), strict=True))
     notes += unusual_voltages(circuit, load_parts, V)
@@ -127,8 +129,9 @@ def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], No
         elements=tuple(elements.rows),
         load_parts=tuple(load_parts),
         notes=tuple(notes),
+        places=engine.places,
     )
-    return DssCircuit(feeder, problems, bool(left_out), V)
+    return DssCircuit(feeder, problems, bool(left_out), V, elements.added)
 
 
 def _elements(circuit: Any) -> list[tuple[str, str]]:

@@ -98,6 +98,11 @@ class DssElements:
             V_nom = self._own_V_nom[stiff] = E
         self.source.append(Source(bus=stiff, V_pu=E / V_nom, angle=radians(vsource.AngleDeg)))
 
+    @property
+    def added(self) -> dict[str, str]:
+        """Buses that are not in the script, and the bus before each."""
+        return {name: like for name, (like, _) in self._added.items()}
+
     def buses(self, parts: list[LoadPart]) -> tuple[Bus, ...]:
         """Return the buses that anything is connected to, in the script's order, with their nodes, voltages, places."""
         used: dict[str, set[str]] = {}

@@ -43,6 +43,8 @@ class DssEngine:
         The engine's active circuit.
     notes : list of str
         What was not done as the script says.
+    places : dict of str to str
+        File and line of each element and "bus NAME" (lower case).
     """
 
     def __init__(self, tell: Callable[[str], None]) -> None:
@@ -54,6 +56,7 @@ class DssEngine:
         self._engine: Any = engine
         self._tell = tell
         self.notes: list[str] = []
+        self.places: dict[str, str] = {}
 
     @property
     def circuit(self) -> Any:
@@ -76,6 +79,7 @@ class DssEngine:
             self.execute(f'set datapath="{scratch}"')
         script = DssScript(self.execute, self._may_solve)
         script.run(path)
+        self.places = script.places
         if not self._engine.NumCircuits:
             none = f"{path.name}: makes no circuit; a script has a line New Circuit.name"
             return [*script.problems[:FEW], none]

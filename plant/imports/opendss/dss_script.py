@@ -5,11 +5,11 @@ The engine itself stops at the first error. What only shows or writes results is
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from plant.imports.script_encoding import decoded
 from wire.printable import printable
 
 Execute = Callable[[str, str], str]
@@ -49,11 +49,20 @@ METERS = frozenset({"energymeter", "monitor", "sensor"})
 ASIDE = METERS | {"loadshape", "tshape", "priceshape", "spectrum", "tcc_curve"}
 """Classes that a snapshot does without: one that fails is a note."""
 
+FREQUENCY = "the circuit's frequency"
+"""Begins a problem with what `set frequency` or `set defaultbasefrequency` says."""
+
 HUNTING = "Max Control Iterations Exceeded"
 """In the engine's warning on controls that move on and on: the import solves once more, and tells."""
 
 CLOSING = {'"': '"', "'": "'", "(": ")", "[": "]", "{": "}"}
 """Closing mark of a quoted name, by its opening mark."""
+
+BUS = re.compile(r"""\bbus(?:es|\d)?\s*=\s*("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
+"""A bus, or several, to which a property connects an element."""
+
+ONE_BUS = re.compile(r""""([^"]+)"|'([^']+)'|([^\s,]+)""")
+"""One of several buses."""
 
 FILE = re.compile(r"""(\b\w*file\s*=\s*)("[^"]+"|'[^']+'|\([^()]+\)|\[[^\[\]]+\]|[^\s,"'()\[\]]+)""", re.IGNORECASE)
 """A file that a property names."""
@@ -65,13 +74,6 @@ KNOWN = (*sorted(INCLUDING | RESULTS | COORDINATES), "solve")
 
 SHORTEST = 3
 """Letters that an abbreviated command has at least: "redir"."""
-
-ENCODINGS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-"""Encodings of files that begin with a mark of theirs; others are UTF-8, or of Windows."""
 
 DEEPEST = 40
 """Scripts within scripts; more is a script that includes itself."""
@@ -95,6 +97,8 @@ class DssScript:
         Commands that failed, and on which the network does not depend.
     not_run : dict of str to str
         First place of each kind of command that was not run.
+    places : dict of str to str
+        First place of each element, and of each "bus NAME" that a property names (lower case).
     """
 
     def __init__(self, execute: Execute, may_solve: Callable[[], bool]) -> None:
@@ -103,6 +107,7 @@ class DssScript:
         self.notes: list[str] = []
         self._element = ""
         self.not_run: dict[str, str] = {}
+        self.places: dict[str, str] = {}
         self._folder = Path()
 
     def run(self, path: Path) -> None:
@@ -139,6 +144,11 @@ class DssScript:
             else:
                 command = FILE.sub(lambda match: f'{match[1]}"{self._whole_path(_bare(match[2]))}"', command)
             self._element = element_of(command, self._element)
+            for name in (self._element, *(f"bus {bus}" for bus in buses_of(command))):
+                if name:
+                    self.places.setdefault(name, where)
+            if re.match(r"set\s+\w*freq\w*\s*=", command, re.IGNORECASE):
+                self.places[FREQUENCY] = where
             message = printable(self._execute(command, where))
             if message and not (verb == "solve" and HUNTING in message):
                 self._failed(verb, where, message)
@@ -194,33 +204,41 @@ def element_of(command: str, before: str) -> str:
     --------
     >>> element_of("New object=LoadShape.a npts=2", ""), element_of("~ mult=(1 2)", "loadshape.a")
     ('loadshape.a', 'loadshape.a')
+    >>> element_of('New "Line.x 1" bus1=b', ""), element_of("New Circuit.c basekv=4", "")
+    ('line.x 1', 'vsource.source')
     >>> element_of("Load.a.kw=3", "line.x"), element_of('new "Line.x-1" bus1=b', ""), element_of("solve", "line.x")
     ('load.a', 'line.x-1', '')
     """
     if re.match(r"(~|m\b|more\b)", command, re.IGNORECASE):
         return before
     made = re.match(
-        r"""(?:new|edit|batchedit)\s+(?:object\s*=\s*)?["'(\[{]?(\w+\.[^\s"')\]},=]+)""", command, re.IGNORECASE
+        r"""(?:new|edit|batchedit)\s+(?:object\s*=\s*)?(?:["'(\[{](\w+\.[^"')\]}]+)|(\w+\.[^\s,=]+))""",
+        command,
+        re.IGNORECASE,
     )
-    found = made or re.match(r"(\w+\.[^\s.=]+)\.[^=\s]+\s*=", command)
+    if made:
+        name = (made[1] or made[2]).lower()
+        return "vsource.source" if name.startswith("circuit.") else name
+    found = re.match(r"(\w+\.[^\s.=]+)\.[^=\s]+\s*=", command)
     return found[1].lower() if found else ""
 
 
-def decoded(data: bytes) -> str:
-    """Return the text of a script in whatever encoding it is.
+def buses_of(command: str) -> list[str]:
+    """Return the buses (lower case) that the properties of a command name.
 
     Examples
     --------
-    >>> decoded("bus São".encode("latin-1")), decoded("bus São".encode("utf-16"))
-    ('bus São', 'bus São')
+    >>> buses_of('New Line.a bus1="Src bus.1.2" bus2=b.3'), buses_of("~ buses=[x.1, 'y z']")
+    (['src bus', 'b'], ['x', 'y z'])
     """
-    for mark, encoding in ENCODINGS:
-        if data.startswith(mark):
-            return data.decode(encoding, errors="replace")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("cp1252", errors="replace")
+    found = []
+    for match in BUS.finditer(command):
+        text = match[1]
+        inner = text[1:-1] if text[0] in CLOSING else text
+        several = text[0] in "([{" and "es" in match[0].lower().partition("=")[0]
+        names = ["".join(one) for one in ONE_BUS.findall(inner)] if several else [inner]
+        found += [name.partition(".")[0].lower() for name in names]
+    return found
 
 
 def _full_name(verb: str) -> str:

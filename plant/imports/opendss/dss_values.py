@@ -12,6 +12,7 @@ import numpy as np
 from plant.equipment import PHASES
 from plant.equipment.connectivity import Node
 from plant.equipment.imported_equipment import LoadPart
+from plant.imports.opendss.dss_script import FREQUENCY
 from plant.tables.feeder_columns import Manifest
 from wire.schema.table_schema import named
 
@@ -26,7 +27,7 @@ def impossible_values(circuit: Any) -> list[str]:
     """Return a problem for each value with which no power flow has a solution; a circuit that has been read."""
     frequency = float(circuit.Solution.Frequency)
     text = named(Manifest, "f_nom_Hz").objection(frequency)
-    problems = [f"the circuit's frequency: {text}; correct Set DefaultBaseFrequency or Set Frequency"] if text else []
+    problems = [f"{FREQUENCY}: {text}; correct Set DefaultBaseFrequency or Set Frequency"] if text else []
     for load in circuit.Loads if circuit.Loads.Count else ():
         if not circuit.ActiveCktElement.Enabled:
             continue

@@ -16,6 +16,7 @@ from plant.equipment import Feeder
 from plant.imports.import_checks import SHOWN_NAMES, number_of, refuse_if, refuse_unsolvable, without_unfed
 from plant.imports.opendss.dss_circuit import ImportRequest
 from plant.imports.opendss.dss_process import reading
+from plant.imports.plain_names import with_plain_names
 from wire.schema.suggestion import first_of
 
 UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
@@ -44,7 +45,9 @@ def read_opendss(
         feeder = without_unfed(feeder, notes)
     feeder = msgspec.structs.replace(feeder, notes=tuple(notes))
     refuse_unsolvable(path, feeder, problems, UNGROUNDED)
-    return feeder if circuit.left_out else _compared(path, feeder, circuit.V)
+    if not circuit.left_out:
+        feeder = _compared(path, feeder, circuit.V)
+    return with_plain_names(feeder, circuit.added)
 
 
 def _compared(path: Path, feeder: Feeder, V: dict[tuple[str, str], complex]) -> Feeder:
@@ -69,5 +72,5 @@ def _compared(path: Path, feeder: Feeder, V: dict[tuple[str, str], complex]) -> 
             "grounded: the voltage to ground has no single solution; make it conn=delta or model=2, or ground a winding"
         )
     if alone or not solved:
-        refuse_if(path, [told])
+        refuse_if(path, [told], feeder.places)
     return msgspec.structs.replace(feeder, notes=(*feeder.notes, told))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from pathlib import Path
 from tempfile import gettempdir
@@ -13,7 +14,7 @@ from gridpeers import Feeder
 from plant.tables import read_feeder
 from scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
-from tests.unit.plant.imports.gridlabd.glm_models import LOADS
+from tests.unit.plant.imports.gridlabd.glm_models import HEAD, LOADS
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
 pytest.importorskip("gridlabd", reason="GridLAB-D is not installed")
@@ -74,15 +75,63 @@ def test_a_proposal_that_would_oscillate_is_calmed_or_said(
     assert ("T_vf_s = 0.2" in Path("mine/islanding.toml").read_text()) == slower
 
 
-def test_an_import_that_no_run_could_read_leaves_no_tables(elsewhere: Path) -> None:
-    """Voltage bases that are no feeder's are refused by their rows, and the folder is not left behind."""
-    Path("tiny.dss").write_text("New Circuit.tiny basekv=0.003\nNew Load.l bus1=sourcebus kv=0.003 kw=0.001\n")
+TINY = {
+    "tiny.dss": "New Circuit.tiny basekv=0.003 bus1=sourcebus\nNew Load.l bus1=sourcebus kv=0.003 kw=0.001\n",
+    "tiny.glm": "module powerflow;\nobject node { name sub; phases ABCN; bustype SWING; nominal_voltage 7.2; }\n",
+}
+"""Feeders whose voltages are no feeder's."""
 
-    code, text = invoke("feeder", "import", "tiny.dss", "--out", "mine")
+
+@pytest.mark.parametrize("script", TINY)
+def test_an_import_that_no_run_could_read_leaves_no_tables(elsewhere: Path, script: str) -> None:
+    """Voltage bases that are no feeder's are refused by the script's lines, and the folder is not left behind."""
+    Path(script).write_text(TINY[script])
+
+    code, text = invoke("feeder", "import", script, "--out", "mine")
 
     assert code == 2
-    assert "is not plausible for a nominal voltage" in text
+    told = [line for line in text.splitlines() if "is not plausible for a nominal voltage" in line]
+    assert told
+    assert all(re.search(rf"{script}:\d+: (bus |load\.)\S+: V_nom_kV", line) for line in told)
+    assert ".csv" not in text
     assert not Path("mine").exists()
+
+
+NAMED = {
+    "named.dss": """New Circuit.named bus1="src bus" basekv=12.47
+New "Line.a b" bus1="src bus" bus2="c (1)" r1=0.3 x1=0.5 r0=0.6 x0=1.4 length=2
+New Line.l2 bus1="c (1)" bus2="c_(1)" r1=0.3 x1=0.5 r0=0.6 x0=1.4 length=2
+New "Load.one load" bus1="c_(1)" kv=12.47 kw=900
+Set VoltageBases=[12.47]
+CalcVoltageBases
+""",
+    "named.glm": HEAD.replace(" sub;", ' "src bus";')
+    + """object node { name "c (1)"; phases ABCN; nominal_voltage 7200; }
+object node { name "c_(1)"; phases ABCN; nominal_voltage 7200; }
+object overhead_line { name "a b"; phases ABCN; from "src bus"; to "c (1)"; length 5280; configuration uneven; }
+object overhead_line { name l2; phases ABCN; from "c (1)"; to "c_(1)"; length 5280; configuration uneven; }
+object load { name "one load"; phases ABCN; parent "c_(1)"; nominal_voltage 7200; constant_power_A 3e5; }
+""".replace(" sub;", ' "src bus";'),
+}
+"""Feeders whose buses have blanks in their names, and one that is called as another would be without them."""
+
+
+@pytest.mark.parametrize("script", NAMED)
+def test_buses_with_blanks_in_their_names_are_imported(elsewhere: Path, script: str) -> None:
+    """They have other names in the tables, each its own, which a note tells; switches and loads keep theirs."""
+    Path(script).write_text(NAMED[script].replace("from sub", 'from "src bus"'))
+    line = "Line.a b" if script.endswith(".dss") else "overhead_line.a b"
+
+    code, text = invoke("feeder", "import", script, "--out", "mine", "--switch", line)
+
+    assert code == 0, text
+    assert '"src bus" is src_bus, "c (1)" is c_(1)_2' in text
+    feeder = Feeder.read("mine")
+    assert {"src_bus", "c_(1)_2", "c_(1)"} < {bus.name for bus in feeder.buses}
+    assert [switch.alias for switch in feeder.switches] == ["a b"]
+    assert {part.name for part in feeder.load_parts} == {"load.one load"}
+    V = feeder.solve().set_index("bus")["V_pu"]
+    assert V["src_bus"].min() > V["c_(1)_2"].min() > V["c_(1)"].min() > 0.9
 
 
 def test_tables_named_as_a_feeder_of_ours_need_their_path(elsewhere: Path) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from plant.imports.gridlabd.glm_elements import letters_of
+from plant.imports.gridlabd.glm_text import GlmText
 from plant.imports.gridlabd.gridlabd_process import solved_model
 from plant.imports.gridlabd.read_glm import read_glm, voltage_of
 from plant.network import Network, solve_power_flow
@@ -124,7 +125,7 @@ def gridlabd_voltages(path: Path) -> dict[tuple[str, str], complex]:
     """Voltage (V) of each node as GridLAB-D has it; A and B are the legs of a split-phase service."""
     return {
         (bus["name"], letter): voltage_of(bus, letter)
-        for bus in solved_model(path)["buses"]
+        for bus in solved_model(path, GlmText(path))["buses"]
         for letter in letters_of(bus["phases"])
     }
 

@@ -1,5 +1,6 @@
 """What cannot be imported is refused by name, several mistakes at once, each in one line that tells what to do."""
 
+import re
 import sys
 from pathlib import Path
 
@@ -103,14 +104,19 @@ ONE_LINE = {
 }
 
 
+OF_THE_WHOLE = ("no solution", "a winding that floats")
+"""Problems that no line of a script has."""
+
+
 @pytest.mark.parametrize("what", ONE_LINE)
 def test_one_line_says_what_is_refused(tmp_path: Path, what: str) -> None:
-    """Each thing that cannot be represented is named, in one line."""
+    """Each thing that cannot be represented is named, in one line with the script's file and line."""
     script, told = ONE_LINE[what]
 
     (problem,) = problems(write(tmp_path, LINE, STEP_DOWN, script))
 
     assert told in problem
+    assert re.match(r"Master\.dss:\d+: ", problem) or what in OF_THE_WHOLE
 
 
 def test_all_mistakes_of_a_script_come_at_once(tmp_path: Path) -> None:
@@ -142,10 +148,10 @@ def test_several_lines_without_length_come_at_once(tmp_path: Path) -> None:
     """The engine stops at the first line without an impedance; the import names all of them."""
     lines = [f"New Line.{name} bus1=c bus2={name} r1=0.1 x1=0.1 length=0" for name in "xyz"]
 
-    assert [problem[:7] for problem in problems(write(tmp_path, LINE, STEP_DOWN, *lines))] == [
-        "line.x:",
-        "line.y:",
-        "line.z:",
+    assert [problem.partition(" it")[0] for problem in problems(write(tmp_path, LINE, STEP_DOWN, *lines))] == [
+        "Master.dss:11: line.x:",
+        "Master.dss:12: line.y:",
+        "Master.dss:13: line.z:",
     ]
 
 
@@ -177,7 +183,9 @@ def test_a_source_of_one_phase_is_told(tmp_path: Path) -> None:
     path = tmp_path / "x.dss"
     path.write_text("New Circuit.x bus1=s phases=1 basekv=7.2\nNew Load.l bus1=s.1 phases=1 kv=7.2 kw=9\nSolve\n")
 
-    assert problems(path) == ("vsource.source: a source has three phases between nodes 1, 2, 3 of its bus and ground",)
+    assert problems(path) == (
+        "x.dss:1: vsource.source: a source has three phases between nodes 1, 2, 3 of its bus and ground",
+    )
     assert problems(path, ("vsource.source",))[-1].startswith("no Vsource")
 
 
