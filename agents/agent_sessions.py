@@ -86,6 +86,8 @@ class AgentSessions:
         self._session = session = _opened(self._configs[0], self._credentials, again=again)
         try:
             core = self._make_nodes(session.id) if self._core is None else self._core
+            for agent in _realtime(self._nodes):
+                agent.host_moved = lambda: session.moved
             if self._credentials is not None:
                 for node in self._nodes:
                     node.vouches = session.vouches

@@ -17,6 +17,7 @@ news.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf
 
 from msgspec.structs import replace
@@ -96,6 +97,8 @@ class RealtimeAgent(AgentNode):
         """Periods since then."""
         self._skipped = 0
         """States since the last that neighbours were sent."""
+        self.host_moved: Callable[[], bool] = lambda: False
+        """Whether the own host has another address than the session knows; the driver sets it."""
         self._forget_everybody()
 
     def _forget_everybody(self) -> None:
@@ -209,11 +212,15 @@ class RealtimeAgent(AgentNode):
         roster = None if measured is None else measured.roster
         if roster is not None and self._agent.fault:
             roster = (*roster, self._name)  # who says nothing is not heard, and no session changes that
-        problem = self._health.problem(
-            roster,
-            met=self.members.nameplates,
-            neighbours=self._neighbours,
-            now=now,
+        problem = (
+            "this host has another address"
+            if self.host_moved()
+            else self._health.problem(
+                roster,
+                met=self.members.nameplates,
+                neighbours=self._neighbours,
+                now=now,
+            )
         )
         if problem:
             self.session_broken = True

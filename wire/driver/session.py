@@ -11,11 +11,13 @@ import os
 import re
 import threading
 from collections.abc import Callable
+from time import monotonic
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
 from wire.backlog import Loss
 from wire.driver.foreign import keep_thread_state
+from wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
 from wire.driver.inbox import Inbox
 from wire.driver.large_blocks import give_back_freed
 from wire.driver.left_links import end_left_links
@@ -36,6 +38,9 @@ FIRST_LINK = 0.5
 _REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
 """What of Zenoh's log the rendezvous prints on standard output where links have certificates: each handshake that has
 failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 s after each."""
+
+ADDRESSES_EVERY = 0.5
+"""Time (s) between two looks at the host's addresses."""
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
@@ -135,8 +140,10 @@ class Session:
         self._certificates: LinkCertificates | None = None
         if credentials is not None:
             self._certificates = LinkCertificates(credentials, relayed=star and not rendezvous)
+        self._addresses = LinkAddresses(listen, host_addresses())
+        self._next_look = monotonic() + ADDRESSES_EVERY
         config = zenoh_settings(
-            listen,
+            self._addresses.endpoints,
             connect,
             gossip=gossip,
             clock=clock,
@@ -212,6 +219,15 @@ class Session:
     def misplaced(self) -> bool:
         """Whether a router has answered too late for this session to be its client: open another one."""
         return self._changeable and bool(self._session.info.routers_zid())
+
+    @property
+    def moved(self) -> bool:
+        """Whether this host has lost the address of a link, or has got another: others need a new session's."""
+        if (now := monotonic()) < self._next_look:
+            return False
+        self._next_look = now + ADDRESSES_EVERY
+        sources = {address_in(str(link.src)) for link in self._session.info.links()}
+        return self._addresses.moved(sources, host_addresses())
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
         """Take the events out of the inbox, as `Inbox.take` does, and set up new links."""
