@@ -26,7 +26,8 @@ ACCOUNTS = 0.5
 """Time (s) between two questions for the accounts of emulated links, while any has a fault."""
 
 STATUS = 5.0
-"""Time (s) between two questions for the plant's status, which are also asked when a switch has moved."""
+"""Time (s) between two questions for the plant's status, which are also asked when a switch has moved, and for the
+one-line diagram until it has come."""
 
 AGAIN = 0.1
 """Least time (s) between two questions for it."""
@@ -47,7 +48,7 @@ class RunFollower:
         self._on_news: Callable[[], None] = _nothing
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
-        self._asked_status = self._asked_accounts = float("-inf")
+        self._asked_status = self._asked_accounts = self._ask_map_at = float("-inf")
         self._had_plant = False
 
     def __enter__(self) -> RunFollower:
@@ -83,7 +84,8 @@ class RunFollower:
                 questions = self._questions(now)
             for verb in questions:
                 self._ask(verb)
-            if self._client.plant and not self._had_plant:
+            if self._client.plant and (not self._had_plant or (now >= self._ask_map_at and self.feeder_map() is None)):
+                self._ask_map_at = now + STATUS
                 self._client.fetch(self._client.keys.feeder_map)
             self._had_plant = self._client.plant
             if heard or questions:

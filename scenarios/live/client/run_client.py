@@ -66,6 +66,11 @@ class RunClient:
         self._session.watch(self.keys.any_alive)
         self._session.watch(ANY_ALIVE_PLANT)
 
+    @property
+    def moved(self) -> bool:
+        """Whether this host has another address than the session knows."""
+        return self._session.moved
+
     def renew(self) -> None:
         """Open a new session, as the old one does not bring the messages that it should."""
         self._session.close(replaced=True)

@@ -29,6 +29,7 @@ from scenarios.live.client.run_client import RunClient
 from scenarios.live.launch.link_log import LinkLog
 from scenarios.live.launch.live_recorder import LiveRecorder
 from scenarios.live.requests.agent_configs import check_free, configuration, own_code
+from scenarios.live.requests.run_requests import ANSWER
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded
 from scenarios.short_names import short
@@ -219,7 +220,7 @@ def agent_here(
     listen : tuple[str, ...] or None
         Where other agents can connect; None is for any free port, of all addresses if others can reach the plant.
     wait : float
-        Longest wait (s) for a plant.
+        Longest wait (s) for a plant, and its answers.
     trusts : bool, optional
         Whether to run code that only the plant names, though the plant may be on another host.
 
@@ -236,8 +237,9 @@ def agent_here(
     say(f"{who}: seeks the plant of {where}, for up to {wait:g} s")
     try:
         with RunClient(where) as client:
+            end = monotonic() + wait
             client.find_plant(wait, lambda line: say(f"{who}: {line}"))
-            configs = [configuration(client, name) for name in dict.fromkeys(names)]
+            configs = [configuration(client, name, max(ANSWER, end - monotonic())) for name in dict.fromkeys(names)]
             for name in names:
                 check_free(client, name)
         named = list(dict.fromkeys(code for config in configs for code in own_code(config)))

@@ -11,45 +11,56 @@ from agents.agent_config import AgentConfig
 from agents.own_nameplate import check_nameplate
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests.run_requests import plant_status
+from scenarios.live.requests.run_requests import ANSWER, ASKED_AGAIN, plant_status
 from scenarios.short_names import in_order
 from wire.driver.command_line import command_line
 from wire.foreign_bytes import decode_foreign
 
-HANDOUT = 10.0
-"""Longest wait (s) for a configuration that the plant hands out; it answers within milliseconds, or a busy second."""
 
-
-def configuration(client: RunClient, name: str) -> AgentConfig:
+def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
     """Return the configuration that the plant hands out to the agent of an inverter.
 
     Raises
     ------
     NobodyError
-        If there is no such inverter.
+        If the plant says that there is no such inverter, or does not answer within `wait` (s).
     """
-    known = configurations(client, name)
-    if name not in known:
-        there = f"inverters are {', '.join(in_order(known))}" if known else "the plant has no configuration for it"
+    end = monotonic() + wait
+    inverters = plant_status(client, wait).inverters
+    if name not in inverters:
+        there = f"inverters are {', '.join(in_order(inverters))}"
         raise NobodyError(f'no inverter "{name}" in {client.where}; {there}')
-    return known[name]
+    return configurations(client, name, end - monotonic())[name]
 
 
-def configurations(client: RunClient, name: str = "") -> dict[str, AgentConfig]:
+def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> dict[str, AgentConfig]:
     """Return configurations of agents by name: all that came until that of `name`, or any, was there.
 
     With the certificate of an agent it asks for that of `name` alone: access rules let an agent ask for no other.
+
+    Raises
+    ------
+    NobodyError
+        If it does not come within `wait` (s), asked for again and again.
     """
     known: dict[str, AgentConfig] = {}
     credentials = client.where.credentials
     is_agent = credentials is not None and credentials.own.role == "agent"
-    client.fetch(client.keys.config(name if is_agent else "*"))
-    end = monotonic() + HANDOUT
-    while not (name in known if name else known) and (left := end - monotonic()) > 0.0:
-        for _, payload, _ in client.take(left):
+    key = client.keys.config(name if is_agent else "*")
+    now = ask_at = monotonic()
+    end = now + wait
+    while not (name in known if name else known):
+        if now >= end:
+            what = f"the configuration of {name}" if name else "a configuration"
+            raise NobodyError(f"no answer: the plant of {client.where} has not sent {what} within {wait:.3g} s")
+        if now >= ask_at:
+            client.fetch(key)
+            ask_at = now + ASKED_AGAIN
+        for _, payload, _ in client.take(min(end, ask_at) - now):
             config = read_config(payload)
             if config is not None:
                 known[config.name] = config
+        now = monotonic()
     return known
 
 

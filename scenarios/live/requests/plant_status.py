@@ -18,7 +18,9 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Run time per wall time (s/s)."""
     pacing: Pacing
     agents: tuple[str, ...] = ()
-    """Agents that take part."""
+    """Inverters whose agents take part."""
+    absent: tuple[str, ...] = ()
+    """Inverters whose agents do not."""
     events: tuple[PlantEvent, ...] = ()
     """The latest, oldest first."""
     impaired: tuple[str, ...] = ()
@@ -27,3 +29,8 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     """Position of each switch, by its name: whether it is closed."""
     loads: dict[str, tuple[float, float]] = {}
     """Real (W) and reactive power (var) at nominal voltage of each load that was set during the run."""
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """All inverters of the plant."""
+        return self.agents + self.absent

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Callable, Mapping
+from math import inf
 from time import monotonic
 from typing import Any, Literal, TypeVar
 
@@ -20,8 +21,14 @@ T = TypeVar("T")
 
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
+QUESTIONS = ("status", "links")
+"""Verbs that change nothing."""
+
 ANSWER = 10.0
 """Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
+
+ASKED_AGAIN = 1.0
+"""Time (s) after which a question without an answer is asked again: it may have been lost with its link."""
 
 ACKNOWLEDGED = 4.0
 """Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
@@ -52,33 +59,44 @@ def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | N
 
 
 def request(
-    client: RunClient, receivers: Callable[[Answer], set[str]], *, verb: Verb, **command_fields: Any
+    client: RunClient,
+    receivers: Callable[[Answer], set[str]],
+    *,
+    verb: Verb,
+    wait: float = ANSWER,
+    **command_fields: Any,
 ) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
     """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it.
 
     Anybody who may ask the plant anything may have its answer sent to this client. So the command has a number that
     nobody else knows, which the plant repeats; acknowledgements have the number that the plant's answer names.
+
+    A question, which changes nothing, is asked again until its answer comes, for `wait` (s).
     """
     number = secrets.randbelow(MOST_COUNT)
     command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
-    client.publish(client.keys.for_verb(verb), encode(command))
     answer: Answer | None = None
     acknowledgements: dict[int, dict[str, LinkAcknowledgement]] = {}
-    end = monotonic() + ANSWER
-    while (left := end - monotonic()) > 0.0:
-        for key, payload, _ in client.take(left):
+    now = ask_at = monotonic()
+    end = now + wait
+    while now < end:
+        if now >= ask_at:
+            client.publish(client.keys.for_verb(verb), encode(command))
+            ask_at = now + ASKED_AGAIN if verb in QUESTIONS else inf
+        for key, payload, _ in client.take(min(end, ask_at) - now):
             message = client.read(key, payload)
             if isinstance(message, LinkAcknowledgement):
                 acknowledgements.setdefault(message.seq, {})[message.sender] = message
             elif isinstance(message, Answer) and message.seq == number:
                 if not message.ok:
                     raise RefusedError(message.text)
-                answer, end = message, monotonic() + ACKNOWLEDGED
+                answer, end, ask_at = message, monotonic() + ACKNOWLEDGED, inf
         if answer is not None and _of_number(answer, acknowledgements).keys() >= receivers(answer):
             break
+        now = monotonic()
     if answer is None:
         raise NobodyError(
-            f"the plant of {client.where} is there but has not answered within {ANSWER:g} s; is it frozen?"
+            f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
         )
     return answer, _of_number(answer, acknowledgements)
 
@@ -91,9 +109,9 @@ def _of_number(
     return acknowledgements.get(number, {}) if isinstance(number, int) else {}
 
 
-def plant_status(client: RunClient) -> PlantStatus:
-    """Return the state of the run as the plant reports it."""
-    answer, _ = request(client, lambda answer: set(), verb="status")
+def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
+    """Return the state of the run as the plant reports it within `wait` (s)."""
+    answer, _ = request(client, lambda answer: set(), verb="status", wait=wait)
     return data_of(client, answer, PlantStatus)
 
 

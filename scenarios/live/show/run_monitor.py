@@ -5,6 +5,7 @@ Pure: messages and the time are arguments.
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Collection
 
@@ -51,6 +52,8 @@ class RunMonitor:
         self._plant_status: PlantStatus | None = None
         self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
         self._status: dict[str, tuple[AgentStatus, float]] = {}
+        self.members: set[str] = set()
+        """Inverters whose agents take part, as the plant says."""
 
     @property
     def inverters(self) -> tuple[str, ...]:
@@ -72,6 +75,7 @@ class RunMonitor:
     def plant_status(self, status: PlantStatus) -> None:
         """Note the plant's status."""
         self._plant_status, self._impaired = status, status.impaired
+        self.members = set(status.agents)
         if status.phase != "gathering":
             self._t, self._pacing = status.t, status.pacing
         self._events.extend(event for event in status.events if event not in self._events)
@@ -81,6 +85,7 @@ class RunMonitor:
         if message.epoch != self._epoch:
             if self._epoch:
                 self._events.clear()
+                self.members.clear()
                 self._plant_status = None
             self._epoch, self._latest = message.epoch, 0.0
         if message.t < self._latest:
@@ -94,7 +99,20 @@ class RunMonitor:
         self._impaired = message.impaired
         if message.rows:
             self._row = message.rows[-1]
-        self._events.extend(event for event in message.events if event not in self._events)
+        for event in message.events:
+            if event not in self._events:
+                self._events.append(event)
+                self._count_member(event)
+
+    def _count_member(self, event: PlantEvent) -> None:
+        """Note an agent that joins, leaves or dies."""
+        match = re.match(r"(\S+) (joined|left|died)\b", event.text)
+        if event.kind != "roster" or match is None or match[1] != event.subject:
+            return
+        if match[2] == "joined":
+            self.members.add(event.subject)
+        else:
+            self.members.discard(event.subject)
 
     def status(self, message: AgentStatus, now: float) -> None:
         """Note the status of an agent."""
@@ -175,7 +193,7 @@ class RunMonitor:
     def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
         """Return what a person should know of an agent, whose last status is `age` (s) old."""
         if not present:
-            return "no agent"
+            return "not heard here; the plant hears it" if name in self.members else "no agent"
         if status is None:
             return f"silent for {age:.0f} s" if name in self._status else "has not reported yet"
         if status.phase != "running":

@@ -52,7 +52,7 @@ class InverterStatus:
     impaired: tuple[str, ...] = ()
     """Senders whose links to it have an emulated fault."""
     note: str = ""
-    """A note for the reader: "no agent", "waits for ...", "silent for 3 s"."""
+    """A note for the reader: "no agent", "not heard here; the plant hears it", "waits for ...", "silent for 3 s"."""
 
 
 @dataclass(frozen=True, kw_only=True)

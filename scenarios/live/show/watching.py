@@ -30,6 +30,9 @@ LOOK = 1.2
 SILENT = 1.0
 """Time (s) without a message after which a sender counts as silent: two periods of an agent's status."""
 
+CONFIGS_AGAIN = 2.0
+"""Time (s) after which missing configurations are asked for again."""
+
 REFRESH = 0.25
 """Time (s) between two tables on a terminal: the plant publishes five times a second."""
 
@@ -89,8 +92,18 @@ class RunSubscriber:
         self._used: dict[str, tuple[str, ...]] = {}
         """Neighbours that each agent uses."""
         self._patience = SessionDeadline()
+        self._configured: set[str] = set()
+        """Inverters whose configuration has come."""
+        self._ask_at = 0.0
+        """When (s, monotonic) to ask for those that are missing."""
         client.listen(client.keys.telemetry)
-        client.fetch(client.keys.config("*"))
+        self._ask_for_configs(monotonic())
+
+    def _ask_for_configs(self, now: float) -> None:
+        """Ask for the configurations of all agents; a question may be lost with its link."""
+        if now >= self._ask_at:
+            self._ask_at = now + CONFIGS_AGAIN
+            self._client.fetch(self._client.keys.config("*"))
 
     def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
         """Wait (s) for messages, feed them into the monitor and return them."""
@@ -99,6 +112,7 @@ class RunSubscriber:
             config = read_config(payload)
             if config is not None:
                 self._monitor.config(config)
+                self._configured.add(config.name)
                 continue
             message = self._client.read(key, payload)
             if isinstance(message, Telemetry):
@@ -111,15 +125,19 @@ class RunSubscriber:
                 continue
             self._heard_at[message.sender] = at
             heard.append(message)
+        now = monotonic()
         if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
-            self._client.fetch(self._client.keys.config("*"))
+            self._configured.clear()
+            self._ask_at = now
         self._plant = self._client.plant
+        if self._plant and not self._configured.issuperset(self._monitor.inverters):
+            self._ask_for_configs(now)
         for name in self._monitor.inverters:
             self._listen_to(name)
         for name in self._client.present:  # anybody may hold tokens of any names
             if len(self._subscribed) < MOST_INVERTERS:
                 self._listen_to(name)
-        self._renew(monotonic())
+        self._renew(now)
         return heard
 
     def _listen_to(self, name: str) -> None:
@@ -133,7 +151,7 @@ class RunSubscriber:
             self.take(left)
 
     def _renew(self, now: float) -> None:
-        """Open a new session if a process that takes part has been silent for too long: the session is broken.
+        """Open a new session if a process that takes part has been silent for too long, or this host has moved.
 
         A process takes part if its token is there, or if an agent that is heard uses it.
         """
@@ -142,7 +160,7 @@ class RunSubscriber:
         there.update(*(self._used.get(name, ()) for name in heard))
         silent = dict.fromkeys(sorted(there - heard), 0.0)
         self._patience.whole |= PLANT in heard and not silent
-        if self._patience.lost(silent, now):
+        if self._patience.lost(silent, now) or self._client.moved:
             self._patience = self._patience.next()
             self._client.renew()
 
@@ -155,7 +173,7 @@ def look(client: RunClient) -> Snapshot:
     end = monotonic() + LOOK
     while (left := end - monotonic()) > 0.0:
         heard.update(message.sender for message in subscriber.take(left))
-        if heard >= {PLANT, *client.present} and monitor.has_configs:
+        if heard >= {PLANT, *client.present, *monitor.members} and monitor.has_configs:
             break
     return monitor.snapshot(client.present, monotonic())
 

@@ -28,7 +28,7 @@ LAB, MINE = Keys("lab"), Keys("mine")
 class Line:
     """Stands for Zenoh behind a real inbox: what the test puts on it waits there."""
 
-    id, misplaced = "1", False
+    id, misplaced, moved = "1", False, False
 
     def __init__(self) -> None:
         self.inbox = Inbox()

@@ -35,7 +35,7 @@ Event = tuple[str, str, bytes, float]
 class Line:
     """Stands for Zenoh: what the test puts on it comes in."""
 
-    id, misplaced = "1", False
+    id, misplaced, moved = "1", False, False
 
     def __init__(self) -> None:
         self.events: list[Event] = []

@@ -7,11 +7,14 @@ from msgspec.structs import replace
 from rich.console import Console
 
 from agents.agent_config import AgentConfig, Control
+from scenarios.live.requests.plant_status import PlantStatus
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
 from scenarios.live.show.snapshot import InverterStatus, Snapshot
 from scenarios.short_names import short
 from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+PACING = Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0)
 
 
 def plate(name: str) -> AgentConfig:
@@ -28,7 +31,7 @@ def told(t: float, *events: PlantEvent, life: int = 1) -> Telemetry:
         sender="plant", epoch=life, seq=0, t=t, inverters=("inv1", "inv2"),
         rows=((t, 60.01, 3e5, 1e4, 2400.0, 3.1e5, 2412.0, 60.0, 2.5e5, -2e4, 2376.0, 2.5e5, 2400.0),),
         events=events, final=False, outcome="", reproducible=False,
-        pacing=Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0),
+        pacing=PACING,
     )  # fmt: skip
 
 
@@ -64,6 +67,23 @@ def test_status_is_a_line_per_agent_with_units() -> None:
         "  no agent",
         "    1.00 s  13-152 opened",
     ]
+
+
+def test_an_agent_that_the_plant_hears_is_there_though_nothing_comes_from_it_here() -> None:
+    """No link to its host: the plant says who takes part, in its status and then in its events, and is believed."""
+    seen = monitor()
+    joined, died = (
+        PlantEvent(t=t, kind="roster", subject="inv2", text=f"inv2 {what}")
+        for t, what in ((2.1, "joined"), (2.3, "died"))
+    )
+    for event, note in ((joined, "not heard here; the plant hears it"), (died, "no agent")):
+        seen.telemetry(told(event.t, event), now=10.2)
+        assert seen.snapshot({"inv1"}, now=10.2).inverters[1].note == note
+
+    seen.plant_status(PlantStatus(phase="running", t=2.5, speed=1.0, pacing=PACING, agents=("inv1", "inv2")))
+    assert seen.snapshot({"inv1"}, now=10.2).inverters[1].note == "not heard here; the plant hears it"
+    seen.telemetry(told(0.1, life=2), now=10.4)
+    assert seen.snapshot({"inv1"}, now=10.4).inverters[1].note == "no agent"
 
 
 def test_a_run_that_has_not_begun_shows_who_waits() -> None:
