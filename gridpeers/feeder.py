@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
+from plant.equipment import NODES, PHASES, InverterRow
 from plant.equipment import Feeder as Tables
-from plant.equipment import InverterRow
 from plant.equipment.imported_equipment import is_behind
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from plant.equipment.neutrals import neutral_for, neutrals_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -36,6 +37,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
         buses = [bus for bus in self.buses if not is_behind(bus.name)]
         counted = {"buses": buses, "switches": self.switches, "inverters": self.inverters}
         counts = ", ".join(f"{what} {len(rows)}" for what, rows in counted.items())
+        if returning := sum(bool(row.neutral) for row in self.inverters):
+            counts += f" ({returning} to a neutral)"
         return f"<Feeder {self.name}: {counts}, loads {loads}>"
 
     @classmethod
@@ -125,6 +128,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         P_rated: float,
         *,
         phases: Literal["ABC", "A", "B", "C"] = "ABC",
+        neutral: str | int = "",
         microgrid: str = "MG1",
         m_p: float = 0.01,
         m_q: float = 0.05,
@@ -144,6 +148,9 @@ class Feeder(Tables, frozen=True, kw_only=True):
             Rated power (W, of all its phases).
         phases : {"ABC", "A", "B", "C"}, optional
             All three, or one for a single-phase inverter.
+        neutral : str or int, optional
+            Node of the bus to which its phases return, by its number or letter, or "earth"; by default the neutral to
+            which loads return, else earth. Its V, P and Q are those between its phases and this node.
         microgrid : str, optional
             Microgrid it belongs to.
         m_p, m_q : float, optional
@@ -175,6 +182,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
             m_p=m_p,
             m_q=m_q,
             phases=str(phases).strip() or "ABC",  # type: ignore[arg-type]  # `problems_of` refuses others
+            neutral=NODES[neutral - 1] if isinstance(neutral, int) and 0 < neutral <= len(NODES) else str(neutral),
         )
         if problems := problems_of(row, found, self):
             raise ValueError("; ".join(problems))
@@ -186,14 +194,16 @@ class Feeder(Tables, frozen=True, kw_only=True):
             P_rated=float(P_rated),
             m_p=float(m_p),
             m_q=float(m_q),
+            neutral=neutral_for(row.neutral, found, row.phases, neutrals_of(self).get(bus, "")),
             parameters=set_name,
         )
         return msgspec.structs.replace(self, inverters=(*self.inverters, row), parameter_sets=sets)
 
     def solve(self, open_switches: Sequence[str] = ()) -> pd.DataFrame:
-        """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg.
+        """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg, to.
 
-        They are 0 where it does not reach.
+        They are 0 where it does not reach. Those of phases A, B and C count from the neutral of the bus, whose letter
+        is in `to`; those of other nodes, and of phases without a neutral, from earth: `to` is empty.
 
         Parameters
         ----------
@@ -215,6 +225,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
         network = Network(self)
         closed = network.closed0 - {network.switch_name(name) for name in _listed(open_switches)}
         V = solve_power_flow(network, closed).V
+        neutrals = neutrals_of(self)
+        of = [neutrals.get(bus, "") for bus, _ in network.nodes]
+        to = [n if p in PHASES and p != n else "" for n, (_, p) in zip(of, network.nodes, strict=True)]
+        back = np.array([network.index(bus, n) if n else -1 for n, (bus, _) in zip(to, network.nodes, strict=True)])
+        V = np.where((back >= 0) & (V != 0.0), V - V[back], V)
         return pd.DataFrame(
             {
                 "bus": [bus for bus, _ in network.nodes],
@@ -222,6 +237,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
                 "V": np.abs(V),
                 "V_pu": np.abs(V) / network.V_nom,
                 "angle_deg": np.degrees(np.angle(V)),
+                "to": to,
             }
         )
 

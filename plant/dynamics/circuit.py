@@ -22,6 +22,10 @@ class Circuit:
     """A linear network with non-linear load branches, ideal sources and inverter terminals.
 
     All phasors in the frame that rotates at nominal speed; volts are line-to-neutral RMS.
+
+    The voltage of a node counts from its reference: earth, or the neutral to which an inverter there returns. So the
+    voltage of a terminal is that between its phase and its neutral, and a current into it is one that comes out of the
+    neutral: with V = M V' of the voltages V to earth, Y and C are M^T Y M and M^T C of those to earth.
     """
 
     Y: sp.csc_array
@@ -40,6 +44,8 @@ class Circuit:
     """Law of the currents that the branches draw."""
     V_branch: NDArray[np.complex128]
     """Nominal phasor of each branch (V): where the first solution starts."""
+    reference: NDArray[np.int64] | None = None
+    """Node from which each node's voltage counts, -1: earth; None: all from earth. It counts from earth itself."""
 
     def __deepcopy__(self, memo: object) -> Circuit:
         """Return itself: it is never written, so copies of a plant share it, and its factorisation."""
@@ -62,6 +68,21 @@ class Circuit:
         """Factors from each terminal's node to the terminal, n_inv x 3: 1, and `PHASES` of a copy."""
         return np.where(self.copies, PHASES, 1.0 + 0.0j)
 
+    @cached_property
+    def returns(self) -> NDArray[np.int64]:
+        """Node to which each inverter returns, -1: earth."""
+        none = np.full(self.terminals.shape[0], -1, np.int64)
+        return none if self.reference is None else self.reference[self.terminals[:, 0]]
+
+    @cached_property
+    def two_ended(self) -> bool:
+        """Whether each branch is between two nodes at most, or a node and earth."""
+        return bool(np.max(np.diff(self.C.tocsc().indptr), initial=0) <= 2)
+
+    def to_earth(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+        """Return the voltages of all nodes to earth (V) from those to their references."""
+        return V if self.reference is None else V + np.where(self.reference >= 0, V[self.reference], 0.0)
+
     def without_source(self) -> Circuit:
         """Return the same network with its substation disconnected."""
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
@@ -81,5 +102,8 @@ class Circuit:
         if self.sources.size > 1:  # the phases of one ideal source, too
             s = self.sources
             tie = tie + sp.csc_array((np.ones(s.size - 1), (np.repeat(s[:1], s.size - 1), s[1:])), shape=(n, n))
+        if (back := self.returns >= 0).any():
+            ends = self.terminals[back, 0], self.returns[back]
+            tie = tie + sp.csc_array((np.ones(ends[0].size), ends), shape=(n, n))
         count, label = connected_components(link + tie, directed=False)
         return int(count), np.asarray(label, dtype=np.int64)

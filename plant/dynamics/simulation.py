@@ -216,10 +216,10 @@ class Dynamics:
         units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
 
     def voltages(self) -> Complex:
-        """Return the voltages of the circuit's nodes (V); 0 in dead islands and at nodes without any admittance."""
-        network = self.network
-        return network.reduction.node_voltages(
-            self.inverters.J, network.V_branch[network.reduction.branches], network.source_voltage
+        """Return the voltages to earth of all nodes (V); 0 in dead islands and at nodes without any admittance."""
+        network, reduction = self.network, self.network.reduction
+        return reduction.circuit.to_earth(
+            reduction.node_voltages(self.inverters.J, network.V_branch[reduction.branches], network.source_voltage)
         )
 
     def frequency(self, island: int) -> float:

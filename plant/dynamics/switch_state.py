@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
 
 from plant.dynamics.circuit import Circuit
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
@@ -12,6 +15,13 @@ from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 FLOATING = 1e-12
 """Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it
 phases without an inverter, which only the lines' impedances couple to the others, would have no determined voltage."""
+
+EARTHING = 1e3
+"""Admittance (S) with which a grid-forming inverter earths the neutral of an island that has lost its earth."""
+
+UNEARTHED = 0.03 / 50.0
+"""Admittance (S) between a neutral and earth below which it is not earthed: an electrode that is larger than 50 V over
+30 mA protects nobody (IEC 60364-4-41)."""
 
 
 class SwitchState:
@@ -40,6 +50,8 @@ class SwitchState:
         Incidence of the live branches.
     terminals : int64[3 n_inv]
         Nodes of the terminals: all A, then all B, then all C.
+    earthing : tuple of int
+        Inverters that earth their neutral, because nothing else does in an island of theirs (IEC 60364-5-551).
     """
 
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
@@ -91,6 +103,7 @@ class SwitchState:
             self.to_ground = np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
             y_diagonal += self.to_ground
         self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
+        self.earthing = tuple(self._earthing(np.flatnonzero(forming & self.online & (circuit.returns >= 0))))
         self.C = C[:, self.branches]
         self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)
         """Rows of `terminals` at which an inverter injects."""
@@ -98,6 +111,25 @@ class SwitchState:
     def __deepcopy__(self, memo: object) -> SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
         return self
+
+    def _earthing(self, formers: NDArray[np.int64]) -> Iterator[int]:
+        """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does."""
+        circuit = self.circuit
+        for i in formers.tolist():
+            neutral, island = circuit.returns[i], self.inverter_island[i]
+            own = circuit.sources[self.label[circuit.sources] == island]
+            if self.place[neutral] < 0 or circuit.reference is None or (circuit.reference[own] < 0).any():
+                continue
+            earthed = self.Y + sp.csr_array(([EARTHING], ([neutral], [neutral])), shape=self.Y.shape)
+            nodes = self.unknown[self.label[self.unknown] == island]
+            at = int(np.searchsorted(nodes, neutral))
+            unit = np.zeros(nodes.size, complex)
+            unit[at] = 1.0
+            seen = 1.0 / splu(sp.csc_matrix(earthed[nodes][:, nodes])).solve(unit)[at]
+            if abs(seen - EARTHING) < UNEARTHED:
+                self.to_ground[neutral] += EARTHING
+                self.Y = earthed
+                yield i
 
     def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:
         """Return the inner loop's arrays but those of the network: the loads' tangent, the islands' frames.

@@ -210,6 +210,8 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     """Q-V droop (pu voltage per pu reactive power)."""
     phases: Literal["ABC", "A", "B", "C"] = "ABC"
     """Phases of the bus at which it stands: all three, or one."""
+    neutral: str = ""
+    """Node of the bus to which its phases return, by its letter; empty for earth."""
     spare: bool = False
     """Whether it stays off until an agent joins for it."""
     parameters: str = ""

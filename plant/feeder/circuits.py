@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from plant.dynamics import Circuit, PlantError
 from plant.dynamics.foreseen_cache import ForeseenCache
 from plant.network import Network
 from plant.network.loads import LoadBranches
+from plant.network.merging import Merge
+
+ROUNDING = 1e-14
+"""Part of its terms below which a sum of admittances is what rounding leaves of 0."""
 
 
 class Circuits:
@@ -80,12 +85,63 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
                 "switches or a regulator, without any impedance between them: move it behind a line"
             )
         owner.update(dict.fromkeys(nodes.tolist(), unit.name))
+    Y, reference = network.admittance(closed), None
+    if any(unit.neutral for unit in network.inverters):
+        reference = _references(network, merge, on, terminals)
+        Y, C = _referred(Y, C, reference)
     return Circuit(
-        Y=network.admittance(closed),
+        Y=Y,
         sources=network.source_nodes,
         source_voltage=network.source_voltage,
         terminals=terminals,
         C=C,
         loads=on.law,
         V_branch=on.V_nom * np.exp(1j * on.phi0),
+        reference=reference,
     )
+
+
+def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the node from which each node's voltage counts: the neutral of an inverter there, or -1.
+
+    A node between which and a terminal a load stands counts from the same neutral, where it can: the load is then
+    between two nodes in these voltages, too, and not three.
+    """
+    reference = np.full(len(network.nodes), -1, np.int64)
+    for unit, nodes in zip(network.inverters, terminals, strict=True):
+        if unit.neutral:
+            reference[nodes] = merge.representative[network.index(unit.bus, unit.neutral)]
+    fixed = np.zeros(reference.size, bool)
+    fixed[network.source_nodes] = fixed[reference[reference >= 0]] = fixed[terminals.ravel()] = True
+    for unit, nodes in zip(network.inverters, terminals, strict=True):
+        if unit.neutral and (np.isin(nodes, network.source_nodes) | (reference[reference[nodes]] >= 0)).any():
+            raise PlantError(
+                f"{unit.name} at bus {unit.bus} cannot return to node {unit.neutral}: the substation, or another "
+                'inverter, holds one of its nodes without any impedance between; give it neutral "earth"'
+            )
+    between = on.n_to >= 0
+    pairs = np.column_stack([on.n_from[between], on.n_to[between]])
+    while True:
+        one, other = np.vstack([pairs, pairs[:, ::-1]]).T
+        follows = (reference[one] >= 0) & (reference[other] < 0) & ~fixed[other]
+        if not follows.any():
+            return reference
+        reference[other[follows]] = reference[one[follows]]
+
+
+def _referred(Y: sp.csc_array, C: sp.csc_array, reference: NDArray[np.int64]) -> tuple[sp.csc_array, sp.csc_array]:
+    """Return admittances and incidence for voltages that count from these nodes; see `Circuit`."""
+    n = reference.size
+    at = np.flatnonzero(reference >= 0)
+    M = sp.csc_array((np.ones(n + at.size), (np.r_[:n, at], np.r_[:n, reference[at]])), shape=(n, n))
+    C = sp.csc_array(M.T @ C)
+    C.eliminate_zeros()
+    entries, sizes = sp.coo_array(M.T @ Y @ M), sp.csr_array(M.T @ abs(Y) @ M)
+    size = np.asarray(sizes[entries.row, entries.col]).ravel()
+    left = abs(entries.data) > ROUNDING * size
+    # what cancels is no coupling; it goes from both places of the matrix, or from none
+    kept = sp.csr_array((left.astype(float), (entries.row, entries.col)), shape=(n, n))
+    kept = kept + kept.T
+    left = np.asarray(kept[entries.row, entries.col]).ravel() > 0.0
+    where = entries.row[left], entries.col[left]
+    return sp.csc_array((entries.data[left], where), shape=(n, n)), C

@@ -21,6 +21,7 @@ from plant.feeder.installed_inverters import installed_inverters
 from plant.feeder.islands import Islands
 from plant.feeder.load_board import LoadBoard
 from plant.feeder.load_limits import LoadLimits
+from plant.feeder.neutral_events import NeutralEvents
 from plant.feeder.set_points import SetPointLimits
 from plant.feeder.switchboard import Switchboard
 from plant.feeder.synchronism import Difference, Synchronism
@@ -85,7 +86,7 @@ class Plant:
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
         self._switches = Switchboard(network, settings.events, settings.h)
-        self._circuits, self._islands = Circuits(network), Islands(network)
+        self._circuits, self._islands, self._neutrals = Circuits(network), Islands(network), NeutralEvents(network)
         self._loads = LoadBoard(network, settings.loads, settings.h)
         self._set_points = SetPointLimits()
         self._limits: dict[int, list[PowerLimit]] = {}
@@ -127,6 +128,7 @@ class Plant:
         self._now = self._dynamics.readings()
         self._rows: list[tuple[float, ...]] = [self._as_row(0, self._now)]
         self._events = self._islands.report_dead(0.0, self._switches.closed, self._dynamics.network.reduction)
+        self._events += self._neutrals.report(0.0, self._switches.closed, self._dynamics)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # the first scheduled networks are factored now: in wall-clock time an event must not be late
         for circuit in islice(self._foreseen(), ROOM):
@@ -302,8 +304,7 @@ class Plant:
         if not switched:
             self._dynamics.connect(self._circuits.of(self._switches.closed))
             if self._tell_trips(step):
-                t, reduction = self._time(step), self._dynamics.network.reduction
-                self._events += self._islands.report(t, self._switches.closed, reduction)
+                self._tell_islands(self._time(step))
         self._load_limits = LoadLimits(self.network, self._dynamics.network.V_branch)
 
     def _operate(self, step: int) -> bool:
@@ -325,7 +326,7 @@ class Plant:
         self._events += operated
         self._dynamics.connect(circuit)
         self._tell_trips(step)
-        self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
+        self._tell_islands(t)
         return True
 
     def _settle(self, step: int, which: list[int]) -> None:
@@ -334,7 +335,13 @@ class Plant:
         self._now[which] = now[which]
         if self._tell_trips(step):
             self._now = now
-        self._events += self._islands.report(self._time(step), self._switches.closed, self._dynamics.network.reduction)
+        self._tell_islands(self._time(step))
+
+    def _tell_islands(self, t: float) -> None:
+        """Report the islands of a network that has changed at t (s), and their neutrals."""
+        closed = self._switches.closed
+        self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
+        self._events += self._neutrals.report(t, closed, self._dynamics)
 
     def _tell_trips(self, step: int) -> bool:
         """Report the trips since `step` of islands without a solution; return whether there were any."""

@@ -209,6 +209,8 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """"yes" if it stands by, switched off, until an agent comes for it."""
     parameters: str = ""
     """Name of its set of parameters in inverter_parameters.csv; empty: those of its kind."""
+    neutral: str = ""
+    """Node of the bus to which its phases return, or "earth"; empty: the neutral to which loads return, else earth."""
 
 
 class ParameterColumns(msgspec.Struct, frozen=True, kw_only=True):

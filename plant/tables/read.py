@@ -6,6 +6,7 @@ from pathlib import Path
 
 from plant.equipment import Feeder
 from plant.equipment.connectivity import buses_without_ground
+from plant.equipment.neutrals import neutrals_by_bus
 from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
 from plant.tables.buses import BusTable, report_unconnected
 from plant.tables.csv_table import required_columns
@@ -127,7 +128,8 @@ def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
     demand = sum(
         S.real for S in (*(S for load in loads for S in load.S), *(part.S for part in load_parts)) if S.real > 0.0
     )
-    inverters = read_inverters(folder, buses, demand, parameter_sets, problems)
+    neutrals = neutrals_by_bus(buses.rows, load_parts, elements, switches)
+    inverters = read_inverters(folder, buses, demand, neutrals, parameter_sets, problems)
     source = read_source(folder, buses, problems)
     f_nom = read_f_nom(folder, problems)
     found = Feeder(

@@ -11,6 +11,7 @@ from typing import Any
 
 from plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
 from plant.equipment.connectivity import buses_without_ground
+from plant.equipment.neutrals import neutral_for, neutrals_of
 from plant.equipment.own_parameters import OwnParameters, foreign, with_published
 from plant.tables.buses import GROUND_NEEDED, BusTable
 from plant.tables.csv_table import CsvRow, CsvTable
@@ -110,10 +111,13 @@ def read_inverters(
     folder: Path,
     buses: BusTable,
     load: float,
+    neutrals: Mapping[str, str],
     sets: Mapping[str, OwnParameters] | None,
     problems: list[str],
 ) -> tuple[InverterRow, ...]:
     """Read inverters.csv: nameplates, places, and the sets of parameters by name, None where they are unreadable.
+
+    An inverter returns to the neutral of its bus, of `neutrals`, where it says nothing else.
 
     A rating is held against the feeder's load (W): one that is more than `TIMES_THE_LOAD` of it is in another unit.
     """
@@ -139,6 +143,11 @@ def read_inverters(
             row.problem(f'bus "{bus.name}" has inverter "{at[taken]}" on phase {taken[1]} already; {ONE_EACH}')
         for node in nodes:
             at.setdefault(node, name)
+        try:
+            neutral = neutral_for(it.neutral, bus, phases, neutrals.get(bus.name, ""))
+        except ValueError as error:
+            neutral = ""
+            row.problem(str(error))
         inverters.setdefault(
             name,
             InverterRow(
@@ -151,6 +160,7 @@ def read_inverters(
                 m_p=it.m_p_pu,
                 m_q=it.m_q_pu,
                 phases=it.phases,
+                neutral=neutral,
                 spare=it.spare == "yes",
                 parameters=it.parameters,
             ),
@@ -175,6 +185,10 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
         row.problem(GROUND_NEEDED.format(bus=bus.name, what="an inverter"))
     if missing := [phase for phase in inverter.phases if phase not in bus.phases and "phases" not in row.wrong]:
         row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
+    try:
+        neutral_for(inverter.neutral, bus, inverter.phases, neutrals_of(feeder).get(bus.name, ""))
+    except ValueError as error:
+        row.problem(str(error))
     if row.columns.name:
         _require_name(row, row.columns.name)
     for other in (*feeder.inverters, *feeder.spares):

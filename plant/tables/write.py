@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from plant.equipment import Feeder, LineConfig
+from plant.equipment.neutrals import EARTH, neutrals_of
 from plant.equipment.own_parameters import OwnParameters
 from plant.tables import feeder_columns as columns
 from plant.tables.parameter_sets import FILE
@@ -49,6 +50,7 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
 def _tables(feeder: Feeder) -> Iterator[Table]:
     """Yield file, columns and rows of each table that the feeder has."""
     kV = sqrt(3.0) / 1e3
+    neutrals = neutrals_of(feeder)
     yield (
         "buses.csv",
         columns.BusColumns,
@@ -81,6 +83,7 @@ def _tables(feeder: Feeder) -> Iterator[Table]:
                 row.phases,
                 "yes" if row.spare else "",
                 row.parameters,
+                row.neutral or (EARTH if row.bus in neutrals else ""),
             )
             for row in (*feeder.inverters, *feeder.spares)
         ],

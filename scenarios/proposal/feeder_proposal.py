@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from plant.equipment import Feeder, InverterRow
 from plant.equipment.connectivity import Connectivity, by_bus
+from plant.equipment.neutrals import neutrals_of
 from scenarios.proposal.feeder_walk import depth_first, neighbours
 from scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
 from scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
@@ -96,7 +97,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     groups = group_sizes([section.load for section in chosen], there, count)
     chosen = chosen[: len(groups)]
     carried = sum(section.load for section in chosen) or 1.0
-    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    V_nom, neutrals = {bus.name: bus.V_nom for bus in feeder.buses}, neutrals_of(feeder)
     inverters: list[InverterRow] = []
     microgrid = 0
     for section, sizes in zip(chosen, groups, strict=True):
@@ -120,6 +121,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
                         V_nom=V_nom[bus],
                         m_p=DROOPS[0],
                         m_q=DROOPS[1],
+                        neutral=neutrals.get(bus, ""),
                     )
                 )
     large = max(inverters, key=lambda row: row.P_rated / most_rated(row.V_nom))

@@ -85,6 +85,7 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
     Example:  gridpeers feeder check microgrid123
     """
     from plant.equipment.connectivity import Connectivity
+    from plant.equipment.neutrals import returns_in_words
 
     tables = _read(feeder, load_set, switch, leave_out)
     _describe(tables)
@@ -103,6 +104,8 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
             f"{counted(len(behind), 'bus', 'buses')}, {sum(load.get(bus, 0.0) for bus in behind) / 1e3:.0f} kW of load"
         )
         typer.echo(f"switch {name}: closed; open, it cuts off {cut}{', ' + ', '.join(inverters) if inverters else ''}")
+    for text in returns_in_words(tables):
+        typer.echo(text)
 
 
 @app.command()
@@ -139,7 +142,12 @@ def solve(
     typer.echo(text)
     live = live[~live["bus"].map(is_behind).astype(bool)]  # an import's own buses stand beside one that the script has
     for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
-        typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {row['phase']}")
+        between = f"{row['phase']} to {row['to']}, its neutral" if row["to"] else row["phase"]
+        typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {between}")
+    neutrals = table.merge(live[["bus", "to"]].drop_duplicates(), left_on=["bus", "phase"], right_on=["bus", "to"])
+    if len(neutrals):
+        worst = neutrals.loc[neutrals["V"].idxmax()]
+        typer.echo(f"neutral  {worst['V']:.2f} V to earth at most, bus {worst['bus']}, node {worst['phase']}")
     if csv is not None:
         try:
             write_whole(csv, table.to_csv(index=False))

@@ -164,6 +164,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
     from gridpeers.cli.progress import TRYING, explained_work
+    from plant.equipment.neutrals import returns_in_words
     from scenarios.proposal.proposal_errors import NoProposalError
     from scenarios.schema import load_scenario
     from scenarios.start_check import start_problem
@@ -205,6 +206,8 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then: {check}")
     if count is not None and len(proposal.inverters) < count:
         typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")
+    for text in returns_in_words(msgspec.structs.replace(feeder, inverters=proposal.inverters)):
+        typer.echo(f"NOTE  {text}")
     rated = sum(row.P_rated for row in proposal.inverters) / 1e3
     typer.echo(
         f"{feeder.name}: switch {proposal.switch} islands {proposal.load / 1e3:.0f} kW of load; "

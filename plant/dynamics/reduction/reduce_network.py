@@ -18,6 +18,6 @@ MOST_DENSE = 30
 
 def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
     """Return a switch state as it is solved; arguments as for `plant.dynamics.switch_state.SwitchState`."""
-    if circuit.loads.S.size > MOST_DENSE:
+    if circuit.loads.S.size > MOST_DENSE and circuit.two_ended:
         return SparseReduction(circuit, y_f, forming, online)
     return DenseReduction(circuit, y_f, forming, online)

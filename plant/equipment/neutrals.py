@@ -1,0 +1,120 @@
+"""Neutral conductors of a feeder: the nodes to which loads return, and what is connected to them in line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from plant.equipment.equipment import PHASES, Bus, Feeder, Switch
+from plant.equipment.imported_equipment import LinearElement, LoadPart
+from wire.schema.suggestion import first_of
+
+EARTH = "earth"
+"""In place of a neutral: the inverter returns through earth, though its bus has a neutral."""
+
+BETWEEN_PHASES = 1.3
+"""Voltage of a load (pu of its bus, line-to-neutral) from which on it is between phases: there it is 1.73, or 2 between
+the legs of a split-phase service."""
+
+SHOWN = 6
+"""Inverters that a sentence names."""
+
+Node = tuple[str, str]
+
+
+def neutrals_of(feeder: Feeder) -> dict[str, str]:
+    """Return the neutral of each bus of a feeder that has one; see `neutrals_by_bus`."""
+    return neutrals_by_bus(feeder.buses, feeder.load_parts, feeder.elements, feeder.switches)
+
+
+def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
+    """Return the letter of the node to which an inverter returns; empty for earth.
+
+    Parameters
+    ----------
+    text
+        What is wanted: such a letter, `EARTH`, or empty for the bus's neutral.
+    bus, phases
+        Where it stands.
+    neutral
+        The bus's neutral; empty for none.
+
+    Raises
+    ------
+    ValueError
+        If it cannot return there; the message says where it can.
+    """
+    if text in ("", EARTH):
+        return "" if text == EARTH or neutral in phases else neutral
+    possible = [letter for letter in bus.phases if letter not in phases and (letter not in PHASES or letter == neutral)]
+    if text not in possible:
+        raise ValueError(
+            f'neutral "{text}": bus "{bus.name}" has no such neutral; {", ".join([*possible, EARTH])} can be'
+        )
+    return text
+
+
+def returns_in_words(feeder: Feeder) -> list[str]:
+    """Return sentences that say where the inverters of a feeder with neutrals return; none of another feeder."""
+    if not (neutrals := neutrals_of(feeder)):
+        return []
+    rows = (*feeder.inverters, *feeder.spares)
+    to = {
+        "to the neutral of their bus": [row.name for row in rows if row.neutral],
+        "through earth, though their bus has a neutral": [
+            row.name for row in rows if not row.neutral and row.bus in neutrals
+        ],
+        "through earth, as their bus has no neutral": [row.name for row in rows if row.bus not in neutrals],
+    }
+    return [f"inverters that return {where}: {first_of(names, SHOWN)}" for where, names in to.items() if names]
+
+
+def neutrals_by_bus(
+    buses: Iterable[Bus],
+    load_parts: Iterable[LoadPart],
+    elements: Iterable[LinearElement],
+    switches: Iterable[Switch],
+) -> dict[str, str]:
+    """Return the neutral of each bus that has one: the letter of a node, that of most load where there are several.
+
+    Parameters
+    ----------
+    buses, load_parts, elements, switches
+        The feeder's. A neutral goes on along the elements that have it in the same place at both ends.
+    """
+    V_nom = {bus.name: bus.V_nom for bus in buses}
+    weight: dict[Node, float] = {}
+    for part in load_parts:
+        if part.ends[1] and part.V_nom < BETWEEN_PHASES * V_nom[part.bus]:
+            node = part.bus, next((end for end in part.ends if end not in PHASES), part.ends[1])
+            weight[node] = weight.get(node, 0.0) + abs(part.S)
+    along: dict[Node, list[Node]] = {}
+    for one, other in (*_conductors(elements), *_poles(switches)):
+        along.setdefault(one, []).append(other)
+        along.setdefault(other, []).append(one)
+    waiting = list(weight)
+    while waiting:
+        at = waiting.pop()
+        for node in along.get(at, ()):
+            if node not in weight and 0.9 < V_nom[node[0]] / V_nom[at[0]] < 1.1:  # not through a transformer
+                weight[node] = 0.0
+                waiting.append(node)
+    found: dict[str, str] = {}
+    for (bus, letter), load in weight.items():
+        if bus not in found or load > weight[bus, found[bus]]:
+            found[bus] = letter
+    return found
+
+
+def _conductors(elements: Iterable[LinearElement]) -> Iterator[tuple[Node, Node]]:
+    """Yield the two ends of each conductor of elements between two buses: same place in either half of the rows."""
+    for element in elements:
+        half = len(element.nodes) // 2
+        ends = element.nodes[:half], element.nodes[half:]
+        if len(ends[0]) == len(ends[1]) and all(len({bus for bus, _ in end}) == 1 for end in ends):
+            yield from zip(*ends, strict=True)
+
+
+def _poles(switches: Iterable[Switch]) -> Iterator[tuple[Node, Node]]:
+    """Yield the two ends of each pole of switches."""
+    for switch in switches:
+        yield from (((switch.from_bus, phase), (switch.to_bus, phase)) for phase in switch.phases)

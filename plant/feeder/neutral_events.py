@@ -1,0 +1,63 @@
+"""Events of neutrals: inverters that begin to earth theirs, and neutrals that stand off earth."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from plant.dynamics import Dynamics
+from plant.equipment.imported_equipment import is_behind
+from plant.equipment.neutrals import neutrals_of
+from plant.network import Network
+from wire.counted import counted
+from wire.messages import PlantEvent
+
+TOUCHABLE = 50.0
+"""Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""
+
+
+class NeutralEvents:
+    """Report the neutrals of a feeder when its network has changed; each once, until it is as before.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._neutrals = [node for node in neutrals_of(network.feeder).items() if not is_behind(node[0])]
+        self._nodes = np.array([network.index(*node) for node in self._neutrals], np.int64)
+        self._earthing: set[int] = set()
+        self._off: set[int] = set()
+
+    def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
+        """Return the events at t (s), with these switches closed."""
+        if not self._neutrals:
+            return []
+        earthing = set(dynamics.network.reduction.earthing)
+        rows = [self._network.inverters[i] for i in sorted(earthing - self._earthing)]
+        self._earthing = earthing
+        events = [
+            PlantEvent(
+                t=t,
+                kind="island",
+                subject=row.name,
+                text=f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does",
+            )
+            for row in rows
+        ]
+        V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
+        off = set(np.flatnonzero(V > TOUCHABLE).tolist())
+        new, self._off = off - self._off, off
+        if new:
+            worst = max(new, key=lambda k: V[k])
+            bus, letter = self._neutrals[worst]
+            others = f" (and of {counted(len(new) - 1, 'bus', 'buses')} more)" if len(new) > 1 else ""
+            text = (
+                f"the neutral of bus {bus}{others}, node {letter}, has {V[worst]:.0f} V to earth, more than the "
+                f"{TOUCHABLE:.0f} V that may last: nothing earths it well enough; let the grid-forming inverter return "
+                "to it, or earth it"
+            )
+            events.append(PlantEvent(t=t, kind="warning", subject=bus, text=text))
+        return events
