@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from pathlib import Path
-from typing import TextIO
 
 import msgspec
 
@@ -13,6 +11,7 @@ from netem.models.delay import DELAY, LONGEST_DELAY, Trace
 from netem.schema.netem import Netem
 from wire.schema.suggestion import suggestion
 from wire.schema.table_schema import Problem
+from wire.text_file import TextFileError, read_table_text
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""
@@ -26,36 +25,35 @@ def read_delays(path: Path) -> tuple[tuple[float, ...], list[str]]:
     try:
         if path.exists() and not path.is_file():  # a device or a pipe may never end
             return (), [f"{path}: cannot be read: it is no file"]
-        with path.open(newline="", encoding="utf-8-sig") as stream:
-            return _rows(stream, path.name)
+        return _rows(path.read_bytes(), path.name)
     except FileNotFoundError:
         return (), [f'there is no file "{path}"; the path is seen from the scenario']
     except OSError as error:
         return (), [f"{path}: cannot be read: {error.strerror}"]
-    except (UnicodeDecodeError, csv.Error) as error:
-        return (), [f"{path.name}: not a CSV file in UTF-8 ({error})"]
+    except TextFileError as error:
+        return (), [f"{path.name}: {error}"]
     except ValueError:  # a name with a zero byte
         return (), [f'there is no file "{path}"; the path is seen from the scenario']
 
 
-def _rows(stream: TextIO, file: str) -> tuple[tuple[float, ...], list[str]]:
-    reader = csv.reader(stream, strict=True)
-    header = [name.strip() for name in next(reader, [])]
+def _rows(data: bytes, file: str) -> tuple[tuple[float, ...], list[str]]:
+    header, rows = read_table_text(data, [COLUMN], [COLUMN])
     if COLUMN not in header:
         return (), [f'{file}: no column "{COLUMN}" in its first line; {suggestion(COLUMN, header, "columns")}']
     column = header.index(COLUMN)
     delays, wrong = [], []
-    for cells in reader:
-        if not any(cell.strip() for cell in cells):
+    for number, cells in rows:
+        if len(cells) > len(header):
+            wrong.append(f"{file} row {number}: {len(cells)} cells, but the header has {len(header)}")
             continue
-        text = cells[column].strip() if column < len(cells) else ""
+        text = cells[column] if column < len(cells) else ""
         try:
             delay_s = float(text)
         except ValueError:
-            wrong.append(f'{file} row {reader.line_num}: {COLUMN} must be a number of seconds, got "{text}"')
+            wrong.append(f'{file} row {number}: {COLUMN} must be a number of seconds, got "{text}"')
             continue
         if text := DELAY.objection(delay_s, "s"):
-            wrong.append(f"{file} row {reader.line_num}: {text}")
+            wrong.append(f"{file} row {number}: {text}")
         delays.append(delay_s)
     if wrong and len(wrong) == len(delays) and all(math.isfinite(d) and d > LONGEST_DELAY for d in delays):
         return (), [f"{file}: all {len(delays)} delays are above {LONGEST_DELAY:g} s; are they in milliseconds?"]

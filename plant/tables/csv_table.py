@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
@@ -16,6 +15,7 @@ from wire.schema.plausible import Plausible
 from wire.schema.suggestion import suggestion
 from wire.schema.table_schema import Field, Label, fields_of, named
 from wire.schema.type_words import shown
+from wire.text_file import TextFileError, read_table_text
 
 C = TypeVar("C", bound=msgspec.Struct)
 
@@ -43,13 +43,11 @@ class CsvRow(Generic[C]):
         Columns whose cells are wrong.
     """
 
-    def __init__(self, table: type[C], where: str, cells: dict[str | None, Any], problems: list[str]) -> None:
+    def __init__(self, table: type[C], where: str, cells: Mapping[str, str], problems: list[str]) -> None:
         self._table, self._where, self._problems = table, where, problems
         self.mistaken = False
         self.wrong: set[str] = set()
-        if surplus := cells.get(None):  # `DictReader` files what stands beyond the last column under None
-            self.problem(f"{len(surplus)} cells more than the header has columns; quote texts that have commas")
-        values = {field.name: self._value(field, (cells.get(field.key) or "").strip()) for field in fields_of(table)}
+        values = {field.name: self._value(field, cells.get(field.key, "").strip()) for field in fields_of(table)}
         self.columns = table(**values)
 
     def problem(self, text: str) -> None:
@@ -133,7 +131,8 @@ class CsvTable(Generic[C]):
         self, folder: Path, file: str, columns: type[C], problems: list[str], *, required: bool = False
     ) -> None:
         self._file, self._columns, self._problems = file, columns, problems
-        self._rows: list[tuple[int, dict[str | None, Any]]] = []
+        self._header: list[str] = []
+        self._rows: list[tuple[int, list[str]]] = []
         before = len(problems)
         self._open(folder / file, required_columns(columns), required)
         self.readable = len(problems) == before
@@ -147,27 +146,38 @@ class CsvTable(Generic[C]):
             if required:
                 problems.append(f"{file}: no such file; a feeder needs it, with the columns {', '.join(columns)}")
             return
+        fields = fields_of(self._columns)
+        numbers = [field.key for field in fields if field.type is float]
         try:
-            with path.open(newline="", encoding="utf-8-sig") as stream:
-                reader = csv.DictReader(stream, restval="", strict=True)
-                found = [name.strip() for name in reader.fieldnames or ()]
-                reader.fieldnames = found
-                for column in dict.fromkeys(name for name in columns if found.count(name) > 1):
-                    problems.append(f'{file}: column "{column}" stands there twice; keep one')
-                    return
-                for column in columns:
-                    if column not in found:
-                        problems.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
-                if set(columns) <= set(found):
-                    self._rows = [(reader.line_num, {**cells}) for cells in reader]
+            table = read_table_text(path.read_bytes(), [field.key for field in fields], numbers)
         except OSError as error:
             problems.append(f"{file}: cannot be read: {error.strerror}")
-        except (UnicodeDecodeError, csv.Error) as error:
-            problems.append(f"{file}: not a CSV file in UTF-8 ({error})")
+            return
+        except TextFileError as error:
+            problems.append(f"{file}: {error}")
+            return
+        found = table.header
+        for column in dict.fromkeys(name for name in columns if found.count(name) > 1):
+            problems.append(f'{file}: column "{column}" stands there twice; keep one')
+            return
+        for column in columns:
+            if column not in found:
+                problems.append(f'{file}: no column "{column}"; {suggestion(column, found, "columns")}')
+        if set(columns) <= set(found):
+            self._rows = table.rows
+            self._header = found
 
     def __iter__(self) -> Iterator[CsvRow[C]]:
         for number, cells in self._rows:
-            yield CsvRow(self._columns, f"{self._file} row {number}", cells, self._problems)
+            row = CsvRow(
+                self._columns,
+                f"{self._file} row {number}",
+                dict(zip(self._header, cells, strict=False)),
+                self._problems,
+            )
+            if (surplus := len(cells) - len(self._header)) > 0:
+                row.problem(f"{surplus} cells more than the header has columns; quote texts that have commas")
+            yield row
 
     def __len__(self) -> int:
         return len(self._rows)

@@ -8,6 +8,7 @@ from typing import Any
 
 from plant.tables.feeder_columns import Manifest
 from wire.schema.table_reading import read_table
+from wire.text_file import TextFileError, text_of
 
 MANIFEST = "feeder.toml"
 """Name of the file."""
@@ -22,11 +23,13 @@ def read_f_nom(folder: Path, problems: list[str]) -> float:
 
 def _tables(path: Path, problems: list[str]) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        return tomllib.loads(text_of(path.read_bytes()))
     except FileNotFoundError:
         return {}
     except OSError as error:
         problems.append(f"{path.name}: cannot be read: {error.strerror}")
-    except (ValueError, RecursionError) as error:  # no TOML, or no UTF-8
+    except TextFileError as error:
+        problems.append(f"{path.name}: {error}")
+    except (ValueError, RecursionError) as error:
         problems.append(f"{path.name}: not valid TOML: {error}")
     return {}

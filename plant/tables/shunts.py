@@ -174,7 +174,7 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
     """Return what the tables would refuse of a further inverter of a feeder, at a bus of it."""
     problems: list[str] = []
     numbers = {"P_rated_kW": (inverter.P_rated, 1e3), "m_p_pu": (inverter.m_p, 1.0), "m_q_pu": (inverter.m_q, 1.0)}
-    cells: dict[str | None, Any] = {
+    cells: dict[str, str] = {
         key: "" if (text := getattr(inverter, key)) is None else str(text)
         for key in ("name", "kind", "bus", "microgrid", "phases")
     }

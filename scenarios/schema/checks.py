@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 from collections.abc import Mapping
 
 from plant.equipment import Feeder, InverterRow
@@ -30,6 +31,18 @@ _LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max"
 
 _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "status.txt")
 """Files and folders of a run folder beside the folders of its cases."""
+
+
+def name_of(stem: str) -> str:
+    """Return the name of a scenario whose file has none: the file's, with other letters as names may have.
+
+    Examples
+    --------
+    >>> name_of("süd"), name_of("Übung 3 (neu)"), name_of("東京")
+    ('sud', 'Ubung-3-neu', 'scenario')
+    """
+    letters = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode("ascii")
+    return re.sub(r"[^A-Za-z0-9_.]+", "-", letters).strip("_.-")[:31] or "scenario"
 
 
 def check_names(scenario: ScenarioModel, problems: Problems) -> None:

@@ -22,6 +22,7 @@ from scenarios.schema.checks import (
     check_protection,
     check_start,
     check_switches,
+    name_of,
 )
 from scenarios.schema.configs import as_in
 from scenarios.schema.gridlabd_checks import check_gridlabd
@@ -34,6 +35,7 @@ from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from scenarios.schema.supply import check_supply
 from scenarios.schema.time_checks import check_step, check_times
 from wire.schema.suggestion import suggestion
+from wire.text_file import TextFileError, text_of
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""
@@ -160,7 +162,7 @@ def check_tables(
     data : Mapping[str, Any]
         Parsed TOML.
     path : Path
-        Its file: a relative path of a feeder starts there, and a scenario without a name has its name.
+        Its file: a relative path of a feeder starts there, and a scenario without a name has its name, by `name_of`.
     problems : Problems
         Takes the problems; the scenario is of use only when it stays empty.
     read_feeder : Callable[[str, str], Feeder], optional
@@ -168,7 +170,7 @@ def check_tables(
     """
     scenario = read_tables(data, problems)
     if not scenario.name:
-        scenario = msgspec.structs.replace(scenario, name=path.stem)
+        scenario = msgspec.structs.replace(scenario, name=name_of(path.stem))
     check_times(scenario, problems)
     check_names(scenario, problems)
     scenario = with_folders(scenario, path.parent)
@@ -199,9 +201,9 @@ def check_tables(
 
 def _text_of(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ScenarioError([f"{path.name}: byte {error.start} is not UTF-8; save the file as UTF-8 text"]) from None
+        return text_of(path.read_bytes())
+    except TextFileError as error:
+        raise ScenarioError([f"{path.name}: {error}"]) from None
     except OSError as error:
         raise ScenarioError([f"{path}: cannot be read: {error.strerror}"]) from None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from plant.imports.script_encoding import decoded
+from wire.text_file import script_of
 
 INCLUDE = re.compile(r'^(\s*#include\s+["<])([^">]+)([">])', re.IGNORECASE)
 
@@ -88,7 +88,7 @@ class GlmText:
             data = path.read_bytes()
         except OSError:
             return  # GridLAB-D says so, with the line that includes it
-        text = self._texts[path] = decoded(data)
+        text = self._texts[path] = script_of(data)
         if "\0" in text:
             self.problems.append(f"{path.name}: has bytes that are zero: it is no text; name a model")
             return

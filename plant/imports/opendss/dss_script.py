@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from plant.imports.script_encoding import decoded
 from wire.printable import printable
+from wire.text_file import script_of
 
 Execute = Callable[[str, str], str]
 """Runs one command in the engine, from this file and line; returns its message if it fails, else an empty text."""
@@ -120,7 +120,7 @@ class DssScript:
             self.problems.append(f"{where}: includes itself, directly or through others")
             return
         try:
-            text = decoded(path.read_bytes())
+            text = script_of(path.read_bytes())
         except OSError as error:
             self.problems.append(f"{where}: {path.name} cannot be read: {error.strerror}")
             return

@@ -25,6 +25,16 @@ def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None
     assert not netem.problems(NAMES, MICROGRIDS, 10.0)
 
 
+def test_a_trace_with_decimal_commas_has_its_delays(tmp_path: Path) -> None:
+    """One column and no separator: 0,012 is 12 ms, and was 0 s without a word."""
+    (tmp_path / "d.csv").write_bytes("delay_s\r\n0,012\r\n0,5\r\n".encode("utf-16"))
+
+    netem, wrong = with_traces(Netem(links=(Fault(on="* -> *", delay=Trace(file="d.csv")),)), tmp_path)
+
+    assert not wrong
+    assert netem.links[0].models()["delay"].delays_s == (0.012, 0.5)
+
+
 @pytest.mark.parametrize(
     ("rows", "words"),
     [
@@ -35,6 +45,7 @@ def test_a_traces_file_is_read_from_the_scenarios_folder(tmp_path: Path) -> None
         ("delay\n0.01\n", ['no column "delay_s"']),
         ("delay_s\n12\n13\n", ["are they in milliseconds?"]),
         ("delay_s\n", ["no row"]),
+        ("t_s,delay_s\n0,1,0,012\n", ["row 2: 4 cells, but the header has 2"]),
         ("delay_s\n" + "x\n" * 30, [*[f"row {i}:" for i in range(2, 22)], "10 more rows"]),
         (None, ["there is no file"]),
     ],

@@ -1,4 +1,5 @@
 import csv
+import re
 import shutil
 from pathlib import Path
 
@@ -261,10 +262,47 @@ def test_surplus_cells_are_told(folder: Path) -> None:
 
 
 def test_unreadable_file_is_told(folder: Path) -> None:
-    """A file that is not UTF-8 text is a problem of the feeder, not an exception of another kind."""
-    (folder / "loads_main.csv").write_bytes(b"\xff\xfe\x00bus")
+    """A file that is no text is a problem of the feeder, not an exception of another kind."""
+    (folder / "loads_main.csv").write_bytes(b"\xff\xfebus")
 
-    assert problems(folder)[0].startswith("loads_main.csv: not a CSV file in UTF-8")
+    assert problems(folder)[0].startswith("loads_main.csv: is not whole")
+
+
+@pytest.mark.parametrize(
+    ("separator", "encoding", "comma"),
+    [(";", "utf-8-sig", True), ("\t", "utf-16", True), (",", "utf-8-sig", False)],
+    ids=["German CSV UTF-8", "German Unicode text", "CSV UTF-8"],
+)
+def test_tables_as_a_spreadsheet_saves_them_are_the_same_feeder(
+    folder: Path, separator: str, encoding: str, comma: bool
+) -> None:
+    """Its separators, decimal commas, marks, line ends, and empty rows and columns."""
+    before = read_feeder("microgrid123")
+    for path in folder.glob("*.csv"):
+        with path.open(newline="", encoding="utf-8") as stream:
+            rows = list(csv.reader(stream))
+        if comma:
+            rows = [[re.sub(r"^(-?\d+)\.(\d+)$", r"\1,\2", cell) for cell in row] for row in rows]
+        empty = [[""] * len(rows[0])] * 14
+        with path.open("w", newline="", encoding=encoding) as stream:
+            csv.writer(stream, delimiter=separator).writerows([[*row, ""] for row in [*rows, *empty]])
+    manifest = folder / "feeder.toml"
+    if manifest.is_file():
+        manifest.write_bytes(manifest.read_text(encoding="utf-8").encode("utf-16"))
+
+    after = read_feeder(str(folder))
+
+    assert (after.buses, after.lines, after.loads) == (before.buses, before.lines, before.loads)
+    assert (after.inverters, after.transformers) == (before.inverters, before.transformers)
+
+
+def test_a_table_of_a_code_page_is_told_in_one_line(folder: Path) -> None:
+    """Excel's plain "CSV" has the letters of the computer's country."""
+    text = (folder / "buses.csv").read_text()
+    (folder / "buses.csv").write_bytes((text + "süd\n").encode("cp1252"))
+
+    line = f"buses.csv: line {text.count(chr(10)) + 1} has byte 0xfc, which is not UTF-8 (Windows or Latin-1?)"
+    assert [problem.split(";")[0] for problem in problems(folder) if "buses.csv" in problem] == [line]
 
 
 def test_incomplete_matrix_is_told(folder: Path) -> None:

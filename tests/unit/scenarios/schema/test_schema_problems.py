@@ -300,8 +300,28 @@ def test_a_file_that_is_no_text_is_told(tmp_path: Path) -> None:
     path = tmp_path / "mine.toml"
     path.write_bytes(b"seed = 1 # \xff\n")
 
-    with pytest.raises(ScenarioError, match=r"mine.toml: byte 11 is not UTF-8"):
+    with pytest.raises(ScenarioError, match=r"mine.toml: line 1 has byte 0xff, which is not UTF-8"):
         load_scenario(path)
+
+
+@pytest.mark.parametrize("name", ["süd", "su\u0308d", "my study (2)", "東京", "_"])
+def test_a_scenario_is_not_refused_by_the_name_of_its_file(tmp_path: Path, name: str) -> None:
+    """Where the file says no name, the scenario's is made of the file's, in whichever form a system keeps that."""
+    path = tmp_path / f"{name}.toml"
+    path.write_text(re.sub(r"(?m)^name = .*$", "", (CATALOGUE / "islanding.toml").read_text()))
+
+    scenario, _ = load_scenario(path)
+
+    assert scenario.name in ("sud", "my-study-2", "scenario")
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "utf-16-le"])
+def test_a_scenario_that_powershell_wrote_is_read(tmp_path: Path, encoding: str) -> None:
+    """Its `>` writes UTF-16, and other programs a mark before UTF-8."""
+    path = tmp_path / "mine.toml"
+    path.write_bytes((CATALOGUE / "islanding.toml").read_text().replace("\n", "\r\n").encode(encoding))
+
+    assert load_scenario(path) == load_scenario("islanding")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,183 @@
+"""Text of users' files in the encodings of Excel, PowerShell and editors; tables with any separator. Pure."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from collections.abc import Collection, Iterable
+from typing import NamedTuple
+
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    (codecs.BOM_UTF32_LE, "utf-32"),  # before UTF-16, whose mark it begins with
+    (codecs.BOM_UTF32_BE, "utf-32"),
+    (codecs.BOM_UTF16_LE, "utf-16"),
+    (codecs.BOM_UTF16_BE, "utf-16"),
+)
+"""Marks with which a text begins, and their encodings."""
+
+SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
+"""Separators of cells, and their names."""
+
+_HINT = re.compile(r"sep=(.)\s*", re.IGNORECASE)
+"""First line by which Excel is told the separator."""
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
+
+
+class TextFileError(ValueError):
+    """The file is no text, or no table, that can be read; its message goes behind the file's name."""
+
+
+def text_of(data: bytes) -> str:
+    r"""Return the text of a file, with line ends as Python has them.
+
+    Raises
+    ------
+    TextFileError
+        If its bytes do not tell the encoding.
+
+    Examples
+    --------
+    >>> text_of("süd\r\n".encode("utf-16")), text_of("a\rb".encode("utf-16-le"))
+    ('süd\n', 'a\nb')
+    >>> text_of("a\nsüd".encode("latin-1"))
+    Traceback (most recent call last):
+    wire.text_file.TextFileError: line 2 has byte 0xfc, which is not UTF-8 (Windows or Latin-1?); save it as UTF-8
+    """
+    encoding = _encoding(data)
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError as error:
+        if encoding != "utf-8":
+            raise TextFileError(f"is not whole: it begins as {encoding.upper()}, and ends as none") from None
+        line = data.count(b"\n", 0, error.start) + 1
+        raise TextFileError(
+            f"line {line} has byte {data[error.start]:#04x}, which is not UTF-8 (Windows or Latin-1?); save it as UTF-8"
+        ) from None
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def script_of(data: bytes) -> str:
+    """Return the text of a script of another program; bytes that are not UTF-8 are those of Windows.
+
+    Examples
+    --------
+    >>> [script_of("bus São".encode(encoding)) for encoding in ("latin-1", "utf-16", "utf-16-be", "utf-8-sig")]
+    ['bus São', 'bus São', 'bus São', 'bus São']
+    """
+    encoding = _encoding(data)
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return data.decode("cp1252" if encoding == "utf-8" else encoding, errors="replace")
+
+
+def _encoding(data: bytes) -> str:
+    """Return the encoding by a text's mark; without one UTF-16 by its zeros, else UTF-8."""
+    for mark, encoding in _MARKS:
+        if data.startswith(mark):
+            return encoding
+    if data.count(0) > len(data) // 4:  # Latin letters have a zero as every second byte
+        return "utf-16-le" if data[1::2].count(0) > data[::2].count(0) else "utf-16-be"
+    return "utf-8"
+
+
+class TextTable(NamedTuple):
+    """A table of texts with one header line.
+
+    Attributes
+    ----------
+    header : list[str]
+        Names of the columns.
+    rows : list[tuple[int, list[str]]]
+        Line number and cells of each row that is not empty. Numbers have decimal points.
+    """
+
+    header: list[str]
+    rows: list[tuple[int, list[str]]]
+
+
+def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str]) -> TextTable:
+    r"""Return the table of a CSV file as programs and spreadsheets write it.
+
+    The separator is the one by which the header has most of the known columns. Decimal commas become points where no
+    number can be read in two ways. Empty rows, and empty cells beyond the header, as Excel leaves them, are left out.
+
+    Parameters
+    ----------
+    data : bytes
+        The file.
+    known : Collection[str]
+        Columns that the table may have.
+    numbers : Collection[str]
+        Those of them that have numbers.
+
+    Raises
+    ------
+    TextFileError
+        If it is no text, no table, or a number has two meanings.
+
+    Examples
+    --------
+    >>> read_table_text(b"sep=;\nbus;kW\n48;12,5\n;\n", ["bus", "kW"], ["kW"])
+    TextTable(header=['bus', 'kW'], rows=[(3, ['48', '12.5'])])
+    """
+    text = text_of(data)
+    lines = text.splitlines() or [""]
+    hint = _HINT.fullmatch(lines[0])
+    first = next((line for line in lines[1 if hint else 0 :] if line.strip()), "")
+    separator = hint[1] if hint else _separator(first, known)
+    reader = csv.reader(io.StringIO(text), delimiter=separator, strict=True)
+    try:
+        rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(map(str.strip, cells))]
+    except csv.Error as error:
+        raise TextFileError(f"not a CSV file ({error})") from None
+    (_, header), rows = (rows or [(1, [])])[hint is not None], rows[1 + (hint is not None) :]
+    while header and not header[-1]:
+        header.pop()
+    for _, cells in rows:
+        while len(cells) > len(header) and not cells[-1]:
+            cells.pop()
+    at = [i for i, name in enumerate(header) if name in numbers]
+    _replace_commas(rows, at)
+    return TextTable(header, rows)
+
+
+def _separator(header: str, known: Collection[str]) -> str:
+    """Return the separator of a header; of one column it is no comma, for numbers below may have one."""
+
+    def fit(separator: str) -> tuple[int, int]:
+        cells = [cell.strip(' "') for cell in header.split(separator)]
+        return len(set(cells) & set(known)), len(cells)
+
+    best = max(SEPARATORS, key=fit)
+    return best if fit(best)[1] > 1 else ";"
+
+
+def _replace_commas(rows: Iterable[tuple[int, list[str]]], columns: Collection[int]) -> None:
+    """Replace decimal commas in these columns by points.
+
+    Raises
+    ------
+    TextFileError
+        If they may part thousands, or points are there as well.
+    """
+    places = [(row, cells, i) for row, cells in rows for i in columns if i < len(cells)]
+    commas = [(row, cells, i) for row, cells, i in places if _DECIMAL_COMMA.fullmatch(cells[i])]
+    if not commas:
+        return
+    row, cells, i = commas[0]
+    if point := next((f'"{each[k]}" (row {n})' for n, each, k in places if re.fullmatch(r".*\d\.\d.*", each[k])), ""):
+        raise TextFileError(
+            f'has decimal commas, "{cells[i]}" (row {row}), and points, {point}; write all numbers with a point'
+        )
+    if all(_THOUSANDS.fullmatch(each[k]) for _, each, k in commas):
+        raise TextFileError(
+            f'"{cells[i]}" (row {row}) has a comma that may part decimals or thousands; write it with a point, or none'
+        )
+    for _, each, k in commas:
+        each[k] = each[k].replace(",", ".")
