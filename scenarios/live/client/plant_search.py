@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from scenarios.drivers.free_endpoint import parse_endpoint
+from scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
+from scenarios.live.client.access import is_loopback_host
 from scenarios.live.client.run_address import PROBE, RunAddress, accepting
 from wire.driver.command_line import command_line
 from wire.driver.session import Session
@@ -116,6 +117,8 @@ def _refusal(text: str, where: RunAddress) -> str:
     endpoint = parse_endpoint(text)
     if endpoint is None or not endpoint.connects:
         return ""
+    if is_loopback_host(endpoint.host) and (fault := loopback_fault()):
+        return f"nothing can be reached at {text}: {fault}"
     refusal = tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)
     if not refusal:
         return ""

@@ -45,6 +45,9 @@ LOGGED = ("roster", "warning")
 CHECK = 0.25
 """Time (s) between two checks for process faults that are due."""
 
+UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link to it was made"
+"""Why a run has failed whose plant ended well by its own account."""
+
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""
 
@@ -268,7 +271,7 @@ def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str], requests
                 if requests.requests > 1:
                     recorder.cut_short = f"{_signal_of(stop)} came again before the plant had ended"
                 raise
-        broke = broke or recorder.failure
+        broke = broke or recorder.failure or ("" if recorder.client.latest else UNHEARD)
     except (StoppedError, KeyboardInterrupt) as stop:
         interrupted = _signal_of(stop)
         if recorder.recorded is None:  # a whole record has its numbers

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import pytest
 
-from scenarios.live.launch.live_processes import _follow
+from scenarios.live.launch.live_processes import UNHEARD, _follow
 from scenarios.live.launch.live_recorder import LiveRecorder
 from wire.driver.drive import StoppedError
 from wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
@@ -19,7 +19,7 @@ class CutRecorder:
 
     def __init__(self) -> None:
         self.cut_short = self.failure = ""
-        self.recorded, self.client = None, SimpleNamespace(pacing=None)
+        self.recorded, self.client = None, SimpleNamespace(pacing=None, latest=None)
 
     def __enter__(self) -> CutRecorder:
         return self
@@ -50,3 +50,15 @@ def test_a_record_that_a_second_ctrl_c_cuts_short_says_so(later: float, why: str
     outcome = _follow(cast("LiveRecorder", CutRecorder()), run, requests)
 
     assert (outcome.interrupted, outcome.broke) == ("SIGINT", f"the record ends at 9.20 s: {why}")
+
+
+def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
+    """Its plant ended well by its own account: no link to it was made, so nobody knows what it did."""
+
+    class DeafRecorder(CutRecorder):
+        def __exit__(self, *_: object) -> None:
+            """End as a recorder that writes no files."""
+
+    outcome = _follow(cast("LiveRecorder", DeafRecorder()), lambda recorder: "", StopSignal(ctrl_c_or(StoppedError)))
+
+    assert outcome.broke == UNHEARD
