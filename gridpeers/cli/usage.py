@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 from collections.abc import Collection, Mapping
@@ -89,7 +90,7 @@ INSTALL = "install gridpeers with its dependencies: pip install -e ."
 
 
 def require(modules: dict[str, str], install: str = INSTALL) -> None:
-    """End with a clear line, and with advice, if a package is not installed that a part of gridpeers needs."""
+    """End with a clear line, and with advice, if a package that a part of gridpeers needs is missing or ill set up."""
     from importlib.util import find_spec
 
     packages = {"zenoh": "eclipse-zenoh"}
@@ -97,6 +98,11 @@ def require(modules: dict[str, str], install: str = INSTALL) -> None:
     if missing:
         lines = [f"{packages.get(name, name)} is not installed; it is needed for {modules[name]}" for name in missing]
         fail([*lines, install], BAD_INPUT)
+    if "zenoh" in modules:
+        from wire.driver.zenoh_settings import RUNTIME, runtime_objection
+
+        if objection := runtime_objection(os.environ.get("ZENOH_RUNTIME", RUNTIME)):
+            fail([objection], BAD_INPUT)
 
 
 def require_loadable(module: str, user: str) -> None:

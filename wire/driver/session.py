@@ -23,7 +23,15 @@ from wire.driver.large_blocks import give_back_freed
 from wire.driver.left_links import end_left_links
 from wire.driver.lingering import do_not_linger
 from wire.driver.open_files import limit
-from wire.driver.zenoh_settings import ONE_THREAD, PROFILES, RUNTIME, Clock, as_client, zenoh_settings
+from wire.driver.zenoh_settings import (
+    ONE_THREAD,
+    PROFILES,
+    RUNTIME,
+    Clock,
+    as_client,
+    runtime_objection,
+    zenoh_settings,
+)
 from wire.keys import LATEST_ONLY, is_token
 from wire.token_queue import Stamped
 from wire.trust.credentials import Credentials
@@ -100,7 +108,7 @@ class Session:
     Raises
     ------
     SessionError
-        If Zenoh is not installed or an endpoint cannot be listened on.
+        If Zenoh is not installed, the user's choice of its threads is wrong, or an endpoint cannot be listened on.
     """
 
     def __init__(
@@ -117,6 +125,8 @@ class Session:
         star: bool = False,
         credentials: Credentials | None = None,
     ) -> None:
+        if objection := runtime_objection(os.environ.get("ZENOH_RUNTIME", RUNTIME)):
+            raise SessionError(f"{who}: {objection}")
         try:
             load_zenoh(one_thread=star and not rendezvous)
             import zenoh
