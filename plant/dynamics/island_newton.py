@@ -24,6 +24,9 @@ SHORTEST_STEP = 2.0**-10
 """Smallest part of a Newton step, and of the load in the continuation."""
 TOLERANCE = 2e-12
 """Largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here."""
+ROUNDING, STALL = 1e-8, 4
+"""A step (pu) that may be rounding where the residual is, and the number of steps in a row that shrink no more: next to
+a very small impedance steps do not come below some 1e-11."""
 NOISE = 1e-12
 """Residual (pu) below which it need not shrink: it is rounding."""
 
@@ -77,8 +80,8 @@ class DenseIsland:
         except np.linalg.LinAlgError:
             return None
         step = dV[: V.size] + 1j * dV[V.size :]
-        ended = float(np.max(np.abs(step) / self.V_nom, initial=0.0)) <= TOLERANCE
-        return step, not ended or bool(np.linalg.slogdet(jacobian)[0] > 0)
+        small = float(np.max(np.abs(step) / self.V_nom, initial=0.0)) <= ROUNDING
+        return step, not small or bool(np.linalg.slogdet(jacobian)[0] > 0)
 
 
 @one_thread()
@@ -116,7 +119,7 @@ def _raise_load(island: IslandEquations) -> Complex | None:
 
 def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | None:
     """Solution with this part of the load, on the branch of high voltage; None if none is found."""
-    V = guess
+    V, former, stalled = guess, np.inf, 0
     F, size = island.residual(V, part)
     for _ in range(ITERATIONS):
         if not np.isfinite(size):
@@ -125,8 +128,11 @@ def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | N
         if taken is None:
             return None
         dV, high = taken
-        if float(np.max(np.abs(dV) / island.V_nom, initial=0.0)) <= TOLERANCE:
+        largest = float(np.max(np.abs(dV) / island.V_nom, initial=0.0))
+        stalled = stalled + 1 if size <= NOISE and 0.5 * former <= largest <= ROUNDING else 0
+        if largest <= TOLERANCE or stalled == STALL:
             return V + dV if high else None
+        former = largest
         length = 1.0
         F_next, size_next = island.residual(V + dV, part)
         while not size_next < (1.0 - 1e-4 * length) * size and size > NOISE:

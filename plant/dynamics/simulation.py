@@ -24,6 +24,9 @@ from plant.dynamics.start.operating_point import OperatingPoint, equilibrium
 from plant.dynamics.unsettled_island import unsettled_island
 from plant.plant_config import Method
 
+MOST_RENEWALS = 20
+"""Most tangents of one network solution, while its limited currents shrink; two or three are enough."""
+
 
 class Dynamics:
     """Inverters and network, stepped with fixed h.
@@ -123,23 +126,28 @@ class Dynamics:
     def run(self, steps: int) -> Real:
         """Advance by `steps` steps; return steps x n_inv x `kernel.controller_pass.READING`, all finite.
 
-        Where the frozen tangent leads to no solution it is renewed, as often as necessary. An island without
-        solution is de-energised before the step, and the others take the step. With 0 steps the inner loop is only
-        compiled or loaded.
+        Where the frozen tangent leads to no solution it is renewed, as often as necessary; within one solution, while
+        its limited currents shrink. An island without solution is de-energised before the step, and the others take the
+        step. With 0 steps the inner loop is only compiled or loaded.
         """
         network = self.network
         out = np.zeros((steps, len(self.inverters), READING))
         begin, renewed = 0, -1
+        limited: list[Complex] = []
+        """Injections (A) at which the tangent of one solution was renewed: they differ where currents are limited."""
         while (status := self._advance(begin, steps, out)) < 0:
             step, what = divmod(-1 - status, FAILURES)
             solution = 2 * step + what
             if what == 2:
                 islands = set(network.reduction.inverter_island[~np.isfinite(out[step, :, 0])].tolist())
-            elif solution == renewed:  # just renewed, but not solved: limited currents, or rounding at the largest load
+            elif solution == renewed and (
+                len(limited) == MOST_RENEWALS or np.array_equal(limited[-1], self.inverters.J)
+            ):  # rounding at the largest load, or limited currents that do not settle
                 islands = {unsettled_island(network.net, self.arrays(), network.x, self._tolerance)}
             else:
                 try:
                     network.renew()
+                    limited = [*(limited if solution == renewed else ()), self.inverters.J.copy()]
                     begin = renewed = solution
                     continue
                 except NoSolutionError as error:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.island_newton import TOLERANCE, solve_island
+from plant.dynamics.island_newton import ROUNDING, solve_island
 from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
 from plant.dynamics.kernel.sparse import COPY, SparseMaps
 from plant.dynamics.load_law import LoadLaw
@@ -184,8 +184,8 @@ class SparseIsland:
         dV = step.view(complex)
         if not np.isfinite(dV).all():  # it is singular
             return None
-        ended = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= TOLERANCE
-        return dV, not ended or positive
+        small = float(np.max(np.abs(dV) / self.V_nom, initial=0.0)) <= ROUNDING
+        return dV, not small or positive
 
 
 def _interleaved(V: Complex) -> Real:

@@ -1,16 +1,20 @@
 """The phase-current limit of grid-forming inverters, `inverter-models.md` section 3.7."""
 
+import dataclasses
+
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from msgspec.structs import replace
 
-from plant.dynamics import PlantError
+from plant.dynamics import Circuit, Dynamics, PlantError
+from plant.dynamics.load_law import LoadLaw
 from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import PlantSettings, Protection, SwitchEvent
 from plant.tables import read_feeder
-from tests.unit.plant.dynamics.circuits import GFM_D, S_B, V_B, Z_B, circuit, loaded, lone
+from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, loaded, lone
 
 I_B = S_B / (3.0 * V_B)
 
@@ -40,6 +44,31 @@ def test_the_controller_goes_on_unlimited_once_the_overload_ends() -> None:
 
     assert out[0, 0, 6] == 0.0
     assert out[0, 0, 3] / V_B > 0.9
+
+
+def unequal(*P: float) -> Circuit:
+    """One terminal and, behind lines, constant power (pu) on each phase, which gives way below 0.7 pu."""
+    y, one = 20.0 / Z_B, np.eye(3)
+    rows = [(part * S_B / 3.0, 0.45 * part * S_B / 3.0, V_B, 0, 0, 0.5 * V_B, 0.7 * V_B, 0, 0, 0) for part in P]
+    loads = LoadLaw(S=np.zeros(3, complex), I0=np.zeros(3, complex), limited_at=np.arange(3), law=np.array(rows, float))
+    behind = sp.csc_array(np.vstack([0.0 * one, one]))
+    lines = circuit(np.kron([[y, -y], [-y, y]], one).astype(complex), [[0, 1, 2]])
+    return dataclasses.replace(lines, C=behind, loads=loads, V_branch=V_B * BALANCED)
+
+
+def test_an_island_whose_limited_currents_settle_is_not_de_energised() -> None:
+    """Two phases that fall to where loads give way hold their limit there, however far the tangent is from it."""
+    dynamics = Dynamics(unequal(0.3, 0.8, 0.9), (inverter(replace(GFM_D, I_max=1.5)),), 0.002)
+    dynamics.start(np.array([0.6]), np.zeros(1))
+    dynamics.connect(unequal(0.3, 1.2, 1.6))
+
+    dynamics.run(20)
+    current, V = np.abs(dynamics.inverters.I[0]) / I_B, np.abs(dynamics.inverters.V[0]) / V_B
+
+    assert dynamics.take_trips() == []
+    assert current[1:] == pytest.approx([1.5, 1.5], abs=0.01)
+    assert V[0] > 1.0
+    assert (V[1:] < 0.75).all()
 
 
 def test_a_limit_that_does_not_act_changes_no_number() -> None:

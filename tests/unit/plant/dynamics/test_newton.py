@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from msgspec.structs import replace
 
 from plant.dynamics.island_newton import DenseIsland, solve_island
 from plant.dynamics.load_law import LoadLaw
 from plant.dynamics.reduction.reduced import Complex
 from plant.dynamics.reduction.reduction import DenseReduction
-from plant.dynamics.reduction.sparse_reduction import SparseReduction
+from plant.dynamics.reduction.sparse_reduction import SparseIsland, SparseReduction
 from plant.feeder.circuits import Circuits
 from plant.network import Network, solve_power_flow
 from plant.tables import read_feeder
@@ -41,6 +42,20 @@ def test_a_load_behind_a_reactance_has_the_textbook_voltage(part: float, guess: 
 def test_more_than_the_largest_load_has_no_solution(part: float) -> None:
     """Beyond E^2 / 2X nothing is found, rather than something that does not solve."""
     assert voltage_of(part * E**2 / (2.0 * X), E, E) is None
+
+
+@pytest.mark.parametrize("B", [1e3, 1e5, 1e7])
+def test_a_load_behind_next_to_no_impedance_has_the_textbook_voltage(B: float) -> None:
+    """A susceptance of 1e7 S before the load, as of a switch, leaves rounding in every step: that is a solution."""
+    P, X_all, y = 0.7 * E**2 / (2.0 * X), X + 1.0 / B, -1j * B
+    load = LoadLaw(S=np.array([P + 0j]), I0=np.zeros(1, complex))
+    Y = sp.csc_array(np.array([[y + 1.0 / (1j * X), -y], [-y, y]]))
+    right = np.array([E / (1j * X), 0.0])
+
+    V = solve_island(SparseIsland(Y, sp.csc_array([[0.0], [1.0]]), load, np.zeros(1, complex), right), right)
+
+    assert V is not None
+    assert abs(V[1]) ** 2 == pytest.approx(E**2 / 2.0 + np.sqrt(E**4 / 4.0 - (X_all * P) ** 2), rel=1e-7)
 
 
 def test_what_is_not_finite_has_no_solution() -> None:
