@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import msgspec
 import numpy as np
 
@@ -25,8 +27,17 @@ FIRST = 0.1
 """Time (s) to which the first event is moved: until then nothing happens."""
 
 
-def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
-    """Return what goes on after the last event on droop alone; "" if the plant comes to rest.
+class Unrest(NamedTuple):
+    """What keeps a plant from coming to rest."""
+
+    text: str
+    """"its frequencies swing by 0.35 Hz, and do not calm down", or what tripped, after which limit of a current."""
+    limited: bool
+    """Whether grid-forming inverters were at their current limit."""
+
+
+def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> Unrest | None:
+    """Return what goes on after the last event on droop alone; None if the plant comes to rest.
 
     Parameters
     ----------
@@ -36,11 +47,6 @@ def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
         Its feeder.
     case : str
         The case whose events are taken.
-
-    Returns
-    -------
-    str
-        "its frequencies swing by 0.35 Hz, and do not calm down", or what tripped.
     """
     config, _ = configs(scenario, feeder, case)
     settings = config.settings
@@ -57,14 +63,16 @@ def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> str:
         plant.advance()
         readings = plant.measure()
         found.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
-    for event in plant.take_events():
-        if event.kind == "trip":
-            return event.text
+    happened = plant.take_events()
+    limits = [event.text for event in happened if event.kind == "limit" and event.subject in forming][:1]
+    trip = next((event.text for event in happened if event.kind == "trip"), "")
+    if trip:
+        return Unrest(", and ".join([*limits, trip]), bool(limits))
     f = np.array(found)
     before, after = (float(np.ptp(part, axis=0).max()) for part in (f[-2 * window : -window], f[-window:]))
     if after < SWING or after < 0.5 * before:
-        return ""
-    return f"its frequencies swing by {after:.2g} Hz, and do not calm down"
+        return None
+    return Unrest(f"its frequencies swing by {after:.2g} Hz, and do not calm down", bool(limits))
 
 
 def _times(settings: PlantSettings) -> list[float]:

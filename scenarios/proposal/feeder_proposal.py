@@ -12,12 +12,13 @@ from scenarios.proposal.feeder_walk import depth_first, neighbours
 from scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
 from scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
 from scenarios.proposal.islanding_switch import islanding_switch
+from scenarios.proposal.phase_loads import heaviest_phase
 from scenarios.proposal.proposal_errors import NoProposalError, TooLargeError
 
 RATING = 1.3
-"""Rating of all inverters of a section beside its load at nominal voltage."""
+"""Rating of all inverters of a section beside its load at nominal voltage, were all phases loaded as the heaviest."""
 IMPORTED = 0.1
-"""Part of the load that comes over the islanding switch before it opens."""
+"""Part of the load, less the fixed generation, that comes over the islanding switch before it opens."""
 LEADER = 0.4
 """Part of a group's rating that its leader, the grid-forming inverter, has."""
 SMALLEST = 20e3
@@ -38,13 +39,17 @@ class Proposal(NamedTuple):
     """First P_set of every inverter (pu of its rating)."""
     load: float
     """Load (W) beyond the switch."""
+    generation: float
+    """Fixed generation (W) beyond the switch."""
+    heaviest: float
+    """Load of the heaviest phase in relation to the mean of the phases."""
 
 
 def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
-    rated by its load and spread over it in equal parts of the load.
+    rated by its load and that of the heaviest phase, and spread over it in equal parts of the load.
 
     Parameters
     ----------
@@ -81,6 +86,8 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     everywhere = feeder.load_by_bus()
     load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
     total = sum(load.values())
+    generation = sum(P for bus, P in feeder.generation_by_bus().items() if bus in beyond)
+    heaviest = heaviest_phase(feeder, switch, head)
     near = {bus: [other for other in others if other in beyond] for bus, others in neighbours(feeder).items()}
     along = depth_first(near, [head, *(bus.name for bus in feeder.buses if bus.name in beyond)])
     known = set(three_phase(feeder))
@@ -101,7 +108,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     inverters: list[InverterRow] = []
     microgrid = 0
     for section, sizes in zip(chosen, groups, strict=True):
-        rating = RATING * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
+        rating = RATING * heaviest * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
         places = possible_places(feeder, section.along, LEADER * rating / len(sizes), sum(sizes))
         places = spread(section.along, set(places), sum(sizes), load)
         for size in sizes:
@@ -128,7 +135,8 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     if large.P_rated > (most := most_rated(large.V_nom)):
         raise TooLargeError(large, most, total, len(inverters))
     total_rated = sum(row.P_rated for row in inverters)
-    return Proposal(switch, tuple(inverters), round((1.0 - IMPORTED) * total / total_rated, 3), total)
+    P_set0 = (1.0 - IMPORTED) * max(total - generation, 0.0) / total_rated
+    return Proposal(switch, tuple(inverters), round(P_set0, 3), total, generation, heaviest)
 
 
 class _Section(NamedTuple):

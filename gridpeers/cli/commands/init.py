@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from scenarios.proposal.feeder_proposal import Proposal
     from scenarios.schema import ScenarioModel
 
+    Project = tuple[ScenarioModel, Tables]
+    """A scenario and its feeder."""
+
 TEMPLATE = Path(__file__).parents[1] / "template"
 """Folder that is copied."""
 
@@ -30,7 +33,7 @@ title = {title}
 [plant]
 feeder = "./{folder}"
 P_set0_pu = {P_set0}  # the substation gives the rest
-{gfl}
+{settings}
 [time]
 end_s = 6.0
 
@@ -55,7 +58,27 @@ SLOW_VOLT_VAR = """
 [plant.gfl]
 T_vf_s = 0.2  # 0.05 as a rule: here the volt-var droop would oscillate with the network between leader and followers
 """
-"""Followers of a proposed scenario whose plant would oscillate on droop alone."""
+MORE_CURRENT = """
+[plant.gfm]
+I_max_pu = 3.0  # 2.0 as a rule: here a phase would stay at the limit, with too low a voltage to recover
+"""
+REMEDIES = {
+    SLOW_VOLT_VAR: "[plant.gfl] has a slower volt-var droop, T_vf_s = 0.2",
+    MORE_CURRENT: "[plant.gfm] allows more current, I_max_pu = 3",
+    SLOW_VOLT_VAR + MORE_CURRENT: "[plant.gfl] has T_vf_s = 0.2, and [plant.gfm] I_max_pu = 3",
+}
+"""Settings with which the plant of a proposed scenario may come to rest on droop alone, and their words."""
+
+BETA = """
+[gains]
+beta_GFM = {beta}  # 1 as a rule: here the vars would stay unequal where voltages differ along the feeder
+beta_GFL = {beta}
+"""
+BETAS = 4.0, 16.0, 64.0
+"""Weights of var sharing, beside that of the voltage error, to try where vars stay unequal."""
+
+MUCH = 0.5
+"""Part of the load from which on fixed generation is the likely cause."""
 
 GRAPHS = {"ring": "agents in a ring", "clustered": "agents of each microgrid and all leaders"}
 """Graphs of a proposed scenario, and their words."""
@@ -142,17 +165,54 @@ def _with_proposal(
     return feeder, propose(feeder, count)
 
 
-def _damp(project: tuple[ScenarioModel, Tables], rewritten: Callable[[str], tuple[ScenarioModel, Tables]]) -> None:
-    """Slow the volt-var droop of a project's followers where its plant comes to rest with that alone; say so."""
+def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Proposal) -> str | None:
+    """Return the settings with which a project comes to rest on droop alone, or None; say what they are."""
     from scenarios.proposal.droop_alone import unsteady
 
     if not (found := unsteady(*project, "none")):
-        return
-    if not unsteady(*rewritten(SLOW_VOLT_VAR), "none"):
-        typer.echo(f"NOTE  on droop alone, {found}: so [plant.gfl] has a slower volt-var droop, T_vf_s = 0.2")
-        return
+        return ""
+    for settings, words in REMEDIES.items():
+        if (found.limited or MORE_CURRENT not in settings) and not unsteady(*rewritten(settings), "none"):
+            typer.echo(f"NOTE  on droop alone, {found.text}: so {words}")
+            return settings
     rewritten("")
-    typer.echo(f"NOTE  on droop alone, {found}; more --inverters give more leaders, or try another --switch")
+    typer.echo(f"NOTE  on droop alone, {found.text}; {_remedy(project[1], proposal)}")
+    return None
+
+
+def _remedy(feeder: Tables, proposal: Proposal) -> str:
+    """Return what may help where no settings do: with much fixed generation, to do without it."""
+    from wire.schema.suggestion import first_of
+
+    if proposal.generation < MUCH * proposal.load:
+        return "more --inverters give more leaders, or try another --switch"
+    names = list(dict.fromkeys(part.name for part in feeder.load_parts if part.S.real < 0.0))
+    return (
+        f"{proposal.generation / 1e3:.0f} kW of fixed generation beside {proposal.load / 1e3:.0f} kW of load follow no "
+        f"droop: leave out {first_of(names, 3)} (--leave-out), and add inverters at their buses"
+    )
+
+
+def _shared(file: Path, case: str, settings: str, rewritten: Callable[[str], Project]) -> None:
+    """Run the agents' case of a project; weigh var sharing more where vars stay unequal, and say which checks fail."""
+    import gridpeers as gp
+
+    def failed() -> dict[str, str]:
+        verdicts = gp.load(file).run(case).check_verdicts
+        return {row.check: row.violations[0].sentence for row in verdicts if row.status == "failed"}
+
+    first = found = failed()
+    beta, betas = 1.0, iter(BETAS)
+    while set(found) == {"var_sharing"} and (beta := next(betas, 0.0)):
+        rewritten(settings + BETA.format(beta=beta))
+        found = failed()
+    if first and not found:
+        words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
+        typer.echo(f"NOTE  case {case}, {first['var_sharing']}: {words}")
+    elif first:
+        rewritten(settings)
+        for check, sentence in first.items():
+            typer.echo(f"NOTE  case {case} fails its check {check}: {sentence}")
 
 
 def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[str], count: int | None) -> None:
@@ -177,32 +237,36 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         fail([f"{script}: {error}"], BAD_INPUT)
     name = folder_of(feeder.name)
     save_readable(msgspec.structs.replace(feeder, inverters=proposal.inverters), folder / name, script.name)
+    file = folder / "islanding.toml"
     graph = "ring" if len(proposal.inverters) <= MOST_IN_RING else "clustered"
 
-    def written(part: float, gfl: str = "") -> tuple[ScenarioModel, Tables]:
+    def written(part: float, settings: str = "") -> Project:
         text = SCENARIO.format(
             feeder=feeder.name,
             folder=name,
             switch=json.dumps(proposal.switch),  # names of scripts may have quotes
             P_set0=round(part * proposal.P_set0, 3),
-            gfl=gfl,
+            settings=settings,
             graph=graph,
             agents=GRAPHS[graph],
             title=json.dumps(f"Islanding of {feeder.name} at {proposal.switch}"),
         )
-        (folder / "islanding.toml").write_text(text, encoding="utf-8")
-        return load_scenario(str(folder / "islanding.toml"))
+        file.write_text(text, encoding="utf-8")
+        return load_scenario(str(file))
 
     problem = ""
     with explained_work(lambda: typer.echo(TRYING)):
         for part in PARTS:
             found = start_problem(*(project := written(part)))
             if not found:
-                _damp(project, partial(written, part))
+                rewritten = partial(written, part)
+                settings = _calmed(project, rewritten, proposal)
+                if settings is not None:
+                    _shared(file, graph, settings, rewritten)
                 break
             problem = problem or found
     if found:
-        check = command_line("check", str(folder / "islanding.toml"))
+        check = command_line("check", str(file))
         typer.echo(f"NOTE  it cannot start yet: {problem}; edit the inverters, then: {check}")
     if count is not None and len(proposal.inverters) < count:
         typer.echo(f"NOTE  no bus for more than {len(proposal.inverters)} of the {count} inverters of --inverters")

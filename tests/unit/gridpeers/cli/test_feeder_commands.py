@@ -11,6 +11,7 @@ import pandas as pd
 import pytest
 
 from gridpeers import Feeder
+from gridpeers.cli.commands import init
 from plant.tables import read_feeder
 from scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
@@ -73,6 +74,85 @@ def test_a_proposal_that_would_oscillate_is_calmed_or_said(
     assert ("NOTE" in made) == bool(note)
     assert note in made
     assert ("T_vf_s = 0.2" in Path("mine/islanding.toml").read_text()) == slower
+
+
+UNEVEN = """New Circuit.uneven basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9
+New Line.sw bus1=sourcebus bus2=a r1=0.02 x1=0.04 r0=0.05 x0=0.12 c1=0 c0=0 length=1
+New Line.l1 bus1=a bus2=b r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
+New Line.l2 bus1=b bus2=c r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
+New Load.a bus1=b.1 phases=1 kv=7.2 kw=900 kvar=400 vminpu=0.7 vlowpu=0.5
+New Load.b bus1=b.2 phases=1 kv=7.2 kw=2200 kvar=1000 vminpu=0.7 vlowpu=0.5
+New Load.c bus1=c.3 phases=1 kv=7.2 kw=2700 kvar=1200 vminpu=0.7 vlowpu=0.5
+Set VoltageBases=[12.47]
+CalcVoltageBases
+"""
+"""A feeder of constant power, most of it on one phase."""
+
+
+def test_inverters_are_rated_for_the_heaviest_phase(elsewhere: Path) -> None:
+    """1.3 times three times the load of phase C, less what lines lose: then an islanding comes to rest at 2 pu."""
+    Path("uneven.dss").write_text(UNEVEN)
+
+    code, made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")
+
+    assert code == 0, made
+    assert "NOTE" not in made
+    rated = pd.read_csv("mine/uneven/inverters.csv")["P_rated_kW"].sum()
+    assert rated == pytest.approx(1.3 * 3.0 * 2700.0, rel=0.03)
+
+
+def test_a_phase_that_would_stay_at_its_limit_gets_more_current(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With inverters for the mean phase, C falls to where loads give way, and A and B rise until all trip."""
+    monkeypatch.setattr(feeder_proposal, "heaviest_phase", lambda *_: 1.0)
+    Path("uneven.dss").write_text(UNEVEN)
+
+    made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")[1]
+
+    assert "limits its phase currents to 2 pu" in made
+    assert "tripped: overvoltage" in made
+    assert "so [plant.gfm] allows more current, I_max_pu = 3" in made
+    assert "I_max_pu = 3.0" in Path("mine/islanding.toml").read_text()
+
+
+def string_of_loads(buses: int, km: float, kvar: float) -> str:
+    """A line with equal loads, 6 MW in all, and a capacitor at its end."""
+    rows = ["New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9"]
+    for k in range(buses):
+        name, start = ("sw", "sourcebus") if k == 0 else (f"l{k}", f"b{k - 1}")
+        rows.append(f"New Line.{name} bus1={start} bus2=b{k} r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length={km}")
+        rows.append(f"New Load.d{k} bus1=b{k} kv=12.47 kw={6000 / buses:g} kvar={1500 / buses:g}")
+    rows += [
+        f"New Capacitor.k bus1=b{buses - 1} kv=12.47 kvar={kvar:g}",
+        "Set VoltageBases=[12.47]",
+        "CalcVoltageBases",
+    ]
+    return "\n".join(rows)
+
+
+def test_gains_are_chosen_with_which_the_agents_share_vars(elsewhere: Path) -> None:
+    """Where two leaders see different voltages and few vars are needed, var sharing weighs more, and a note says so."""
+    Path("long.dss").write_text(string_of_loads(9, 1.0, 1400.0))
+
+    made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "6")[1]
+    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess")
+
+    assert "NOTE  case ring, MQSI, islanding: inv" in made
+    assert "so [gains] weighs var sharing more" in made
+    assert end == 0
+    assert "CHECKS  case ring: 11 of 11 checks passed" in ran
+
+
+def test_a_check_that_no_gains_pass_is_said(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The note names the check and what it found, and the gains stay as they are by default."""
+    monkeypatch.setattr(init, "BETAS", (1.5,))
+    Path("long.dss").write_text(string_of_loads(9, 1.0, 1400.0))
+
+    made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "6")[1]
+
+    assert "NOTE  case ring fails its check var_sharing: MQSI, islanding: inv" in made
+    assert "[gains]" not in Path("mine/islanding.toml").read_text()
 
 
 TINY = {
