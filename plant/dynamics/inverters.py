@@ -86,10 +86,12 @@ class Inverters:
         Whether each is a GFM that measures the positive sequence, and one without voltage controller (section 3.8).
     balanced : bool[n]
         Whether each is a GFL of balanced power.
-    S_max : float64[n]
-        Apparent-power limits (pu); infinite for a GFM.
+    S_max, Q_min, Q_max : float64[n]
+        Limits of apparent and of reactive power (pu); infinite for a GFM, whose limiters act in time.
     db_UV, db_OV : float64[n]
         Dead bands of volt-var below and above V_set (pu); 0 for a GFM, infinite for a GFL without volt-var.
+    from_edge : bool[n]
+        Whether volt-var begins at the edge of its dead band.
     y_f : complex128[n]
         Filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
         "second-order", which solves its filter together with its current controller.
@@ -133,6 +135,10 @@ class Inverters:
         self.direct[self.gfm_at] = ~self.gfm["voltage_control"]
         self.S_max = np.full(n, np.inf)
         self.S_max[self.gfl_at] = self.gfl["S_max"]
+        self.Q_min, self.Q_max = np.full(n, -np.inf), np.full(n, np.inf)
+        self.Q_min[self.gfl_at], self.Q_max[self.gfl_at] = self.gfl["Q_min"], self.gfl["Q_max"]
+        self.from_edge = np.zeros(n, bool)
+        self.from_edge[self.gfl_at] = self.gfl["from_edge"]
         self.db_UV, self.db_OV = np.zeros(n), np.zeros(n)
         for band, name in ((self.db_UV, "db_UV"), (self.db_OV, "db_OV")):
             band[self.gfl_at] = np.where(self.gfl["volt_var"], self.gfl[name], np.inf)

@@ -145,12 +145,19 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Dead band below V_set (pu)."""
     db_OV: VoltageBand = 0.0
     """Dead band above V_set (pu)."""
+    dead_band: Literal["gridlabd", "ieee1547"] = "gridlabd"
+    """Droop outside of a dead band, of freq-watt and volt-var: by the full deviation, so that it jumps at the edge, as
+    GridLAB-D, or by the deviation from the edge, as IEEE 1547-2018 (sections 4.3, 4.4)."""
     P_max: LimitOfP = 1.0
     """Upper bound of the P reference (pu)."""
     P_min: Annotated[LimitOfP, Below("P_max")] = -1.0
     """Lower bound of the P reference (pu)."""
     S_max: Capacity = 1.2
     """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
+    Q_max: LimitOfQ = 10.0
+    """Upper bound of the Q reference (pu): Q1 of IEEE 1547-2018."""
+    Q_min: Annotated[LimitOfQ, Below("Q_max")] = -10.0
+    """Lower bound of the Q reference (pu): Q4 of IEEE 1547-2018."""
     i_max: Capacity = 1.2
     """Bound of each axis of the current reference (pu)."""
     P_set_lim: BoundOfPset = 1.0

@@ -27,6 +27,7 @@ PARAMETERS = np.dtype(
         ("y_e", "c16"),  # S, filter admittance also in the current-source form (unused there)
         ("current_source", "b1"),
         ("balanced_power", "b1"),
+        ("from_edge", "b1"),  # a droop begins at the edge of its dead band
         ("frequency_watt", "b1"),
         ("volt_var", "b1"),
         ("R_p", "f8"),  # pu frequency per pu
@@ -49,6 +50,8 @@ PARAMETERS = np.dtype(
         ("P_max", "f8"),
         ("P_min", "f8"),
         ("S_max", "f8"),
+        ("Q_max", "f8"),
+        ("Q_min", "f8"),
         ("i_max", "f8"),
     ],
     align=True,
@@ -114,10 +117,11 @@ def pack(
     record["f_nom"], record["w_nom"] = f_nom, 2.0 * np.pi * f_nom
     record["current_source"] = par.model == "current_source"
     record["balanced_power"] = par.mode == "balanced_power"
+    record["from_edge"] = par.dead_band == "ieee1547"
     record["y_e"] = y
     record["y_f"] = 0.0 if par.model == "current_source" or method == "second-order" else y
     record["R_p"], record["R_q"] = m_p, m_q
-    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[13:]):  # type: ignore[index]  # as in gfm
+    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[14:]):  # type: ignore[index]  # as in gfm
         record[name] = getattr(par, name)
     return record
 
@@ -165,22 +169,29 @@ def settle(
 def power_reference(g: Any, P_set: float, f_m: float) -> float:
     """Freq-watt characteristic (7) with dead band, section 4.3 (pu).
 
-    Outside the dead band the *full* deviation acts: the characteristic jumps at its edges.
+    Outside the dead band the *full* deviation acts, so that the characteristic jumps at its edges, or `from_edge` the
+    deviation from the edge.
     """
     P_d = P_set
     if g.frequency_watt and not (g.f_nom - g.db_UF < f_m < g.f_nom + g.db_OF):
-        P_d += (g.f_nom - f_m) / (g.f_nom * g.R_p)
+        edge = 0.0
+        if g.from_edge:
+            edge = g.db_UF if f_m < g.f_nom else -g.db_OF
+        P_d += (g.f_nom - edge - f_m) / (g.f_nom * g.R_p)
     return sat(P_d, g.P_min, g.P_max)
 
 
 @compiled
 def var_reference(g: Any, V_set: float, Q_set: float, V_m: float, P_d: float) -> float:
-    """Volt-var characteristic (8) with dead band and the limit that P leaves, section 4.4 (pu)."""
+    """Volt-var characteristic (8) with dead band and the limits, of which P leaves one, section 4.4 (pu)."""
     Q_d = Q_set
     if g.volt_var and not (V_set - g.db_UV < V_m < V_set + g.db_OV):
-        Q_d += (V_set - V_m) / g.R_q
+        edge = 0.0
+        if g.from_edge:
+            edge = g.db_UV if V_m < V_set else -g.db_OV
+        Q_d += (V_set - edge - V_m) / g.R_q
     Q_lim = np.sqrt(max(g.S_max**2 - P_d**2, 0.0))
-    return sat(Q_d, -Q_lim, Q_lim)
+    return sat(Q_d, max(-Q_lim, g.Q_min), min(Q_lim, g.Q_max))
 
 
 @compiled

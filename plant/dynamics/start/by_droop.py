@@ -61,14 +61,17 @@ def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, s
     units = flow.units
     free = ~swing & flow.reduction.online
     limit = np.sqrt(np.maximum(units.S_max**2 - P**2, 0.0))
-    at_rest = VoltVarAtRest(V_set, units.m_q, units.db_UV, units.db_OV, limit)
+    low, high = np.maximum(-limit, units.Q_min), np.minimum(limit, units.Q_max)
+    at_rest = VoltVarAtRest(V_set, units.m_q, units.db_UV, units.db_OV, units.from_edge, low, high)
     place = np.where(free, at_rest.first_places(), DROOP)
     for rounds in range(MOST_ROUNDS):
         J, V, Q = _at_places(flow, J, P, Q, at_rest, place, np.flatnonzero(free), swing)
         v = units.regulated(V, J - flow.y[:, None] * V)
         right = np.where(free, at_rest.next_places(place, v, Q, rounds), DROOP)
         if np.array_equal(right, place):
-            on_droop = (place == DROOP) & (np.abs(V_set - v) <= limit * units.m_q)
+            deviation = V_set - v
+            on_droop = (place == DROOP) & (low * units.m_q <= deviation) & (deviation <= high * units.m_q)
+            on_droop &= at_rest.beyond(v) == deviation
             return DroopPowers(J, V, Q, on_droop | ~free, (place == UNDER) | (place == OVER))
         place = right
     raise PlantError(

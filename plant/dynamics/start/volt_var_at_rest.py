@@ -1,9 +1,9 @@
 """Where each inverter rests on a volt-var characteristic with a dead band (section 4.4).
 
-The characteristic jumps at the edges of its band, from 0 to db / m_q. An inverter whose droop would bring its voltage
-back into the band, and whose voltage would leave the band without it, rests at neither: its Q hunts around the one
-that holds the voltage on the edge. With that Q the characteristic has no gap and never rises with the voltage; so
-where vars raise voltages, there is one operating point, and only one.
+Unless the droop begins at the edge of its band, the characteristic jumps there, from 0 to db / m_q. An inverter whose
+droop would bring its voltage back into the band, and whose voltage would leave the band without it, rests at neither:
+its Q hunts around the one that holds the voltage on the edge. With that Q the characteristic has no gap and never rises
+with the voltage; so where vars raise voltages, there is one operating point, and only one.
 """
 
 from __future__ import annotations
@@ -33,17 +33,25 @@ class VoltVarAtRest(NamedTuple):
     """Dead bands below V_set (pu); 0 for a GFM, infinite without volt-var."""
     db_OV: Real
     """The same above V_set."""
-    limit: Real
-    """Largest reactive powers (pu)."""
+    from_edge: NDArray[np.bool_]
+    """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
+    Q_min: Real
+    """Limits of reactive power (pu)."""
+    Q_max: Real
 
     def first_places(self) -> NDArray[np.int64]:
-        """Return where the search begins: inside of every band."""
-        return np.where((self.db_UV > 0.0) | (self.db_OV > 0.0), INSIDE, DROOP)
+        """Return where the search begins: inside of every band at whose edges the characteristic jumps."""
+        return np.where(((self.db_UV > 0.0) | (self.db_OV > 0.0)) & ~self.from_edge, INSIDE, DROOP)
+
+    def beyond(self, v: Real) -> Real:
+        """Return the deviation on which the droop acts (pu): from V_set, or from the edge of the band."""
+        low = self.V_set - v
+        return np.where(self.from_edge, low - np.clip(low, -self.db_OV, self.db_UV), low)
 
     def mismatch(self, place: NDArray[np.int64], v: Real, Q: Real) -> Real:
         """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
         low = self.V_set - v
-        wanted = np.clip(low / self.m_q, -self.limit, self.limit)
+        wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
         off = (np.where(place == INSIDE, 0.0, wanted) - Q) * self.m_q
         off = np.where(place == UNDER, low - self.db_UV, off)
         return np.where(place == OVER, low + self.db_OV, off)
@@ -61,8 +69,11 @@ class VoltVarAtRest(NamedTuple):
             How often places have changed before.
         """
         low = self.V_set - v
-        within = (-self.db_OV < low) & (low < self.db_UV)
-        on_jump = np.minimum(np.where(place == UNDER, self.db_UV, self.db_OV) / self.m_q, self.limit)
+        within = (-self.db_OV < low) & (low < self.db_UV) & ~self.from_edge
+        band, limit = (
+            np.where(place == UNDER, *pair) for pair in ((self.db_UV, self.db_OV), (self.Q_max, -self.Q_min))
+        )
+        on_jump = np.minimum(band / self.m_q, limit)
         inward = np.where(place == UNDER, Q, -Q)  # of an inverter on an edge: what holds its voltage there
         edge = np.where(Q > 0.0, UNDER, OVER)
         edge = np.where(np.isinf(np.where(Q > 0.0, self.db_UV, self.db_OV)), INSIDE, edge)

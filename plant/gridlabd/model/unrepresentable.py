@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from plant.equipment import Feeder
-from plant.equipment.inverter_parameters import GfmParameters
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.own_parameters import InverterParameters
 from plant.gridlabd.model.glm_inverters import node_of
 from plant.gridlabd.model.glm_network import F_NOM
@@ -60,6 +60,12 @@ def beyond_gridlabd(own: InverterParameters) -> dict[str, str]:
             found["voltage_control"] = "false"
         if own.V_lim != GfmParameters().V_lim:  # fixed in GridLAB-D
             found["V_lim_pu"] = f"{own.V_lim:g}"
+    else:
+        if own.dead_band != "gridlabd":
+            found["dead_band"] = f'"{own.dead_band}"'
+        for key in ("Q_max", "Q_min"):  # GridLAB-D overwrites its own with what P leaves
+            if getattr(own, key) != getattr(GflParameters(), key):
+                found[f"{key}_pu"] = f"{getattr(own, key):g}"
     return found
 
 

@@ -79,6 +79,21 @@ def test_an_inverter_that_rests_nowhere_starts_on_the_edge_of_its_dead_band(sign
     assert abs(Q[1000:].mean() - q) < 0.02
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("band", "most"), [(0.02, 10.0), (0.005, 10.0), (0.005, 0.1), (0.04, 10.0)])
+def test_a_droop_from_the_edge_of_its_band_has_a_rest(band: float, most: float, sign: float) -> None:
+    """Within the band there are no vars, beyond it those of the deviation from the edge; nothing hunts."""
+    bands = replace(VOLT_VAR, db_UV=band, db_OV=band, dead_band="ieee1547", Q_max=most, Q_min=-most)
+    dynamics = started(bands, 1.0 - 0.03 * sign)
+    v, q = powers(dynamics)
+
+    droop = max(abs(1.0 - v) - band, 0.0) / M_Q
+    assert sign * q == pytest.approx(min(droop, most), abs=1e-9)
+    assert (q == pytest.approx(0.0, abs=1e-12)) == (band > 0.03)
+    assert dynamics.inverters.set_points[0, 1:].tolist() == [1.0, 0.0]
+    assert moved(dynamics) < 1e-4
+
+
 def test_an_inverter_at_its_limit_of_vars_keeps_its_set_point() -> None:
     """0.9 pu of P leave 0.44 pu of Q, where the droop asks for 1 pu: V_set stays 1 pu, and nothing moves."""
     dynamics = started(VOLT_VAR, 0.9, P=0.9)
@@ -117,7 +132,8 @@ def coupled(random: np.random.Generator) -> tuple[VoltVarAtRest, Real, Real]:
     n = 4
     X = np.cov(random.normal(0.0, 0.3, (n, 6))) + np.diag(random.uniform(0.0, 0.02, n))
     below, above = random.choice([0.0, 0.005, 0.01, 0.03, np.inf], (2, n))
-    inverters = VoltVarAtRest(np.ones(n), random.uniform(0.02, 0.1, n), below, above, np.full(n, np.inf))
+    no, most = np.zeros(n, bool), np.full(n, np.inf)
+    inverters = VoltVarAtRest(np.ones(n), random.uniform(0.02, 0.1, n), below, above, no, -most, most)
     return inverters, 1.0 + random.normal(0.0, 0.03, n), X
 
 
