@@ -15,7 +15,7 @@ from agents.agent_config import AgentConfig
 from agents.degraded_communication import SaturationDetector, StalenessWeights
 from agents.graphs import GraphError
 from agents.island_detector import IslandDetector
-from agents.laws.call import LawError, decide, start_law
+from agents.laws.call import LawError, decide, failed_at, start_law
 from agents.laws.in_force import law_in_force
 from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
 from agents.laws.law_inputs import neighbour_of, neighbours_alike, own_of
@@ -264,7 +264,8 @@ class Agent:
                     self._law_runs = True
                 P_set, V_set, shared, send = decide(self._law, own, around, config.T_c)
             except LawError as error:
-                self.fault = f"law {config.control.law.name}: {error}"
+                law = config.control.law
+                self.fault = f"law {law.name}{failed_at(self._law, error, law.folder)}: {error}"
                 return replace(self.idle_state(measurement), fault=self.fault)
             self._P_set, self._V_set = P_set * config.P_rated, V_set * config.V_nom
         send = send or measurement.t - self._sent_at >= self._silent_at_most - 1e-9

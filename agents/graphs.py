@@ -18,7 +18,7 @@ from functools import lru_cache
 from types import FunctionType
 from typing import Annotated, Any, Protocol
 
-from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.anybody import ANYTHING, line_of, named
 from wire.plugins.plugin import Plugin, callable_objection, made
 from wire.plugins.registry import PluginError, Registry
 from wire.plugins.unreplaced_output import unreplaced
@@ -260,7 +260,8 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
             result = rule(ordered)
             return {one: frozenset(result[one]) for one in result}
     except ANYTHING as error:  # a rule is foreign code
-        raise GraphError(f"graph {name} of {', '.join(ordered)} failed: {named(error)}") from error
+        members_of = ", ".join(ordered)
+        raise GraphError(f"graph {name}{line_of(rule, error)} of {members_of} failed: {named(error)}") from error
 
 
 def make_graph(plugin: Plugin) -> Graph:

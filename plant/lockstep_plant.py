@@ -343,6 +343,8 @@ class LockstepPlant(PlantNode):
 
     def _finish_tick(self, now: float) -> None:
         """Hold the set-points and advance."""
+        if self._stops_for_a_law(now):
+            return
         if self._tick_traffic is not None:
             self._tick_traffic.ticked(self.tick)
         self._states.update((state.sender, state) for state in self._late_states(self.t))

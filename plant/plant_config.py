@@ -162,6 +162,10 @@ class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Spare inverters of the run, off at the start."""
 
 
+OnLawFailure = Literal["droop", "stop"]
+"""What follows when a law fails: its inverter goes on on primary droop, or the run ends."""
+
+
 class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Configuration of the plant process (JSON on its standard input)."""
 
@@ -214,5 +218,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """How much this process notes in its journal, which a recorder gets."""
     credentials: Credentials | None = None
     """Certificate of this process and members of its site; None: links are open."""
+    on_law_failure: OnLawFailure = "droop"
+    """What follows when the law of an agent fails."""
     feeder_map: dict[str, Any] = {}
     """Wall-clock: the one-line diagram (`scenarios.live.show.feeder_map`), as a tree, for clients that draw it."""

@@ -33,6 +33,9 @@ MOST_RECORDERS = 20
 STAYS = "its inverter stays on primary droop at its last set-points"
 """State of the inverter whose agent has died."""
 
+IDLE = "; its agent is idle, its inverter stays on primary droop"
+"""End of the event of a law that failed."""
+
 
 class PlantNode(Node):
     """The plant as a participant of a run.
@@ -62,6 +65,7 @@ class PlantNode(Node):
         self.tick = 0
         """k: the plant is at k T_c."""
         self.config = config
+        self._inverters = tuple(plant.inverters)
         self._links = links
         self._end_tick = None if config.end is None else ticks_until(config.end, config.T_c)
         self._recorders: set[str] = set()
@@ -75,6 +79,8 @@ class PlantNode(Node):
         """Whether agents send the end of their journals when they close."""
         self._last_due = False
         """Whether the run has ended and the last telemetry is still to be sent."""
+        self._failed_laws: dict[str, str] = {}
+        """By agent, why its law failed."""
 
     @property
     def token(self) -> str:
@@ -192,10 +198,20 @@ class PlantNode(Node):
     def _note_state(self, state: State) -> None:
         """Note a failed law or a quiet state."""
         if state.fault:
-            text = f"{state.sender}: {state.fault}; its agent is idle, its inverter stays on primary droop"
-            self._note_event("law", state.sender, text)
+            self._failed_laws.setdefault(state.sender, state.fault)
+            self._note_event("law", state.sender, f"{state.sender}: {state.fault}{IDLE}")
         if state.quiet:
             self._reporter.note_quiet(self.t)
+
+    def _stops_for_a_law(self, now: float) -> bool:
+        """End the run if a law has failed and the scenario wants it so; return whether it ends."""
+        failed = sorted(self._failed_laws, key=self._inverters.index)
+        if not failed or self.config.on_law_failure != "stop":
+            return False
+        more = f", and {len(failed) - 1} more" if len(failed) > 1 else ""
+        why = f"{failed[0]}: {self._failed_laws[failed[0]]}{more}"
+        self.abort(printable(f"ended at t = {self.t:g} s, as on_law_failure says: {why}"), now)
+        return True
 
     def _late_states(self, now: float) -> Iterable[State]:
         """Return the usable states that the emulated links have delivered by now (s of run time)."""

@@ -35,9 +35,6 @@ if TYPE_CHECKING:
     from scenarios.live.numbers.departures import Departures
     from scenarios.results.report import RunReport
 
-_SHOWN = 3
-"""Laws that failed which a report names."""
-
 
 def run(request: Request, progress: Progress) -> RunReport:
     """Run all cases and write the whole folder.
@@ -115,6 +112,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     from scenarios.checks.judging import JudgingStop, judge_case
     from scenarios.results.evaluation.claims import judge, judged
     from scenarios.results.findings import find
+    from scenarios.results.law_failures import law_failures
     from scenarios.results.report import RunReport, plain
 
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
@@ -128,7 +126,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             labels = [window.label for window in one.disturbed]
             unlike = {"disturbed": labels, "departures": one.lines()} if one.events else {}
             notes += [f"case {case}: {one.note}"] if one.note else []
-        notes += [f"case {case}: {note}" for note in _of_laws(record, cases[case].messages_saved)]
+        notes += [f"case {case}: {note}" for note in _of_laws(cases[case].messages_saved)]
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
@@ -156,6 +154,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             verdicts=(*judge(findings, benchmark.claims), *own),
             benchmark=benchmark,
             checks=checks,
+            failures={case: law_failures(record.events) for case, record in recorded.items()},
             notes=[*notes, *_notes(recorded, request.clock)],
             folder=place + "/" if request.lasting else "",
         )
@@ -166,12 +165,8 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     return report
 
 
-def _of_laws(record: Recorded, saved: Mapping[str, float]) -> Iterator[str]:
-    """Yield notes on the laws of a case: those that failed, and states that were not sent."""
-    failed = [event for event in record.events if event.kind == "law"]
-    yield from (f"{event.text} (from t = {event.t:g} s on)" for event in failed[:_SHOWN])
-    if len(failed) > _SHOWN:
-        yield f"{len(failed) - _SHOWN} more laws failed (events.csv)"
+def _of_laws(saved: Mapping[str, float]) -> Iterator[str]:
+    """Yield a note on the states that laws did not send, if there are any."""
     if saved:
         yield "states not told to neighbours: " + ", ".join(f"{100.0 * s:.0f} % in {name}" for name, s in saved.items())
 

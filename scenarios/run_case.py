@@ -19,7 +19,7 @@ from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.figure_processes import prepare_figures
 from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.run_request import BrokenRunError, Progress, Request
+from scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
 from scenarios.schema.configs import configs
 from scenarios.schema.participants import inverters_of
 from scenarios.versions import versions
@@ -101,7 +101,8 @@ def run_case(
                     shared=request.processes,
                 )
             if outcome.broke:
-                raise BrokenRunError(f"case {case}: {outcome.broke}")
+                stopped = plant.on_law_failure == "stop" and any(event.kind == "law" for event in outcome.events)
+                raise (LawStopError if stopped else BrokenRunError)(f"case {case}: {outcome.broke}")
             recorded = recorder.finish(time.end_s, time.record_s)
             if recorder.record_failure:
                 outcome = dataclasses.replace(

@@ -20,6 +20,10 @@ class BrokenRunError(RuntimeError):
     """The run could not be finished; the folder says so too."""
 
 
+class LawStopError(BrokenRunError):
+    """A law failed, and the scenario says `on_law_failure = "stop"`."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Request(RunMetrics):
     """A run with its options; its folder is empty. Wall-clock time needs the driver "processes"."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +15,16 @@ from agents.laws.call import LawError
 from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
 from wire.plugins.anybody import ANYTHING, named
 from wire.plugins.unreplaced_output import unreplaced
+
+_forks = threading.local()
+"""Forks of this process by each of its threads: `number`."""
+
+
+def _note_fork() -> None:
+    _forks.number = getattr(_forks, "number", 0) + 1
+
+
+os.register_at_fork(after_in_parent=_note_fork)
 
 FIRST = 10.0
 """Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
@@ -41,13 +52,27 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
     Raises
     ------
     LawError
-        If it took longer.
+        If it took longer, or forked this process. The copy ends at once: it would go on as this program.
     """
+    before_forks, own = getattr(_forks, "number", 0), os.getpid()
+    try:
+        with _timed(what, seconds, limit):
+            yield
+    finally:
+        if os.getpid() != own:
+            os._exit(0)
+    if getattr(_forks, "number", 0) != before_forks:
+        raise LawError(f"{what} forked a process; start a program instead (subprocess)")
+
+
+@contextmanager
+def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         with unreplaced():
             yield
         return
     over = False
+    interrupted: BaseException | None = None
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal over
@@ -62,13 +87,14 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
                 yield
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
-    except BaseException:
+    except BaseException as error:
         if not over:
             raise
+        interrupted = error
     finally:
         signal.signal(signal.SIGALRM, before)
     if over:  # also where the law caught the interruption and returned
-        raise LawError(f"{what} took longer than {limit}")
+        raise LawError(f"{what} took longer than {limit}") from interrupted
 
 
 def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: float) -> TimeLimited:
@@ -103,34 +129,34 @@ class TimeLimited(Law):
 
     def __init__(self, law: Law, time_limit: float) -> None:
         super().__init__(**{name: getattr(law, name) for name in LIMITS})
-        self._law, self._time_limit = law, time_limit
+        self.carried, self._time_limit = law, time_limit
         self._limit = f"time_limit_s = {time_limit:g} s"
 
     def start(self, own: Own) -> None:
         """Begin as the law does."""
         with limited(f"start at t = {own.t:.6g} s", self._time_limit, self._limit):
-            self._law.start(own)
+            self.carried.start(own)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
         """Decide as the law does."""
         with limited(f"step at t = {own.t:.6g} s", self._time_limit, self._limit):
-            return self._law.step(own, neighbours, T)
+            return self.carried.step(own, neighbours, T)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
         """Return the terms that the law names."""
         with limited(f"terms at t = {own.t:.6g} s", self._time_limit, self._limit):
-            return self._law.terms(own, neighbours, T)
+            return self.carried.terms(own, neighbours, T)
 
     def close(self) -> None:
         """End the law; the run is over, so that one that fails in it is but named in the log."""
         if failed := self.close_failure():
-            logging.getLogger(__name__).warning("law %s: close failed: %s", type(self._law).__name__, failed)
+            logging.getLogger(__name__).warning("law %s: close failed: %s", type(self.carried).__name__, failed)
 
     def close_failure(self) -> str:
         """End the law, and return why it failed in it; "" if it did not."""
         try:
             with limited("it", self._time_limit, self._limit):
-                self._law.close()
+                self.carried.close()
         except LawError as error:
             return str(error)
         except ANYTHING as error:

@@ -9,7 +9,7 @@ from typing import Any
 
 from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
 from wire.bounds import MOST_SHARED, SHARED_LIMIT
-from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.anybody import ANYTHING, line_of, named
 from wire.printable import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
@@ -61,6 +61,22 @@ def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Set
         raise
     except ANYTHING as error:  # the result of a law is foreign code too: its bool(), float() or items() may raise
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}, which raised {named(error)}") from error
+
+
+def failed_at(law: Law, error: LawError, folder: str) -> str:
+    """Return where a law in Python failed, as " (mine.py:12)"; empty for a program or an FMU, which have no line here.
+
+    Parameters
+    ----------
+    law : Law
+        The law.
+    error : LawError
+        Its failure.
+    folder : str
+        Folder of the scenario: a file in it is named from there.
+    """
+    carried = getattr(law, "carried", law)
+    return "" if type(carried).__module__.startswith("agents.carriers.") else line_of(carried.step, error, folder)
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:

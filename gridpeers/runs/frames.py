@@ -10,6 +10,7 @@ from typing import Any
 import pandas as pd
 
 from scenarios.checks.check_verdict import CheckVerdict, Violation
+from scenarios.results.law_failures import LawFailure
 from scenarios.results.link_record import COLUMNS
 from scenarios.sweep.column_labels import unit_of
 
@@ -94,6 +95,14 @@ def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
 def events_frame(file: Path) -> pd.DataFrame:
     """Return the events of a run, from events.csv."""
     return _from_csv(file, {"t_s": float})
+
+
+def failures_frame(failures: Mapping[str, Iterable[LawFailure]]) -> pd.DataFrame:
+    """Return the laws that failed, by case, a row each."""
+    rows = [(case, *failure) for case, of in failures.items() for failure in of]
+    frame = pd.DataFrame(rows, columns=["case", *LawFailure._fields])
+    frame.attrs["units"] = {"t": "s"}
+    return frame
 
 
 def links_frame(file: Path) -> pd.DataFrame:

@@ -27,6 +27,7 @@ from scenarios.results.evaluation.claims import Verdict, judge, judged
 from scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History, read_history
+from scenarios.results.law_failures import law_failures
 from scenarios.results.plots.drawing import Drawing, drawing_of
 from scenarios.schema import scenario_model as model
 from scenarios.schema.plugin_keys import claims_of
@@ -114,6 +115,11 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def checks(self) -> pd.DataFrame:
         """Verdicts of the checks of all cases, a row per (case, check)."""
         return pd.concat({case: result.checks for case, result in self.items()}, names=["case"])
+
+    @property
+    def failures(self) -> pd.DataFrame:
+        """Laws that failed, a row each: case, t (s), agent, why, and line, as "mine.py:12"; empty if none did."""
+        return frames.failures_frame({case: law_failures(_plant_events(result)) for case, result in self.items()})
 
     @property
     def sha256(self) -> dict[str, str]:
@@ -235,6 +241,11 @@ class Result(_FromFolder):
     def events(self) -> pd.DataFrame:
         """Events of the plant and the agents: time t (s), kind, subject, text."""
         return self._folder.read(f"{self.case}/events.csv", frames.events_frame)
+
+    @property
+    def failures(self) -> pd.DataFrame:
+        """Laws that failed, a row each, as `Results.failures`."""
+        return frames.failures_frame({self.case: law_failures(_plant_events(self))})
 
     @cached_property
     def links(self) -> pd.DataFrame:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+import warnings
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
@@ -12,6 +13,7 @@ from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from plant.tables import read_feeder
 from scenarios.results.file_sizes import file_sizes, require_room
+from scenarios.results.law_failures import first_of
 from scenarios.results.run_files import FolderError, is_complete
 from scenarios.run import run as run_request
 from scenarios.run_request import BrokenRunError, Driver, Progress, Request
@@ -77,11 +79,19 @@ def run(
         **pace,
     )
     try:
-        run_request(request, progress or _silent)
+        report = run_request(request, progress or _silent)
     except BrokenRunError as error:
         home.keep()
-        raise BrokenRunError(f"{error}; what came until then is in {home.path}") from error
+        raise type(error)(f"{error}; what came until then is in {home.path}") from error
+    warn_of_laws({case: first_of(failures) for case, failures in report.failures.items()}, depth=2)
     return Results(home, spec, scenario.feeder)
+
+
+def warn_of_laws(failed: Mapping[str, str], depth: int) -> None:
+    """Warn once of laws that failed, given by case or run, at the line of the user: so many calls above the caller."""
+    if lines := [f"{where}: {why}" for where, why in failed.items() if why]:
+        more = f" (and in {len(lines) - 1} more)" if len(lines) > 1 else ""
+        warnings.warn(f"a law failed, {lines[0]}{more}", RuntimeWarning, stacklevel=depth + 2)
 
 
 def _silent(case: str, t: float, end: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -133,7 +134,14 @@ class Comparison:
         changes = self.changes.to_string() if len(self.changes) else "The scenarios are the same."
         table = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
         verdict = "The histories are the same, byte by byte." if self.same else "The histories differ."
-        return "\n\n".join((changes, table, verdict))
+        return "\n\n".join((*self._failures(), changes, table, verdict))
+
+    def _failures(self) -> Iterator[str]:
+        """Yield a line for each run in which a law failed: its numbers are not those of its law."""
+        for case, pair in self._pairs.items():
+            for name, run in zip(self.names, pair, strict=True):
+                if len(failed := run.failures):
+                    yield f"FAILED  {name}, case {case or run.case}: {failed['agent'][0]}: {failed['why'][0]}"
 
     def __repr__(self) -> str:
         return f"<Comparison of {' and '.join(self.names)}: {counted(len(self._pairs), 'case')}>"

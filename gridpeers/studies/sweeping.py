@@ -10,6 +10,7 @@ from typing import Any
 
 import pandas as pd
 
+from gridpeers.runs.running import warn_of_laws
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.values import plain
 from scenarios.results.evaluation.metric import METRICS
@@ -70,8 +71,9 @@ def sweep(
     Returns
     -------
     pandas.DataFrame
-        Columns: case, seed, the varied keys, `status` ("ran" or "broke") and `why`, the metrics as "WINDOW.METRIC" (nan
-        where there is no value), and without `metrics` also `history_sha256` and the like. Units are in its `attrs`.
+        Columns: case, seed, the varied keys, `status` ("ran", "broke" or "law failed") and `why`, the metrics as
+        "WINDOW.METRIC" (nan where there is no value), and without `metrics` also `history_sha256` and the like. Units
+        are in its `attrs`.
 
     Raises
     ------
@@ -96,6 +98,8 @@ def sweep(
             kept[row.number] = None if history is None else history.frame()
             if progress is not None:
                 progress(len(done), len(plan.runs))
+    failed = {f"run {number}": row.why for number, row in sorted(done.items()) if row.status == "law failed"}
+    warn_of_laws(failed, depth=1)
     frame = results_frame(plan, done).drop(columns="sample")
     if chosen is not None:
         frame = frame[_chosen(list(frame), tuple(chosen), plan)]

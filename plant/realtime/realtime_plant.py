@@ -230,6 +230,8 @@ class RealtimePlant(LivePlantNode):
         self._step_due = False
         if self.timed is not None:
             self.timed.woken(now, work=True)
+        if self._stops_for_a_law(now):
+            return True
         self.recorder_feed.replay()
         self._states.update((state.sender, state) for state in self._late_states(now * self.config.speed))
         states, self._states = self._states, {}

@@ -15,6 +15,7 @@ from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inv
 from scenarios.chaos.disturbance import Schedule
 from scenarios.chaos.disturbed_scenario import ChaosBase
 from scenarios.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
+from scenarios.checks.check_registry import LAW_FAILED
 from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.judging import judge_case
@@ -22,24 +23,23 @@ from scenarios.results.event_windows import CaseRecord
 from scenarios.results.record import Recorded
 from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
 from scenarios.run_case import run_case
-from scenarios.run_request import BrokenRunError, Driver, Request
+from scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from scenarios.schema.scenario_model import ScenarioModel
 from scenarios.sweep.sweep_case import plant_at_start
 from wire.messages import PlantEvent
 from wire.printable import utf8
 
-ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES = (
+ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "ends",
     "no_error",
-    "laws",
     "links",
     "repeats",
     "same_in_processes",
 )
-"""Questions about every run beside the checks: it reaches its end; no error of the program; no law fails; accounts of
-links balance; it repeats to the byte; processes give the bytes of one process."""
+"""Questions about every run beside the checks: it reaches its end; no error of the program; accounts of links balance;
+it repeats to the byte; processes give the bytes of one process."""
 
-ASKED = (ENDS, ERROR, LAWS, LINKS, REPEATS, SAME_IN_PROCESSES)
+ASKED = (ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES)
 """All of them."""
 
 LONGER_RUNS = 6
@@ -244,7 +244,8 @@ def _judged(
             if lack := machine_error(error, folder, disk):
                 raise lack from error
             if isinstance(error, BrokenRunError):
-                return JudgedRun(msgspec.structs.replace(row, violated={ENDS: str(error)}))
+                violated = LAW_FAILED if isinstance(error, LawStopError) else ENDS
+                return JudgedRun(msgspec.structs.replace(row, violated={violated: str(error)}))
             return JudgedRun(msgspec.structs.replace(row, violated={ERROR: f"{type(error).__name__}: {error}"}))
         restored_s = restored_from(recorded.events, scenario.protection.enter_service)
         collapses = collapses_at_changes(scenario, base.feeder, recorded.events)
@@ -256,10 +257,9 @@ def _judged(
 
 def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:
     """Return the result with the verdicts of the checks, and with what else is asked."""
-    laws = [event.text for event in recorded.events if event.kind == "law"]
     links = [*recorded.links.warnings, *sorted(recorded.links.failures)]
     unlike = "" if recorded.reproducible else "something happened that the scenario does not say"
-    asked = {ENDS: "", ERROR: unlike, LAWS: "; ".join(laws[:2]), LINKS: "; ".join(links[:2])}
+    asked = {ENDS: "", ERROR: unlike, LINKS: "; ".join(links[:2])}
     violated = {name: text for name, text in asked.items() if text}
     violated |= {it.check: it.sentence for it in verdicts if it.status == "failed"}
     passed = (

@@ -39,6 +39,7 @@ _PLACES = {
     "power_balance": "physics.balance_check:PowerBalance",
     "returns": "physics.return_check:Returned",
     "message_account": "communication.account_check:MessageAccount",
+    "law_failed": "law_check:LawFailed",
     "heal": "communication.heal_check:Rejoined",
     "stale_values": "communication.stale_check:StaleValues",
     "last_words": "communication.last_words_check:LastWords",
@@ -54,6 +55,9 @@ CHECKS: Registry[Any] = Registry(
 
 RETURNS = "returns"
 """Judges a run whose scenario asks for it: many end before an inverter that trips may return."""
+
+LAW_FAILED = "law_failed"
+"""Fails a run also without `--require-checks`: the numbers are not those of the law that the scenario names."""
 
 ALWAYS = tuple(name for name in CHECKS.own if name != RETURNS)
 """Checks that judge every run, unless its scenario switches one off."""

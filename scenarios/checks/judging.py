@@ -157,7 +157,7 @@ def _checked(violation: Any) -> Violation:
     if not isinstance(violation, Violation):
         raise TypeError(f"yielded {printable(repr(violation), 60)}; yield a gridpeers.Violation")
     return Violation(
-        text=printable(str(violation.text), 200),
+        text=printable(str(violation.text), 400),
         t=_number(violation.t),
         agent=printable(str(violation.agent), 60),
         value=_number(violation.value),

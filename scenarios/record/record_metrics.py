@@ -17,6 +17,7 @@ from scenarios.results.event_windows import CaseRecord, Window, as_they_came, me
 from scenarios.results.findings import find
 from scenarios.results.history import History
 from scenarios.results.island_membership import taken_part
+from scenarios.results.law_failures import law_failures
 from scenarios.results.report import RunReport
 from scenarios.results.steadiness import STEADY
 from scenarios.schema import ScenarioError, ScenarioModel
@@ -56,6 +57,7 @@ def report_of(record: RunRecord) -> RunReport:
         titles={case: scenario.cases[case].title},
         findings=find(scenario, feeder, {case: measured}),
         verdicts=(),
+        failures={case: law_failures(events)},
         notes=[f"case {case}: {note}" for note in (*of.notes, *_about(record))],
         folder="",
     )

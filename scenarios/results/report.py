@@ -16,6 +16,7 @@ from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchm
 from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
 from scenarios.results.findings import Findings
+from scenarios.results.law_failures import LawFailure, first_of
 from scenarios.results.metrics import SHARING, Steady
 from scenarios.results.report_table import GAP, Grid, folded
 from scenarios.results.steadiness import STEADY
@@ -45,10 +46,17 @@ class RunReport:
     """The publication of the experiment; its numbers stand beside ours."""
     checks: Mapping[str, tuple[CheckVerdict, ...]] = field(default_factory=dict)
     """Verdicts of the checks, by case."""
+    failures: Mapping[str, tuple[LawFailure, ...]] = field(default_factory=dict)
+    """Laws that failed, by case."""
     notes: Sequence[str]
     """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
     """Folder of the results; "" for one that goes with them."""
+
+    def fails(self, check: str = "") -> bool:
+        """Return whether a check fails in any case; by default any check."""
+        verdicts = (verdict for of in self.checks.values() for verdict in of)
+        return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
 
 
 _GRIDS: tuple[tuple[str, tuple[Quantity, ...]], ...] = (
@@ -83,7 +91,11 @@ def show(report: RunReport, console: Console) -> None:
 
 def _print(report: RunReport, console: Console) -> None:
     """Print the blocks of a report, with a blank line between them."""
-    blocks = [[*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)]
+    failed: list[RenderableType] = [
+        Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of
+    ]
+    blocks = [failed] if failed else []
+    blocks += [[*_rendered(grid, min(console.width, _TABLE))] for grid in grids(report)]
     if report.verdicts:
         width = max(len(verdict.claim.text) for verdict in report.verdicts)
         lines: list[RenderableType] = []

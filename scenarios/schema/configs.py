@@ -86,6 +86,7 @@ def configs(
         listen=endpoints,
         links=links,
         max_age=rule.degraded_communication.max_age or MAX_AGE,
+        on_law_failure=scenario.on_law_failure,
     )
     agents = tuple(
         AgentConfig(

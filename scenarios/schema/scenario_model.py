@@ -16,7 +16,7 @@ from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.equipment.named_loads import FACTOR
 from plant.equipment.own_parameters import OwnParameters
 from plant.helics.helics_settings import HelicsSettings
-from plant.plant_config import Method, Protection, SyncCheck
+from plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
 from plant.simulator import Simulator
 from wire.journal import RecordLevel
 from wire.schema.plausible import Plausible, Unit
@@ -252,6 +252,9 @@ class ScenarioModel(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Control law that the agents run: a name that `gridpeers doc laws` lists, "mine:Mine" for the class Mine of
     mine.py beside this file, or a table `[law]` with one of use, command = ["./mylaw"] (any program), fmu = "law.fmu",
     and with the law's parameters; time_limit_s is the longest time of one step."""
+    on_law_failure: OnLawFailure = "droop"
+    """What follows when a law, or a graph of your own, fails: "droop", its inverter goes on on primary droop, as real
+    hardware would, and the check "law_failed" fails; "stop", the run ends there. The run has failed in both cases."""
     gains: Gains = Gains()
     """Table `[gains]`: of the law "consensus", for every case."""
     degraded_communication: DegradedCommunication = DegradedCommunication()

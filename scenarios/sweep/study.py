@@ -26,6 +26,8 @@ class Summary:
     """Those that were done before."""
     broke: Counter[str]
     """How many broke, by reason."""
+    law_failed: Counter[str]
+    """In how many a law failed, by the first reason."""
     table: Path
     """The Parquet file."""
     plots: tuple[Path, ...]
@@ -69,5 +71,12 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else why
         set_broken(folder.path, f"{why} after {folder.kept} of {len(plan.runs)} runs")
         raise
-    broke = Counter(row.why for row in folder.done.values() if row.status == "broke")
-    return Summary(runs=len(plan.runs), before=before, broke=broke, table=path, plots=figures)
+    rows = folder.done.values()
+    return Summary(
+        runs=len(plan.runs),
+        before=before,
+        broke=Counter(row.why for row in rows if row.status == "broke"),
+        law_failed=Counter(row.why for row in rows if row.status == "law failed"),
+        table=path,
+        plots=figures,
+    )

@@ -24,6 +24,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History
+from scenarios.results.law_failures import first_of, law_failures
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from scenarios.results.record import Recorder
@@ -52,10 +53,10 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
 
     number: int
     """Its place in the plan, from 0."""
-    status: Literal["ran", "broke"]
-    """Whether it reached its end."""
+    status: Literal["ran", "broke", "law failed"]
+    """Whether it reached its end under its laws. Where one failed there are no measures: they would be droop's."""
     why: str = ""
-    """Why it broke."""
+    """Why it broke, or which law failed, where and why."""
     history_sha256: str = ""
     """Of the bytes that history.csv would have."""
     links_sha256: str = ""
@@ -97,8 +98,10 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     recorder = Recorder()
     ready = plant_at_start(plant) if plant.settings.simulator == "gridpeers" else None
     outcome = run_inprocess(plant, agents, recorder, plant=ready, on_links=recorder)
+    failed_laws = first_of(law_failures(outcome.events))
     if outcome.broke:
-        return SweepRow(number=number, status="broke", why=outcome.broke), None
+        status: Literal["broke", "law failed"] = "law failed" if failed_laws else "broke"
+        return SweepRow(number=number, status=status, why=outcome.broke), None
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
     record = CaseRecord.of(scenario, feeder, case, recorded)
@@ -110,10 +113,13 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     own = found.own.get(case, {})
     for label, metrics in own.items():
         measures |= flat(label, dict(metrics.values))
+    if failed_laws:
+        measures = dict.fromkeys(measures)
     failed = [f"{label}: {name} {text}" for label, metrics in own.items() for name, text in metrics.reasons.items()]
     done = SweepRow(
         number=number,
-        status="ran",
+        status="law failed" if failed_laws else "ran",
+        why=failed_laws,
         metric_warnings="; ".join(failed),
         history_sha256=recorded.sha256,
         links_sha256=links.sha256,

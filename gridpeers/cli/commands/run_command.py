@@ -86,9 +86,9 @@ def run(
 ) -> None:
     """Run a scenario and show its results, beside published ones.
 
-    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim failed (with
-    --require-checks a check, too; one that cannot be judged, or is off, has not failed), 2 bad usage or a bad file, 3
-    the run broke.
+    Exit code: 0 no claim failed (a known miss is shown, with its reason, and is no failure), 1 a claim or a law failed
+    (with --require-checks a check, too; one that cannot be judged, or is off, has not failed), 2 bad usage or a bad
+    file, 3 the run broke.
 
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
@@ -174,7 +174,7 @@ def carry_out(
     from scenarios.results.file_sizes import file_sizes, require_room
     from scenarios.results.run_files import RUNS, FolderError, new_folder, shown
     from scenarios.run import run as run_scenario
-    from scenarios.run_request import BrokenRunError, Request
+    from scenarios.run_request import BrokenRunError, LawStopError, Request
 
     try:
         if driver == "processes":
@@ -200,12 +200,14 @@ def carry_out(
         try:
             with ended_by_signals(left), progress(console, tuple(spec.cases), explanation) as tell:
                 report = run_scenario(request, tell)
+        except LawStopError as error:
+            fail([f"FAILED  {error}", *([left] if folder.is_dir() else [])], CLAIM_FAILED)
         except BrokenRunError as error:
             fail([f"the run broke: {error}", *([left] if folder.is_dir() else [])], BROKEN)
+        from scenarios.checks.check_registry import LAW_FAILED
         from scenarios.results.report import show
 
         show(report, console)
-    failed = any(verdict.status == "FAIL" for verdict in report.verdicts)
-    if require_checks:
-        failed |= any(verdict.status == "failed" for of in report.checks.values() for verdict in of)
+    failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)
+    failed |= require_checks and report.fails()
     raise typer.Exit(CLAIM_FAILED if failed else PASSED)

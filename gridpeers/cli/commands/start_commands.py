@@ -21,7 +21,7 @@ from gridpeers.cli.commands.options import (
     opened,
     usage_errors,
 )
-from gridpeers.cli.usage import BROKEN, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
+from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from scenarios.live.client.access import Access
 from wire.driver.command_line import command_line
 from wire.driver.output import watch_readers
@@ -91,6 +91,9 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
+        from dataclasses import replace
+
+        from scenarios.checks.check_registry import LAW_FAILED
         from scenarios.live.launch.link_log import LinkLog, check_new
         from scenarios.live.launch.live_folders import folders, live_record
         from scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
@@ -98,7 +101,9 @@ def _start(
         from scenarios.live.numbers.live_report import conclude
         from scenarios.record.record_info import LIVE
         from scenarios.results.file_sizes import HOUR, file_sizes, require_room
+        from scenarios.results.law_failures import first_of, law_failures
         from scenarios.results.metrics_file import RunMetrics
+        from scenarios.schema.plugin_keys import checks_off
 
         check_new(record)
         spec = chosen(spec, chosen_case(spec, case), None)
@@ -146,7 +151,9 @@ def _start(
                     scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=speed
                 )
                 outcome = conclude(outcome, metrics, kept)
-        _finish(outcome)
+            elif outcome.failed_laws:
+                typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
+        _finish(outcome if LAW_FAILED not in checks_off(spec) else replace(outcome, failed_laws=()))
 
 
 def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
@@ -162,7 +169,7 @@ def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]
 def plant(**options: Any) -> None:
     """Run the plant of a scenario in this terminal, in real time. Agents come from others.
 
-    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+    Exit code: 0 it was ended, 1 a law failed, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
     Example:  gridpeers plant islanding --keys lab --listen tls/0.0.0.0:7447
     """
@@ -175,7 +182,7 @@ def up(**options: Any) -> None:
 
     It runs until `gridpeers down` or Ctrl-C.
 
-    Exit code: 0 it was ended, 2 bad usage, 3 it broke, 130 Ctrl-C.
+    Exit code: 0 it was ended, 1 a law failed, 2 bad usage, 3 it broke, 130 Ctrl-C.
 
     Example:  gridpeers up islanding --speed 0.5
     """
@@ -233,4 +240,6 @@ def _finish(outcome: ProcessOutcome) -> None:
         code = TERMINATED if outcome.interrupted == "SIGTERM" else INTERRUPTED
         fail([f"{outcome.interrupted}: everything that was started here has ended"], code)
     if outcome.broke:
-        fail([outcome.broke], BROKEN)
+        fail([outcome.broke], CLAIM_FAILED if outcome.failed_laws else BROKEN)
+    if outcome.failed_laws:
+        raise typer.Exit(CLAIM_FAILED)

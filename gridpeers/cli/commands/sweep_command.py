@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, refuse, require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -36,8 +36,8 @@ def sweep(
 
     What comes of it is one table with plots. The same command resumes it.
 
-    Exit code: 0 done (runs that broke are rows of the table), 2 bad usage or a bad file, 3 every run broke or the
-    workers went, 130 interrupted by Ctrl-C: what is done is kept.
+    Exit code: 0 done (runs that broke are rows of the table), 1 a law failed, 2 bad usage or a bad file, 3 every run
+    broke or the workers went, 130 interrupted by Ctrl-C: what is done is kept.
 
     Example:  gridpeers sweep topology --jobs 2
     """
@@ -56,9 +56,13 @@ def sweep(
 
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
+    for line in failure_lines(summary):
+        typer.secho(line, fg="red", bold=True)
     for line in _result_lines(summary):
         typer.echo(line)
-    raise typer.Exit(BROKEN if sum(summary.broke.values()) == summary.runs else 0)
+    if sum(summary.broke.values()) == summary.runs:
+        raise typer.Exit(BROKEN)
+    raise typer.Exit(CLAIM_FAILED if summary.law_failed else PASSED)
 
 
 def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: Sequence[str]) -> Summary:
@@ -110,12 +114,20 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         fail([str(error)], BAD_INPUT)
 
 
+def failure_lines(summary: Summary) -> list[str]:
+    """Return a line for each of the first laws that failed."""
+    return [f"FAILED  {count} x {why}" for why, count in summary.law_failed.most_common(3)]
+
+
 def _result_lines(summary: Summary) -> list[str]:
     """Return the results of a sweep, in lines."""
     from scenarios.results.run_files import shown
 
     broke = sum(summary.broke.values())
-    lines = [f"{summary.runs - broke} runs reached their end" + (f", {broke} broke:" if broke else "")]
+    lines = [
+        f"{summary.runs - broke - sum(summary.law_failed.values())} runs reached their end"
+        + (f", {broke} broke:" if broke else "")
+    ]
     lines += [f"  {count} x {why}" for why, count in summary.broke.most_common(3)]
     if len(summary.broke) > 3:
         lines.append(f"  and for {len(summary.broke) - 3} more reasons: see the column why")

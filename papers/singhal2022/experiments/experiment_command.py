@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, check_choice, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, check_choice, fail, refuse, require
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -34,7 +34,7 @@ def experiment(
     It writes its figure and table, with theory beside.
     A sweep that was interrupted goes on by the same command. docs/experiments.md tells what was found.
 
-    Exit code: 0 done, 2 bad usage or a bad file, 3 a run broke, 130 interrupted by Ctrl-C.
+    Exit code: 0 done, 1 a law failed, 2 bad usage or a bad file, 3 a run broke, 130 interrupted by Ctrl-C.
 
     Example:  gridpeers experiment delay
     """
@@ -63,7 +63,7 @@ def experiment(
 
 def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
-    from gridpeers.cli.commands.sweep_command import check_packages, finish
+    from gridpeers.cli.commands.sweep_command import check_packages, failure_lines, finish
 
     check_packages()
     import pandas as pd
@@ -76,6 +76,8 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequen
     except gp.ScenarioError as error:
         refuse(error)
     summary = finish(source.sweep, plan, folder, jobs, "", again)
+    if summary.law_failed:
+        fail(failure_lines(summary), CLAIM_FAILED)
     if sum(summary.broke.values()):
         fail([f"{count} runs broke: {why}" for why, count in summary.broke.items()], BROKEN)
     return source.make(SweepData(rows=pd.read_parquet(summary.table), base=plan.base, window=plan.base.events[0].label))
@@ -98,6 +100,8 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
         fail([str(error)], BAD_INPUT)
     except gp.BrokenRunError as error:
         fail([f"the run broke: {error}"], BROKEN)
+    if len(run.failures):
+        fail([f"FAILED  {why}" for why in run.failures["why"]], CLAIM_FAILED)
     histories = {case: result.record for case, result in run.items()}
     return source.make(CaseData(scenario=scenario.spec, feeder=scenario.feeder, histories=histories))
 

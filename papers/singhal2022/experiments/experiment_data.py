@@ -157,7 +157,7 @@ class SweepData:
     def measured(self, index: str, rows: pd.DataFrame) -> Floats:
         """Return an index of some rows: infinite for a time that never came, not a number where a run broke."""
         values = rows[f"{self.window}.{index}"].to_numpy(float)
-        ran = rows["status"].to_numpy() != "broke" if "status" in rows else True
+        ran = rows["status"].to_numpy() == "ran" if "status" in rows else True
         return np.where(np.isnan(values) & ran & index.startswith("t_"), np.inf, values)
 
     def median(self, index: str, equal: Mapping[str, Any]) -> float:

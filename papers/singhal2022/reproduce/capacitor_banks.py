@@ -55,7 +55,7 @@ def study(
     found: dict[str, dict[tuple[str, str], float]] = {variant: {} for variant in BANKS}
     for row in rows.fillna(dict.fromkeys((f"{event}.MQSI" for event in EVENTS), 0.0)).to_dict("records"):
         variant = feeders[row["plant.feeder"]]
-        if row["status"] == "broke":
+        if row["status"] != "ran":
             raise RuntimeError(f"capacitor banks, {variant}, case {row['case']}: {row['why']}")
         found[variant] |= {(row["case"], event): row[f"{event}.MQSI"] for event in EVENTS}
     return dict(found)

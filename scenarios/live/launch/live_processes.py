@@ -35,7 +35,7 @@ from scenarios.results.record import Recorded
 from scenarios.short_names import short
 from wire.driver.drive import StoppedError
 from wire.driver.stop_signal import StopSignal, stop_at_signals
-from wire.messages import PLANT, Pacing
+from wire.messages import PLANT, Pacing, PlantEvent
 from wire.printable import printable
 from wire.rate_limit import RateLimit
 
@@ -69,6 +69,8 @@ class ProcessOutcome:
     """The record, if it is whole."""
     pacing: Pacing | None = None
     """How well the plant kept pace, if it ran."""
+    failed_laws: tuple[PlantEvent, ...] = ()
+    """The first failure of each agent's law."""
 
 
 def meaning(word: str, config: PlantConfig) -> str:
@@ -277,7 +279,11 @@ def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str], requests
         if recorder.recorded is None:  # a whole record has its numbers
             broke = recorder.failure
     return ProcessOutcome(
-        broke=broke, interrupted=interrupted, recorded=recorder.recorded, pacing=recorder.client.pacing
+        broke=broke,
+        interrupted=interrupted,
+        recorded=recorder.recorded,
+        pacing=recorder.client.pacing,
+        failed_laws=tuple(recorder.failed_laws.values()),
     )
 
 

@@ -16,7 +16,7 @@ from scenarios.record.record_info import RecordInfo
 from scenarios.results.record import Recorded, Recorder, RecordError
 from wire.driver.free_lists import FreeLists
 from wire.driver.large_blocks import keep_out_of_the_heap
-from wire.messages import LinkRequest, Telemetry
+from wire.messages import LinkRequest, PlantEvent, Telemetry
 from wire.rate_limit import RateLimit
 from wire.trust.credentials import Credentials
 
@@ -69,6 +69,8 @@ class LiveRecorder:
         """The record, once it is closed, if it is whole."""
         self.failure = ""
         """Why something could not be recorded: the first reason; "" if everything was."""
+        self.failed_laws: dict[str, PlantEvent] = {}
+        """By agent, the first failure of its law."""
         self.cut_short = ""
         """Why the plant's last message does not come, if that is known."""
         self._limit = RateLimit()
@@ -151,6 +153,8 @@ class LiveRecorder:
 
     def _say_events(self, telemetry: Telemetry) -> None:
         for event in telemetry.events:
+            if event.kind == "law":
+                self.failed_laws.setdefault(event.subject, event)
             if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
                 self._say(line)
         if telemetry.final:  # before the terminal says that the run has ended

@@ -18,6 +18,7 @@ from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchm
 from scenarios.results.event_windows import CaseRecord, Window, late_moves
 from scenarios.results.findings import find
 from scenarios.results.island_membership import taken_part
+from scenarios.results.law_failures import law_failures
 from scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
 from scenarios.results.record import Recorded
 from scenarios.results.report import RunReport, plain, show
@@ -62,6 +63,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
         verdicts=(),
         benchmark=NO_BENCHMARK if departures.disturbed else benchmark_of(scenario.paper),
         checks=checks,
+        failures={case: law_failures(recorded.events)},
         notes=[f"case {case}: {note}" for note in _notes(scenario, recorded, departures)],
         folder=shown(metrics.folder) + "/",
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import sys
 from typing import Annotated, Any
 
@@ -70,6 +71,11 @@ class Failing(gp.Law):
                 return gp.SetPoints(0.5, 1.0, None)  # type: ignore[arg-type]
             case "shares an array":
                 return gp.SetPoints(0.5, 1.0, np.array([1.0, 2.0]))  # type: ignore[arg-type]
+            case "forks":
+                os.fork()
+                return gp.SetPoints(own.P_set, own.V_set)
+            case "fails late":
+                return gp.SetPoints(own.P_set, own.V_set) if own.t < 1.47 else gp.SetPoints([][0], 1.0)
             case "hangs":
                 while True:
                     pass

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any, Literal
+
+import pytest
 
 import gridpeers as gp
 
@@ -24,3 +27,11 @@ def islanding(law: str = "consensus", *, short: bool = False, **parameters: Any)
 def written(law: Any, *, driver: Driver = "inprocess") -> gp.Result:
     """Result of the short scenario with a law as a scenario writes it."""
     return gp.load("islanding").replace({"case.IV.law": law, **SHORT}).run("IV", driver=driver)
+
+
+def failed(law: Any, *, driver: Driver = "inprocess") -> gp.Result:
+    """The same of a law that fails: one warning tells it."""
+    with pytest.warns(RuntimeWarning, match="a law failed, IV: inv1 at t = ") as told:
+        result = written(law, driver=driver)
+    assert [Path(warning.filename).name for warning in told] == ["law_runs.py"]
+    return result

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import gridpeers as gp
-from tests.conformance.laws.law_runs import SHORT, islanding, written
+from tests.conformance.laws.law_runs import SHORT, Driver, failed, islanding, written
 from tests.conformance.laws.test_carriers import PATIENT, PROGRAM
 
 BAD = "tests.conformance.laws.bad_laws"
@@ -35,17 +37,119 @@ BAD = "tests.conformance.laws.bad_laws"
     ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
     ("shares too much", r"step at t = 1.2 s shares .*; share at most 16 numbers by name"),
     ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
+    ("forks", r"step at t = 1.2 s forked a process; start a program instead \(subprocess\)"),
 ])  # fmt: skip
 def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:
     """A failing step gives one line of every agent in events.csv, primary droop from then on, a history to the end."""
     limit = {"time_limit_s": 0.3} if how.startswith("hangs") else {}  # the default is out of a starved machine's reach
-    result = written({"use": f"{BAD}:Failing", "how": how, **limit})
+    result = failed({"use": f"{BAD}:Failing", "how": how, **limit})
     told = result.events[result.events["kind"] == "law"]
 
     assert list(told["subject"]) == [f"inv{i}" for i in range(1, 10)]
-    assert all(re.search(f"law {BAD}:Failing: {said}; its agent is idle", text) for text in told["text"]), told
+    line = r"\(\S*bad_laws.py:\d+\)"
+    assert all(re.search(f"law {BAD}:Failing {line}: {said}; its agent is idle", text) for text in told["text"]), told
     assert result.history.index[-1] == 1.5
     assert 59.0 < result.history["inv1"]["f"].iloc[-1] < 60.0
+
+
+MINE = """import gridpeers as gp
+
+class Mine(gp.Law):
+    def step(self, own, neighbours, T):
+        return gp.SetPoints(share(own), own.V_set)
+
+def share(own):
+    return own.P_set / (0.0 if own.t > 1.{late} else 1.0)
+
+def star(members):
+    hub = "inv1" if len(members) == 9 else members["nobody"]
+    return {{name: {{hub}} - {{name}} for name in members}}
+"""
+"""A law that fails in its line 8, and a graph that fails in its line 11."""
+
+
+@pytest.fixture
+def mine(tmp_path: Path) -> str:
+    """Folder with the module late_laws, which fails in the last tick but one, and early_laws."""
+    (tmp_path / "late_laws.py").write_text(MINE.format(late=47))
+    (tmp_path / "early_laws.py").write_text(MINE.format(late=2))
+    return str(tmp_path)
+
+
+@pytest.mark.parametrize("driver", ["inprocess", "processes"])
+def test_a_law_that_fails_in_the_last_tick_fails_the_run(mine: str, driver: Driver) -> None:
+    """The check, the report and the table name its file and line, as the scenario sees it, also at 1.48 of 1.5 s."""
+    result = failed({"use": "late_laws:Mine", "folder": mine}, driver=driver)
+    why = r"law late_laws:Mine \(late_laws.py:8\): step at t = 1.48 s raised ZeroDivisionError: float division by zero"
+
+    assert result.checks.loc["law_failed", "status"] == "failed"
+    assert re.match(rf"FAILED  case IV: inv1 at t = 1.48 s: {why}; and 8 more\n", result.report), result.report
+    assert list(result.failures["agent"]) == [f"inv{i}" for i in range(1, 10)]
+    assert set(result.failures["line"]) == {"late_laws.py:8"}
+    assert (set(result.failures["t"]), set(result.failures["case"])) == ({1.48}, {"IV"})
+    assert result.history.index[-1] == 1.5
+
+
+@pytest.mark.parametrize("driver", ["inprocess", "processes"])
+def test_a_law_that_fails_ends_the_run_where_the_scenario_wants_that(mine: str, driver: Driver) -> None:
+    """`on_law_failure = "stop"`: the run ends at the tick of the failure, which its error names with file and line."""
+    law = {"use": "early_laws:Mine", "folder": mine}
+    stopping = gp.load("islanding").replace({"case.IV.law": law, **SHORT, "on_law_failure": "stop"})
+
+    with pytest.raises(gp.BrokenRunError, match=r"at t = 1.22 s, .* inv1: law early_laws:Mine \(early_laws.py:8\): st"):
+        stopping.run("IV", driver=driver)
+
+
+def test_a_sweep_whose_law_fails_has_no_numbers(mine: str) -> None:
+    """Its row says `law failed` and why; without their own law they would be droop's. It warns once of all runs."""
+    law = {"use": "early_laws:Mine", "folder": mine}
+    base = gp.load("islanding").replace({"case.IV.law": law, **SHORT})
+
+    with pytest.warns(RuntimeWarning, match=r"a law failed, run 2: inv1 at .* \(early_laws.py:8\).*in 1 more") as told:
+        table = gp.sweep(base, {"case.IV.law": ["dapi", law], "on_law_failure": ["droop", "stop"]}, cases="IV", jobs=1)
+
+    assert len(told) == 1
+    assert list(table["status"]) == ["ran", "ran", "law failed", "law failed"]
+    assert list(table["why"].str.contains("early_laws.py:8", regex=False).fillna(value=False)) == [
+        False,
+        False,
+        True,
+        True,
+    ]
+    assert list(table["event1.f_error_Hz"].isna()) == [False, False, True, True]
+
+
+def test_a_copy_of_the_program_that_a_law_forks_ends_at_once(tmp_path: Path) -> None:
+    """Nine laws that fork in their first step: one report, in which all have failed, and exit code 1."""
+    law = "import os\nimport gridpeers as gp\n\nclass Mine(gp.Law):\n    def step(self, own, neighbours, T):\n"
+    law += "        if pid := os.fork():\n            os.waitpid(pid, 0)\n"
+    law += "        return gp.SetPoints(own.P_set, own.V_set)\n"
+    (tmp_path / "mine.py").write_text(law)
+    text = gp.load("islanding").replace(SHORT).to_toml().replace('law = "consensus"', 'law = "mine:Mine"')
+    (tmp_path / "mine.toml").write_text(text)
+
+    words = ["run", "mine.toml", "--case", "IV", "--driver", "inprocess"]
+    done = subprocess.run([sys.executable, "-m", "gridpeers", *words], cwd=tmp_path, capture_output=True, text=True)
+
+    why = r"FAILED  case IV: inv1 at t = 1.02 s: law mine:Mine \(mine.py:5\): step at t = 1.02 s forked a process; .*"
+    assert (done.returncode, done.stdout.count("CHECKS"), done.stderr) == (1, 1, ""), done
+    assert re.search(why, done.stdout), done.stdout
+
+
+@pytest.mark.parametrize("driver", ["inprocess", "processes"])
+def test_a_graph_that_fails_in_a_run_is_a_failure_like_a_law(mine: str, driver: Driver) -> None:
+    """The scenario kills an agent: the roster that is left is one that its check has not seen."""
+    dies = {"name": "inv9", "kill": True, "from_s": 1.2}
+    graph = {"use": "late_laws:star", "folder": mine}
+    scenario = gp.load("islanding").replace({**SHORT, "case.IV.graph": graph, "node": [dies]})
+
+    with pytest.warns(
+        RuntimeWarning, match=r"inv1 at t = 1.20 s: graph late_laws:star \(late_laws.py:11\) of inv1, inv2"
+    ):
+        result = scenario.run("IV", driver=driver)
+
+    assert result.checks.loc["law_failed", "status"] == "failed"
+    assert list(result.failures["line"]) == ["late_laws.py:11"] * 8
 
 
 @pytest.mark.parametrize(("failure", "said"), [
@@ -61,7 +165,7 @@ def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) ->
 def test_a_program_that_fails_is_named_and_leaves_no_process(failure: str, said: str) -> None:
     """Rubbish, a wrong answer, an error of its own, death or silence."""
     limit = {"time_limit_s": 0.5} if failure == "hangs" else PATIENT
-    result = written({"command": [*PROGRAM["command"], failure], **limit})
+    result = failed({"command": [*PROGRAM["command"], failure], **limit})
     told = list(result.events[result.events["kind"] == "law"]["text"])
 
     assert len(told) == 9
@@ -201,7 +305,7 @@ def test_a_module_that_was_edited_is_read_again(tmp_path: Path) -> None:
 def test_a_module_of_another_scenario_is_not_taken_for_ones_own(tmp_path: Path) -> None:
     """Two projects may each have a module of the same name; none finds the other's by chance."""
     (tmp_path / "theirs.py").write_text("from tests.conformance.laws.bad_laws import Failing\n")
-    written({"use": "theirs:Failing", "folder": str(tmp_path), "how": "raises"})
+    failed({"use": "theirs:Failing", "folder": str(tmp_path), "how": "raises"})
 
     with pytest.raises(gp.ScenarioError, match=r'there is no module "theirs" in .* on the Python path'):
         written({"use": "theirs:Failing", "folder": str(tmp_path.parent), "how": "raises"})

@@ -282,3 +282,23 @@ def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> N
         for process in started:
             process.kill()
             process.communicate()
+
+
+@pytest.mark.parametrize("out", ["--out", ""])
+def test_a_law_that_fails_in_a_live_run_is_exit_code_1_and_named_by_file_and_line(desk: Desk, out: str) -> None:
+    """Two of nine laws fail as the island forms. The report says it first; without one the last line does."""
+    law = "import gridpeers as gp\n\nclass Mine(gp.Law):\n    def step(self, own, neighbours, T):\n"
+    law += "        return gp.SetPoints(own.P_set / (own.name > 'inv2'), own.V_set)\n"
+    (desk.folder / "mine.py").write_text(law)
+    (desk.folder / "events.toml").write_text(f'law = "mine:Mine"\n{EVENTS}')
+    words = ["--run", "lab", "--listen", desk.options[-1], *((out, "here") if out else ())]
+    up = desk.open_bare("up", "events.toml", *words)
+    for name in ("inv1", "inv2"):
+        up.shows(f"{name}: law mine:Mine (mine.py:5): step at t = ")
+
+    assert desk.type("down")[0] == 0
+    assert up.end() == 1
+    why = r"inv[12] at t = .* s: law mine:Mine \(mine.py:5\): step at t = .* and 1 more"
+    up.expect(rf"FAILED  (case IV: )?{why}")
+    if out:
+        assert re.match(f"FAILED  case IV: {why}\n", (desk.folder / "here" / "report.txt").read_text())

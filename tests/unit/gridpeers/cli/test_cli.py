@@ -239,6 +239,39 @@ def test_a_required_check_that_fails_is_exit_code_1_and_one_that_is_not_judged_i
     assert "last_words switched off" in text
 
 
+FAILING = """import gridpeers as gp
+
+class Mine(gp.Law):
+    def step(self, own, neighbours, T):
+        return gp.SetPoints(own.P_set / 0.0, own.V_set)
+"""
+
+
+@pytest.mark.parametrize(("top", "exit_code", "line"), [
+    ("", 1, "FAILED  case IV: inv1 at t = 1.02 s: law mine:Mine (mine.py:5): step at t = 1.02 s raised ZeroDivis"),
+    ('on_law_failure = "stop"', 1, "FAILED  case IV: ended at t = 1.02 s, as on_law_failure says: inv1: law mine"),
+    ('checks = [{ use = "law_failed", off = true }]', 0, "FAILED  case IV: inv1 at t = 1.02 s: law mine:Mine ("),
+])  # fmt: skip
+def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
+    top: str, exit_code: int, line: str, elsewhere: Path
+) -> None:
+    """Whoever switches its check off has it said all the same; `compare` says it of a run, too."""
+    (elsewhere / "mine.py").write_text(FAILING)
+    case = '[case.IV]\nsecondary = "all"\ngraph = "full"\n'
+    text = SHORT.partition("[case.I]")[0].replace('paper = "islanding"', 'law = "mine:Mine"')
+    (elsewhere / "short.toml").write_text(f"{top}\n{text}{case}")
+
+    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
+
+    assert code == exit_code, text
+    shown = [one for one in text.splitlines() if not one.startswith("case IV: 1.2 s simulated")]
+    assert shown[0].removeprefix("gridpeers: ").startswith(line), text
+    if "stop" not in top:
+        assert (elsewhere / "here" / "report.txt").read_text().startswith(line)
+        compared = invoke("compare", "here", "here", "--out", "c.png")[1]
+        assert compared.startswith("FAILED  first, case IV: inv1: law mine:Mine (mine.py:5): step"), compared
+
+
 def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
     elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -318,7 +318,7 @@ def test_the_report_of_a_run_has_the_verdict() -> None:
     """A line for each case, in report.txt and on the terminal."""
     lines = [line for line in ran().report.splitlines() if line.startswith("CHECKS")]
 
-    assert lines == ["CHECKS  case IV: 11 of 11 checks passed, 1 not judged"]
+    assert lines == ["CHECKS  case IV: 12 of 12 checks passed, 1 not judged"]
 
 
 def test_a_folder_without_verdicts_is_judged_when_it_is_asked(tmp_path: Path) -> None:

@@ -1,0 +1,63 @@
+"""The laws, and graphs of a user, that failed in a run, from its events."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from agents.graphs import natural_order
+from plant.plant_node import IDLE
+from wire.messages import PlantEvent
+
+_LINE = re.compile(r"(?:law|graph) .*? \((?P<line>[^()]+:\d+)\)(?::| of )")
+"""Beginning of the reason of a failure whose line is known."""
+
+
+class LawFailure(NamedTuple):
+    """One law that failed.
+
+    Examples
+    --------
+    >>> why = "law mine:Mine (mine.py:12): step at t = 1.2 s raised ZeroDivisionError: division by zero"
+    >>> (failure,) = law_failures([PlantEvent(t=1.2, kind="law", subject="inv1", text=f"inv1: {why}{IDLE}")])
+    >>> failure.line, failure.sentence == f"inv1 at t = 1.20 s: {why}"
+    ('mine.py:12', True)
+    """
+
+    t: float
+    """When (s of run time)."""
+    agent: str
+    """Its agent."""
+    why: str
+    """Which law, and why."""
+    line: str
+    """File and line, as "mine.py:12"; empty of a program or an FMU."""
+
+    @property
+    def sentence(self) -> str:
+        """The failure on one line."""
+        return f"{self.agent} at t = {self.t:.2f} s: {self.why}"
+
+
+def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
+    """Return the failures among the events of a case, the first one first."""
+    found = []
+    for event in events:
+        if event.kind == "law":
+            why = event.text.removeprefix(f"{event.subject}: ").removesuffix(IDLE)
+            line = _LINE.match(why)
+            found.append(LawFailure(event.t, event.subject, why, line["line"] if line else ""))
+    return tuple(sorted(found, key=lambda failure: (failure.t, natural_order(failure.agent))))
+
+
+def first_of(failures: tuple[LawFailure, ...]) -> str:
+    """Return the first failure on one line, and how many more there are; empty without any.
+
+    Examples
+    --------
+    >>> first_of((LawFailure(1.2, "inv1", "law mine: no idea", ""), LawFailure(1.2, "inv2", "law mine: no idea", "")))
+    'inv1 at t = 1.20 s: law mine: no idea; and 1 more'
+    """
+    more = f"; and {len(failures) - 1} more" if len(failures) > 1 else ""
+    return failures[0].sentence + more if failures else ""

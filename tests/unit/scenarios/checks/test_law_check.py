@@ -1,0 +1,36 @@
+"""The check of laws: a law that fails fails the run, a run without one is not judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from plant.plant_node import IDLE
+from tests.unit.scenarios.checks.cases import ran, verdict
+from wire.messages import PlantEvent
+
+
+def test_a_run_whose_laws_decide_to_the_end_passes() -> None:
+    """Full coordination, where every inverter has a law."""
+    assert verdict(ran().checked_case, "law_failed").sentence == "law_failed passed"
+
+
+def test_each_law_that_fails_is_a_violation_in_the_order_of_time() -> None:
+    """It names the agent, the time, and the line of the law; agents come in the order of the inverters."""
+    why = "law mine:Mine (mine.py:12): step at t = 1.2 s raised ValueError: no"
+    events = [
+        PlantEvent(t=t, kind="law", subject=name, text=f"{name}: {why}{IDLE}")
+        for t, name in ((1.4, "inv1"), (1.2, "inv10"), (1.2, "inv2"))
+    ]
+
+    found = verdict(replace(ran().checked_case, events=tuple(events)), "law_failed")
+
+    assert (found.status, found.count) == ("failed", 3)
+    assert [(it.t, it.agent) for it in found.violations] == [(1.2, "inv2"), (1.2, "inv10"), (1.4, "inv1")]
+    assert found.violations[0].text == why
+
+
+def test_a_run_without_secondary_control_is_not_judged() -> None:
+    """Droop alone has no law that could fail."""
+    found = verdict(ran(case="I").checked_case, "law_failed")
+
+    assert (found.status, found.reason) == ("not judged", "no inverter runs a law")
