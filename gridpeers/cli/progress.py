@@ -42,7 +42,7 @@ def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPIL
     explanation : str, optional
         Why a start may take long.
     """
-    with explained(lambda: console.print(explanation, highlight=False, soft_wrap=True)) as started:
+    with explained(lambda: console.print(explanation, soft_wrap=True)) as started:
         if console.is_terminal:
             with _bars(console, cases) as tell:
                 yield _both(started, tell)
@@ -82,7 +82,7 @@ def explained_work(explain: Callable[[], None]) -> Iterator[None]:
 @contextmanager
 def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
     columns = (
-        TextColumn("case {task.fields[case]:4}"),
+        TextColumn("case {task.fields[case]:4}", markup=False),
         BarColumn(bar_width=40),
         TextColumn("{task.completed:4.1f} of {task.total:g} s simulated"),
         TimeElapsedColumn(),
@@ -107,7 +107,7 @@ def _lines(console: Console) -> Tell:
         if t >= end and case not in done:
             done.add(case)
             took = time.monotonic() - began[case]
-            console.print(f"case {case}: {end:g} s simulated in {took:.1f} s", markup=False, highlight=False)
+            console.print(f"case {case}: {end:g} s simulated in {took:.1f} s")
 
     return tell
 

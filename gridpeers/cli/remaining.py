@@ -130,6 +130,6 @@ def _lines(console: Console, pace: _Pace) -> Tell:
         left = pace.left(done)
         words = f", about {duration(round(left))} left" if left is not None else ""
         text = f"{what}: {100.0 * done / pace.total:.0f} % done{words}"
-        console.print(text, markup=False, highlight=False, soft_wrap=True)
+        console.print(text, soft_wrap=True)
 
     return tell

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
+from scenarios.console import terminal as terminal
+
 if TYPE_CHECKING:
     from plant.equipment import Feeder
     from plant.tables import FeederError

@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from io import StringIO
 
 from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from scenarios.console import text_of as printed_text
 from scenarios.explanation.explanation import Explanation, NeighbourAccount
 from scenarios.explanation.law_step import QuantityStep
 from scenarios.explanation.trail import Quantity, TrailStep
-
-_WIDE = 10_000
-"""Characters of a line that no table reaches: text in a file is not wrapped."""
 
 SHOWN = 12
 """Most terms that stand in a row of their own: the others are summed."""
@@ -24,9 +21,7 @@ _SIDES = {1: "cannot deliver more", -1: "cannot deliver less"}
 
 def text_of(explanation: Explanation, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()) -> str:
     """Return the plain text of an explanation, and of trails from it."""
-    text = StringIO()
-    print_explanation(explanation, Console(file=text, width=_WIDE, color_system=None), trails)
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n")).rstrip("\n")
+    return printed_text(lambda console: print_explanation(explanation, console, trails)).rstrip("\n")
 
 
 def show(
@@ -36,7 +31,7 @@ def show(
     if console.is_terminal:
         print_explanation(explanation, console, trails)
     else:
-        console.print(text_of(explanation, trails), markup=False, highlight=False, soft_wrap=True)
+        console.print(text_of(explanation, trails), soft_wrap=True)
 
 
 def print_explanation(
@@ -57,7 +52,7 @@ def print_explanation(
             console.print()
         number += bool(lines)
         for line in lines:
-            console.print(line, markup=False, highlight=False, soft_wrap=not isinstance(line, Table))
+            console.print(line, soft_wrap=not isinstance(line, Table))
 
 
 def _head(it: Explanation) -> Iterator[RenderableType]:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from io import StringIO
 
 from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
 from scenarios.checks.check_verdict import CheckVerdict, summary
+from scenarios.console import text_of
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
 from scenarios.results.evaluation.claims import Verdict
 from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
@@ -20,9 +20,6 @@ from scenarios.results.law_failures import LawFailure, first_of
 from scenarios.results.metrics import SHARING, Steady
 from scenarios.results.report_table import GAP, Grid, folded
 from scenarios.results.steadiness import STEADY
-
-_WIDE = 10_000
-"""Characters of a line that nobody's sentence reaches: text in a file is not wrapped."""
 
 _TABLE = 140
 """Characters of a table in a file: with four events it would have 200 and more."""
@@ -76,9 +73,7 @@ def grids(report: RunReport) -> tuple[Grid, ...]:
 
 def plain(report: RunReport) -> str:
     """Return the text of a report for files, pipes and logs."""
-    text = StringIO()
-    _print(report, Console(file=text, width=_WIDE, color_system=None))
-    return "\n".join(line.rstrip() for line in text.getvalue().split("\n"))
+    return text_of(lambda console: _print(report, console))
 
 
 def show(report: RunReport, console: Console) -> None:
@@ -86,7 +81,7 @@ def show(report: RunReport, console: Console) -> None:
     if console.is_terminal:
         _print(report, console)
     else:
-        console.print(plain(report), end="", markup=False, highlight=False, soft_wrap=True)
+        console.print(plain(report), end="", soft_wrap=True)
 
 
 def _print(report: RunReport, console: Console) -> None:
@@ -113,7 +108,7 @@ def _print(report: RunReport, console: Console) -> None:
         if number:
             console.print()
         for line in block:
-            console.print(line, markup=False, highlight=False, soft_wrap=not isinstance(line, Table))
+            console.print(line, soft_wrap=not isinstance(line, Table))
 
 
 def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:

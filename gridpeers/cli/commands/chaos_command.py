@@ -10,7 +10,18 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, ScenarioName, chosen, fail, load, require
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    PASSED,
+    ScenarioName,
+    chosen,
+    fail,
+    load,
+    require,
+    terminal,
+)
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -74,8 +85,6 @@ def chaos(
     spec = chosen(spec, case or list(spec.cases)[-1], None)
     _refuse_unless_possible(scenario, spec, case, driver)
     require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
-    from rich.console import Console
-
     from scenarios.chaos.campaign import Campaign
     from scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
     from scenarios.chaos.disturbed_scenario import ChaosBase
@@ -103,7 +112,7 @@ def chaos(
                 [f"--resume {resume}: {error.strerror}; a campaign goes on where its folder can be written"], BAD_INPUT
             )
         fail([f"--out {out or RUNS_FOLDER}: {error.strerror}; give another folder"], BAD_INPUT)
-    console = Console()
+    console = terminal()
     with _kept_if_ended(campaign, rows, resume, scenario):
         _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
@@ -181,7 +190,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
-    with explained_work(lambda: console.print(TRYING, highlight=False, soft_wrap=True)):
+    with explained_work(lambda: console.print(TRYING, soft_wrap=True)):
         row = undisturbed(campaign)
     if row.violated:
         off = ", ".join(f'{{ use = "{check}", off = true }}' for check in row.violated if check in ALWAYS)

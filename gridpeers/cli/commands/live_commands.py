@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
 from scenarios.live.client.access import Access
 
 
@@ -50,11 +50,9 @@ def watch(
 
         check_duration(duration)
     with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
-        from rich.console import Console
-
         from scenarios.live.show.watching import watch as watch_run
 
-        watch_run(client, Console(), duration)
+        watch_run(client, terminal(), duration)
 
 
 def stop(

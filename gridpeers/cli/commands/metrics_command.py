@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import BAD_INPUT, fail, require, terminal
 
 
 def metrics(
@@ -27,8 +27,6 @@ def metrics(
     """
     require({"mcap": "the record of a run"})
 
-    from rich.console import Console
-
     from scenarios.record.record_metrics import report_of
     from scenarios.record.record_reader import RecordFileError, RunRecord
     from scenarios.results.report import show
@@ -37,4 +35,4 @@ def metrics(
         report = report_of(RunRecord.open(run, case))
     except RecordFileError as error:
         fail([str(error)], BAD_INPUT)
-    show(report, Console())
+    show(report, terminal())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, CLAIM_FAILED, fail, require
+from gridpeers.cli.usage import BAD_INPUT, CLAIM_FAILED, fail, require, terminal
 
 if TYPE_CHECKING:
     from scenarios.record.record_reader import RunRecord
@@ -144,8 +144,6 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from datetime import datetime
 
-    from rich.console import Console
-
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.studies.replaying import counterfactual_in
@@ -159,7 +157,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     typer.echo(f"{_about(record)}: {changes}")
     folder = new_folder(out, f"{record.info.scenario}-replay", datetime.now().astimezone())
     with ended_by_signals(f"what came until then is in {shown(folder)}/"), broken_if_ended(folder):
-        with progress(Console(), (record.info.case,)) as tell:
+        with progress(terminal(), (record.info.case,)) as tell:
             done = counterfactual_in(record, rule, folder, tell=tell)
         typer.echo(str(done))
         write_whole(folder / "comparison.txt", f"{changes}\n\n{done}\n")

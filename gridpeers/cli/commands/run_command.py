@@ -21,6 +21,7 @@ from gridpeers.cli.usage import (
     refuse,
     require,
     require_loadable,
+    terminal,
 )
 from plant.simulator import Simulator
 
@@ -166,8 +167,6 @@ def carry_out(
     if federate:
         require_loadable("helics", "a HELICS federate")
 
-    from rich.console import Console
-
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import COMPILING, RESTING, progress
     from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
@@ -185,7 +184,7 @@ def carry_out(
     except (ListenError, FolderError) as error:
         fail([str(error)], BAD_INPUT)
 
-    console = Console()
+    console = terminal()
     if sizes.sentence:
         typer.echo(f"{spec.name}: {sizes.sentence}")
     broker = spec.plant.helics.broker

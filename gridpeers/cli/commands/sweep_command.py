@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, refuse, require, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -83,8 +83,6 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     again : sequence of str
         Words of the command that goes on with what was interrupted.
     """
-    from rich.console import Console
-
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import BASIS_RUNS, remaining
     from scenarios.results.run_files import FolderError, refusal, shown
@@ -93,10 +91,10 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     from scenarios.sweep.workers import WorkersError, cores
     from wire.driver.command_line import command_line
 
-    console = Console()
+    console = terminal()
     try:
         with interruptible(), SweepFolder(path, plan) as folder:
-            console.print(_size(file, plan, len(folder.done)), markup=False, highlight=False, soft_wrap=True)
+            console.print(_size(file, plan, len(folder.done)), soft_wrap=True)
             try:
                 with remaining(console, size := len(plan.runs), BASIS_RUNS) as tell:
 

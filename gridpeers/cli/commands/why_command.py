@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import BAD_INPUT, fail, require, terminal
 
 
 def why(
@@ -34,8 +34,6 @@ def why(
     """
     require({"mcap": "the record of a run"})
 
-    from rich.console import Console
-
     from scenarios.explanation.explanation import explain
     from scenarios.explanation.explanation_text import show
     from scenarios.explanation.trail import trail
@@ -49,4 +47,4 @@ def why(
         trails = [(name, trail(record, explanation.decision, name, hops)) for name in ("P_set", "V_set") if follow]
     except RecordFileError as error:
         fail([str(error)], BAD_INPUT)
-    show(explanation, Console(), trails)  # type: ignore[arg-type]  # the names are those of a trail
+    show(explanation, terminal(), trails)  # type: ignore[arg-type]  # the names are those of a trail

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, check_choice, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, check_choice, fail, refuse, require, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -85,8 +85,6 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequen
 
 def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
-    from rich.console import Console
-
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.output_folders import shown
@@ -94,7 +92,7 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
 
     scenario, left = gp.load(source.scenario), f"what came until then is in {shown(folder)}/"
     try:
-        with ended_by_signals(left), progress(Console(), tuple(scenario.cases)) as tell:
+        with ended_by_signals(left), progress(terminal(), tuple(scenario.cases)) as tell:
             run = scenario.run(progress=tell, folder=folder)
     except gp.FolderError as error:
         fail([str(error)], BAD_INPUT)

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, check_choice, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, check_choice, fail, refuse, require, terminal
 from papers.singhal2022.reproduce.parts import CHOICES, chosen
 
 _NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
@@ -56,8 +56,6 @@ def _reproduce(
 ) -> None:
     from datetime import datetime
 
-    from rich.console import Console
-
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
@@ -71,7 +69,7 @@ def _reproduce(
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
 
-    console = Console()
+    console = terminal()
     work = Work(chosen(only), driver, folder / "runs", seed, jobs)
     results = []
     try:
@@ -101,8 +99,8 @@ def _reproduce(
         set_broken(folder, "interrupted")
         fail([f"interrupted; what came until then is in {shown(folder)}/"], exit_code(error))
     for line in _summary(whole):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
-    console.print(f"Report: {shown(folder / 'report.html')}", markup=False, highlight=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
+    console.print(f"Report: {shown(folder / 'report.html')}", soft_wrap=True)
     raise typer.Exit(CLAIM_FAILED if whole.failed else PASSED)
 
 

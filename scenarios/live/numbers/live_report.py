@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from rich.console import Console
-
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.checks_file import FILE, verdicts_json
 from scenarios.checks.judging import JudgingStop, judge_case
+from scenarios.console import terminal
 from scenarios.live.launch.live_folders import Folders
 from scenarios.live.launch.live_processes import ProcessOutcome
 from scenarios.live.numbers.departures import Departures, compare, few
@@ -149,7 +148,7 @@ def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> 
         return outcome
     try:
         folders.write_end(metrics.scenario, outcome.recorded.ended)  # first: a signal may end what follows
-        show(write_report(metrics, outcome.recorded, outcome.pacing), Console())
+        show(write_report(metrics, outcome.recorded, outcome.pacing), terminal())
         folders.complete(outcome.recorded.record_failure)
     except (StoppedError, KeyboardInterrupt) as stop:
         folders.broken("interrupted while its numbers were made")

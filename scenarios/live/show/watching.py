@@ -198,7 +198,7 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
         while monotonic() < end:
             subscriber.take_until(min(end, monotonic() + PERIOD))
             text = plain(monitor.snapshot(client.present, monotonic()))
-            console.print(text, markup=False, highlight=False, soft_wrap=True)
+            console.print(text, soft_wrap=True)
         return
     with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
         while monotonic() < end:

@@ -5,17 +5,17 @@ import threading
 from typing import Any
 
 import pytest
-from rich.console import Console
 from rich.progress import Progress, ProgressColumn, TimeRemainingColumn
 
 from gridpeers.cli import progress, remaining
+from scenarios.console import terminal
 
 
 def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:
     """A log has one line per case and no control characters."""
     out = io.StringIO()
 
-    with progress.progress(Console(file=out), ("I", "II")) as tell:
+    with progress.progress(terminal(file=out), ("I", "II")) as tell:
         for case in ("I", "II"):
             for t in (0.0, 0.0, 0.5, 1.0, 1.0):
                 tell(case, t, 1.0)
@@ -29,7 +29,7 @@ def test_on_a_terminal_bars_come_and_go() -> None:
     """The bars leave nothing behind that the report would stand below."""
     out = io.StringIO()
 
-    with progress.progress(Console(file=out, force_terminal=True, width=120), ("I",)) as tell:
+    with progress.progress(terminal(file=out, force_terminal=True, width=120), ("I",)) as tell:
         tell("I", 0.0, 1.0)
         tell("I", 1.0, 1.0)
 
@@ -40,7 +40,7 @@ def test_on_a_terminal_bars_come_and_go() -> None:
 def _lines_of(monkeypatch: pytest.MonkeyPatch, basis: float, at: dict[float, tuple[str, int]]) -> list[str]:
     """Lines of 40 pieces of work: by the time (s), the present part, and how many are done."""
     out = io.StringIO()
-    with remaining.remaining(Console(file=out), 40, basis) as tell:
+    with remaining.remaining(terminal(file=out), 40, basis) as tell:
         for now, (part, done) in at.items():
             monkeypatch.setattr(remaining, "monotonic", lambda now=now: now)
             tell(f"{part}, {done} of 40", done)
@@ -75,7 +75,7 @@ def test_the_bar_of_many_runs_comes_and_goes() -> None:
     """It shows what is being done, how much of all is done, and leaves nothing behind."""
     out = io.StringIO()
 
-    with remaining.remaining(Console(file=out, force_terminal=True, width=120), 4) as tell:
+    with remaining.remaining(terminal(file=out, force_terminal=True, width=120), 4) as tell:
         tell("topology, 1 of 4 runs", 1)
         tell("topology, 2 of 4 runs", 2)
 
@@ -100,7 +100,7 @@ def test_the_bar_estimates_nothing_before_there_is_a_basis(monkeypatch: pytest.M
             times_left[round(task.completed)] = column.render(task).plain
 
     monkeypatch.setattr(remaining, "Progress", Bars)
-    with remaining.remaining(Console(file=io.StringIO(), force_terminal=True), 100, 20) as tell:
+    with remaining.remaining(terminal(file=io.StringIO(), force_terminal=True), 100, 20) as tell:
         for done in range(101):
             clock += 2.0
             tell(f"chaos, {done} of 100 runs", done)

@@ -6,11 +6,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from rich.console import Console
 
 from papers.singhal2022.claims import CLAIMS
 from papers.singhal2022.paper_benchmarks import ISLANDING
 from papers.singhal2022.tables import tables_of
+from scenarios.console import terminal
 from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK
 from scenarios.results.evaluation.claims import judge
 from scenarios.results.findings import Findings
@@ -76,16 +76,16 @@ def test_without_a_paper_there_is_nothing_beside() -> None:
     assert "PASS" not in text
 
 
-@pytest.mark.parametrize("terminal", [True, False])
-def test_colours_are_for_terminals_only(terminal: bool) -> None:
+@pytest.mark.parametrize("coloured", [True, False])
+def test_colours_are_for_terminals_only(coloured: bool) -> None:
     """In a pipe no control character is printed; the words are the same."""
     out = io.StringIO()
 
-    show(report(), Console(file=out, force_terminal=terminal, width=160))
+    show(report(), terminal(file=out, force_terminal=coloured, width=160))
 
-    assert ("\x1b[" in out.getvalue()) == terminal
+    assert ("\x1b[" in out.getvalue()) == coloured
     assert "inv3 [died] at t = 2 s" in out.getvalue()
-    if not terminal:
+    if not coloured:
         assert out.getvalue() == plain(report())
 
 
@@ -97,7 +97,7 @@ def test_tables_of_many_events_are_folded_to_the_width_of_the_terminal() -> None
     many = replace(few, findings=found, notes=[], folder="")
     out = io.StringIO()
 
-    show(many, Console(file=out, width=80, force_terminal=True, color_system=None))
+    show(many, terminal(file=out, width=80, force_terminal=True, color_system=None))
 
     on_terminal, in_file = out.getvalue(), plain(many)
     assert max(map(len, on_terminal.splitlines())) <= 80 < max(map(len, in_file.splitlines())) <= 140

@@ -4,9 +4,9 @@ import io
 
 import pytest
 from msgspec.structs import replace
-from rich.console import Console
 
 from agents.agent_config import AgentConfig, Control
+from scenarios.console import terminal
 from scenarios.live.requests.plant_status import PlantStatus
 from scenarios.live.show.render import plain, table
 from scenarios.live.show.run_monitor import RunMonitor
@@ -185,7 +185,7 @@ def test_names_take_little_room(names: list[str], text: str) -> None:
 
 def test_watch_shows_the_same_as_a_table() -> None:
     """Every number of the text is in the table, with the keys below."""
-    console = Console(width=160, record=True, file=io.StringIO())
+    console = terminal(width=160, record=True, file=io.StringIO())
     console.print(table(monitor().snapshot({"inv1"}, now=10.0)))
     text = console.export_text()
 
