@@ -20,6 +20,7 @@ class CutRecorder:
     def __init__(self) -> None:
         self.cut_short = self.failure = ""
         self.recorded, self.client = None, SimpleNamespace(pacing=None, latest=None)
+        self.failed_laws: dict[str, object] = {}
 
     def __enter__(self) -> CutRecorder:
         return self
