@@ -48,21 +48,36 @@ def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
 
 
 def load_name(loads: Mapping[str, NamedLoad], text: str) -> str:
-    """Return the name of a load by its name, or by its bus where that has one load alone.
+    """Return the name of a load by its name, with or without OpenDSS's "load." before it, or by its bus.
 
     Raises
     ------
     ValueError
-        If there is no such load; the message says what was probably meant.
+        If there is no such load, or the text may mean several; the message says what was probably meant.
+
+    Examples
+    --------
+    >>> loads = {name: NamedLoad(name=name, bus=name[5:8], S=1 + 0j) for name in ("load.634a", "load.634b", "load.671")}
+    >>> load_name(loads, "634a"), load_name(loads, "Load.671"), load_name(loads, "671")
+    ('load.634a', 'load.671', 'load.671')
     """
     if text in loads:
         return text
+    named = [name for name in loads if _bare(name) == _bare(text)]
     here = [load.name for load in loads.values() if load.bus == text]
-    if len(here) == 1:
-        return here[0]
+    meant = list(dict.fromkeys([*named, *here]))
+    if len(meant) == 1:
+        return meant[0]
+    if named and here:
+        raise ValueError(f'load "{text}": it has this name, or this bus: {first_of(meant, 8)}; name one')
     if here:
         raise ValueError(f'load "{text}": bus {text} has {len(here)} loads: {first_of(here, 8)}; name one of them')
     raise ValueError(f'load "{text}": no such load; {suggestion(text, loads, "loads")}')
+
+
+def _bare(name: str) -> str:
+    """Return the name of a load without the class that OpenDSS puts before it."""
+    return name[5:] if name[:5].lower() == "load." else name
 
 
 def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:

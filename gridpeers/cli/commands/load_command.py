@@ -11,7 +11,10 @@ from scenarios.live.client.access import Access
 
 
 def load(
-    name: Annotated[str, typer.Argument(metavar="LOAD", help='Its bus, e.g. "48"; its name in an imported feeder.')],
+    name: Annotated[
+        str,
+        typer.Argument(metavar="LOAD", help='Its bus, e.g. "48"; in an imported feeder its name.'),
+    ],
     factor: Annotated[
         float | None,
         typer.Option("--factor", metavar="X", help="Times the power of the feeder's table; 1 is as before."),

@@ -47,6 +47,18 @@ def test_rows_of_one_bus_and_parts_of_one_load_are_one_load() -> None:
     assert load_name(alone, "2") == "mill"
 
 
+def test_a_load_is_named_with_or_without_the_class_that_opendss_puts_before_it() -> None:
+    """In an imported feeder as in our own tables; a name that is another load's bus too is refused with both."""
+    loads = named_loads(feeder(buses=BUSES, loads=(load("1", 1e3, 0, 0),), load_parts=(part("load.mill", "2", 5e3),)))
+    texts = ("mill", "load.mill", "Load.mill", "2", "1", "load.1")
+
+    assert [load_name(loads, text) for text in texts] == ["load.mill"] * 4 + ["1"] * 2
+    crossed = named_loads(feeder(buses=BUSES, load_parts=(part("load.1", "2", 5e3), part("load.house", "1", 1e3))))
+    assert load_name(crossed, "load.1") == "load.1"
+    with pytest.raises(ValueError, match=r'load "1": it has this name, or this bus: load\.1, load\.house; name one'):
+        load_name(crossed, "1")
+
+
 def test_branches_keep_their_shares() -> None:
     """Real and reactive power are scaled each; what had none goes by size; all other loads stay the same objects."""
     tables = feeder(buses=BUSES, loads=(load("1", 3e3 + 2e3j, 1e3, 0), load("1", 0, 0, 4e3), load("2", 1e3, 0, 0)))
