@@ -122,6 +122,7 @@ def init(
     Example:  gridpeers init my-study --feeder Master.dss
     """
     import shlex
+    from importlib.util import find_spec
 
     from gridpeers.output_folders import FolderError, shown, whole_folder
     from wire.driver.command_line import command_line
@@ -132,8 +133,9 @@ def init(
                 fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
             with whole_folder(folder):
                 shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-            run, test = ("run", "mine.toml", "--driver", "inprocess"), command_line(program="pytest", within=folder)
-            following = f"{command_line(*run, within=folder)} && {test}"
+            following = command_line("run", "mine.toml", "--driver", "inprocess", within=folder)
+            if find_spec("pytest"):
+                following += f" && {command_line(program='pytest', within=folder)}"
         else:
             with whole_folder(folder):
                 _propose(folder, feeder, switch or [], leave_out or [], inverters)

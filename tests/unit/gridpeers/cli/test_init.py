@@ -33,6 +33,16 @@ def test_a_new_project_runs_and_its_test_passes(elsewhere: Path) -> None:
     assert tested() == 1
 
 
+@pytest.mark.parametrize("there", [True, False])
+def test_what_to_type_next_is_installed(there: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`pytest` is named only where it is there."""
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: object() if there else None)
+
+    following = invoke("init", "study")[1].splitlines()[-1]
+
+    assert ("gridpeers run mine.toml" in following, "pytest" in following) == (True, there)
+
+
 def test_a_folder_that_another_command_fills_is_left_to_it(elsewhere: Path) -> None:
     """One that ends early empties its folder: what the other has written must not go with it."""
     with whole_folder(elsewhere / "study"):
