@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from gridpeers.studies.sweeping import sweep
     from netem.models.own_fault import FAULTS, LinkFault
     from scenarios.checks.check_registry import CHECKS
-    from scenarios.checks.check_verdict import CheckVerdict, NotJudgedError, Violation
+    from scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
     from scenarios.checks.checked_case import CheckedCase
     from scenarios.results.evaluation.benchmark_registry import CLAIMS
     from scenarios.results.evaluation.claims import Claim
@@ -52,6 +52,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "BrokenRunError": "scenarios.run_request",
+    "Check": "scenarios.checks.check_verdict",
     "CheckVerdict": "scenarios.checks.check_verdict",
     "CheckedCase": "scenarios.checks.checked_case",
     "Claim": "scenarios.results.evaluation.claims",
@@ -96,6 +97,7 @@ _HOME = {
 
 __all__ = [
     "BrokenRunError",
+    "Check",
     "CheckVerdict",
     "CheckedCase",
     "Claim",

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
+
+if TYPE_CHECKING:
+    from scenarios.checks.checked_case import CheckedCase
 
 CheckStatus = Literal["passed", "failed", "not judged", "off"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario
@@ -25,6 +29,20 @@ SWITCHED_OFF = "switched off by the scenario"
 
 class NotJudgedError(Exception):
     """A check cannot judge this run; the text is the reason, such as what the record lacks."""
+
+
+class Check:
+    """A check: its limits are annotated attributes, with unit, range and default (docs/plugins.md)."""
+
+    def __call__(self, case: CheckedCase) -> Iterable[Violation]:
+        """Return, or yield, the violations of a recorded case; none if it passes.
+
+        Raises
+        ------
+        NotJudgedError
+            If the record has no data for the check, or the run never was in a state that it is about.
+        """
+        raise NotImplementedError
 
 
 class Violation(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

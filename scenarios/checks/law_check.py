@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.results.law_failures import law_failures
 
 
-class LawFailed:
+class LawFailed(Check):
     """No agent's law, and no graph of a user, fails: its inverter would go on on primary droop."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Annotated
 
 from netem.ledger import LinkCounts
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.communication.link_accounts import Missing
@@ -15,7 +15,7 @@ from scenarios.checks.judged_time import require_longer
 from wire.schema.plausible import Plausible, Unit
 
 
-class MessageAccount:
+class MessageAccount(Check):
     """Every state that was sent is accounted for at its receiver, link by link.
 
     Of emulated links the accounts and verdicts of their receivers count; of others in simulated time every decision

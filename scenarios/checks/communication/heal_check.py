@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.heals import Heal
 from wire.schema.plausible import Plausible, Unit
 
 
-class Rejoined:
+class Rejoined(Check):
     """Some time after the end of each cut, the receiver uses what the sender has sent since: no split is for ever."""
 
     within_s: Annotated[float, Unit("s"), Plausible("a time to rejoin", 0.0, 3600.0, above_zero=True)] = 6.0

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import msgspec
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.communication.communication_summary import CommunicationSummary
 from scenarios.checks.judged_time import require_longer
@@ -21,7 +21,7 @@ _SAID = re.compile(r"\S+ (leaves|left|dies)\b")
 """Events of an agent that ends as the scenario, or a person, wants it."""
 
 
-class LastWords:
+class LastWords(Check):
     """Each process of an agent speaks until the run ends, or it leaves or is killed as the scenario or a person says.
 
     An unexplained silence is a failure of the agent, of its process, or of its connection.

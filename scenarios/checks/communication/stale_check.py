@@ -7,13 +7,13 @@ from math import inf
 from typing import Annotated
 
 from agents.agent_config import MAX_AGE
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.judged_time import Since, require_time
 from wire.schema.plausible import Plausible, Unit
 
 
-class StaleValues:
+class StaleValues(Check):
     """No decision uses a neighbour's value that is older than a limit.
 
     A value that the neighbour's law keeps in force, without sending it again, does not grow older.

@@ -11,7 +11,7 @@ import numpy as np
 from plant.equipment import Feeder
 from plant.equipment.load_powers import set_power
 from plant.plant_config import PlantSettings
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
 from scenarios.results.switch_positions import closed_switches
@@ -22,7 +22,7 @@ _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = 
 """The power flows of the last feeder: the cases of a run have one in common."""
 
 
-class PowerBalance:
+class PowerBalance(Check):
     """In each island, generation is load plus losses: the power flow of the feeder's tables has the recorded powers.
 
     The rows are those in the middle and at the end of each window. A load that was set, by the scenario or by hand, has

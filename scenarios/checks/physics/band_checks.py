@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
 from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats
@@ -17,7 +17,7 @@ from wire.schema.relations import Below
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
 
 
-class Frequency:
+class Frequency(Check):
     """Each grid-forming inverter is within a band of nominal frequency some time after each event, and stays there."""
 
     band_Hz: Annotated[float, Unit("Hz"), Plausible("a band of frequency", 1e-4, 10.0, above_zero=True)] = 0.01
@@ -46,7 +46,7 @@ class Frequency:
                 )
 
 
-class Voltage:
+class Voltage(Check):
     """The terminal voltage of each inverter is within a band some time after each event, and stays there."""
 
     low_pu: Annotated[float, Unit("pu"), Plausible("a least voltage", 0.3, 1.2), Below("high_pu")] = 0.88

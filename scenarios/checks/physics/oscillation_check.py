@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.physics.matrix_pencil import Mode, modes
 from scenarios.results.history import Flags, Floats
@@ -34,7 +34,7 @@ class _Signal(NamedTuple):
     limit: float
 
 
-class Oscillation:
+class Oscillation(Check):
     """After the last event, no oscillation of an inverter's frequency, power or voltage lasts.
 
     The dominant mode is estimated from the recorded rows by the matrix pencil method: an oscillation is one that still

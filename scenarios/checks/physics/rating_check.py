@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Violation
+from scenarios.checks.check_verdict import Check, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.checks.judged_time import Since, require_longer, require_time
 from scenarios.results.history import Flags
@@ -16,7 +16,7 @@ from wire.schema.plausible import Plausible, Unit
 _LOADING = Plausible("a limit of loading", 0.1, 10.0, above_zero=True)
 
 
-class Rating:
+class Rating(Check):
     """No inverter delivers more real or apparent power than it is made for, but for a while."""
 
     P_limit_pu: Annotated[float, Unit("pu"), _LOADING] = 1.05

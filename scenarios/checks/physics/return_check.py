@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
 
 
-class Returned:
+class Returned(Check):
     """At the end of the run, every inverter that has tripped is in service again, unless its agent had it leave.
 
     A run must be long enough for that: an inverter returns `protection.enter_service_s` after voltage and frequency at

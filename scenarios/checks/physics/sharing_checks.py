@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
 from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats, History, Nameplates
@@ -19,7 +19,7 @@ _LIMIT = Plausible("a sharing index", 1e-4, 2.0, above_zero=True)
 _AFTER = Plausible("a settling time", 0.0, 3600.0)
 
 
-class PowerSharing:
+class PowerSharing(Check):
     """At the end of each window, the inverters of an island deliver equal real power per unit of their ratings."""
 
     limit: Annotated[float, _LIMIT] = 0.01
@@ -36,7 +36,7 @@ class PowerSharing:
         yield from _unequal(case, self, "MPSI", lambda history: history.P, lambda of: of.m_p)
 
 
-class VarSharing:
+class VarSharing(Check):
     """At the end of each window, the inverters of an island deliver equal vars per unit of their ratings."""
 
     limit: Annotated[float, _LIMIT] = 0.2

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import NotJudgedError, Violation
+from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase, IslandWindow
 from scenarios.checks.judged_time import Since
 from scenarios.results.history import Flags, Floats
@@ -17,7 +17,7 @@ from wire.schema.plausible import Plausible, Unit
 _RATE = Plausible("a rate", 1e-6, 100.0, above_zero=True)
 
 
-class SteadyEnd:
+class SteadyEnd(Check):
     """At the end of each window, frequency, power and voltage of every inverter stand still: they can be measured."""
 
     f_Hz_per_s: Annotated[float, Unit("Hz/s"), _RATE] = 0.05
