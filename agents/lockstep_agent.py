@@ -36,7 +36,7 @@ from wire.codec import RejectedError, decode, encode
 from wire.journal import JournalBuffer
 from wire.links import REPORT_TICKS, Links
 from wire.membership import ASKED_AT_ONCE
-from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop
+from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
 from wire.node import Route
 from wire.timing.clock import time_of
 from wire.timing.tick_barrier import Awaited, TickBarrier
@@ -85,7 +85,7 @@ class LockstepAgent(AgentNode):
         if config.record != "physics":
             self.journal = JournalBuffer()
             self._decisions = DecisionJournal(self._agent, self.journal)
-        self.routes[self.keys.control] = Route(PLANT, (Prepare, Stop), self._on_control)
+        self.routes[self.keys.control] = Route(PLANT, (Prepare, Waiting, Stop), self._on_control)
         self._barrier = TickBarrier(config.name, DEADLINES * config.deadline)
         self._last_heard = self._barrier.last_heard
         self._pairwise = is_pairwise(config.control)
@@ -244,9 +244,11 @@ class LockstepAgent(AgentNode):
     def _used(self, message: AnyMessage, now: float) -> None:
         self._last_heard[message.sender] = message.seq, now
 
-    def _on_control(self, message: Prepare | Stop, payload: bytes, now: float) -> None:
+    def _on_control(self, message: Prepare | Waiting | Stop, payload: bytes, now: float) -> None:
         if isinstance(message, Stop):
             self._end(message.reason, now)
+        elif isinstance(message, Waiting):
+            self._barrier.renew(now)
         elif message == self._roster:
             self._barrier.renew(now)
             self._ask_again()

@@ -6,9 +6,12 @@
 to k+1 and sends Measurement(k+1). A change of the roster goes through *preparing* again, between two ticks.
 *joining*: the plant holds the tick until the scheduled newcomers have a token and a nameplate; telemetry names them,
 once, as awaited. Because the tick is held, no number depends on how long a process took to start.
-*closing*: from `Stop`, until all tokens are gone, as proof that every node has heard it.
+*holding*: between two ticks, while much telemetry has no acknowledgement of the recorder. It has no deadline: a
+recorder that stands still is waited for. `Waiting` says so to the agents.
+*closing*: from `Stop`, until all tokens are gone, as proof that every node has heard it, and recorders have all.
 
-What may be lost is asked again every `AGAIN`: for nameplates, and by the same `Prepare` for each `Ready`.
+What may be lost is asked again every `AGAIN`: for nameplates, and by the same `Prepare` for each `Ready`. The process
+that records also starts the agents: while it is silent, no deadline for an agent to come passes.
 
 At a scheduled leave the plant sends the agent a stop request and disconnects its inverter; at a join it connects the
 inverter at no load. At a scheduled death it sends the stop request, but the inverter stays. When an agent dies by
@@ -26,20 +29,38 @@ from plant.plant_config import PlantConfig
 from plant.plant_interface import PlantLike
 from plant.plant_node import CLOSING, STAYS, PlantNode
 from plant.telemetry_reporter import measurement_of
+from plant.unacknowledged_telemetry import UnacknowledgedTelemetry
+from wire.actions import Publish
 from wire.codec import RejectedError, encode
 from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import PLANT, AnyMessage, Journal, LinkReport, Measurement, Nameplate, Prepare, Ready, State
-from wire.node import Route
+from wire.messages import (
+    PLANT,
+    Answer,
+    AnyMessage,
+    Command,
+    Journal,
+    LinkReport,
+    Measurement,
+    Nameplate,
+    Prepare,
+    Ready,
+    State,
+    Waiting,
+)
+from wire.node import ANYBODY, Route
 from wire.timing.tick_barrier import Awaited, TickBarrier
 from wire.traffic import TickTraffic
 
-Phase = Literal["gathering", "preparing", "ticking", "joining", "closing", "over"]
+Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
 
 TELEMETRY_TICKS = 10
 """Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
 
 AGAIN = 1.0
 """Time (s) after which a question without an answer is asked again."""
+
+SILENT = 3.0
+"""Time (s) after a recorder's last word after which it counts as silent; it speaks every second."""
 
 
 class LockstepPlant(PlantNode):
@@ -76,6 +97,9 @@ class LockstepPlant(PlantNode):
         self._last_heard = self._barrier.last_heard
         self._ask_at = inf
         """When open questions are asked again (s on the driver's clock)."""
+        self._unacknowledged = UnacknowledgedTelemetry(config.recorders)
+        self._recorders_at = dict.fromkeys(config.recorders, -inf)
+        """When each recorder that the run waits for has spoken last (s on the driver's clock)."""
         self._prepare_bytes = b""
         """The last roster sent."""
         self._states: dict[str, State] = {}
@@ -84,6 +108,8 @@ class LockstepPlant(PlantNode):
             self.routes[self.keys.ready(name)] = Route(name, (Ready,), self._on_ready)
             self.routes[self.keys.report(name)] = Route(name, (LinkReport,), self._on_report)
             self.routes[self.keys.journal(name)] = Route(name, (Journal,), self._on_journal)
+        if config.recorders:
+            self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
         """Keys to subscribe to before the token is declared."""
         self._tick_traffic: TickTraffic | None = None
@@ -111,8 +137,8 @@ class LockstepPlant(PlantNode):
     @property
     def deadline(self) -> float | None:
         """End of the present wait, or time to ask again (s on the driver's clock)."""
-        deadline = self._barrier.deadline
-        return deadline if deadline is None else min(deadline, self._ask_at)
+        deadline = min(self._barrier.deadline or inf, self._ask_at)
+        return None if deadline == inf else deadline
 
     def start(self, now: float) -> None:
         """Start to wait for the agents."""
@@ -138,7 +164,14 @@ class LockstepPlant(PlantNode):
             self._ask_again(now)
         if self._barrier.is_over(now):
             if self.phase == "closing":
-                self._be_over()
+                self._send_the_last()
+                self._barrier.deadline = now + CLOSING
+                if self._unacknowledged.is_empty:
+                    self._be_over()
+            elif (
+                self.phase in ("gathering", "joining") and now > min(self._recorders_at.values(), default=now) + SILENT
+            ):
+                self._barrier.renew(now)
             elif missing := self.missing_messages():  # else the last awaited message has just arrived
                 self.abort(self._barrier.complaint(missing, now), now)
 
@@ -181,13 +214,17 @@ class LockstepPlant(PlantNode):
         self._gather(now)
 
     def _ask_again(self, now: float) -> None:
-        """Ask again for the nameplates, or for the `Ready`, that have not come."""
+        """Ask again for the nameplates, or for the `Ready`, that have not come; keep agents that wait informed."""
         self._ask_at = now + AGAIN
         if self.phase == "preparing":
-            self._publish(self.keys.control, self._prepare_bytes)
-        else:
+            self._publish_aside(self.keys.control, self._prepare_bytes)
+        elif self.phase != "holding":
             for name, instance in self.members.next_unmet():
                 self._ask(name, instance)
+        if self.phase in ("holding", "joining"):
+            waits_for = self._joining or self.config.recorders
+            waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=self.tick, t=self.t, waits_for=waits_for)
+            self._publish_aside(self.keys.control, encode(waiting))
 
     def _agent_gone(self, name: str, now: float) -> None:
         if self.phase in ("closing", "over"):
@@ -209,6 +246,12 @@ class LockstepPlant(PlantNode):
         if self.phase == "closing" and self._all_have_gone():
             self._be_over()
 
+    def _all_have_gone(self) -> bool:
+        """Whether all other tokens are gone, and the recorders that the run waits for have everything."""
+        super()._all_have_gone()
+        recorders = {self.keys.alive_recorder(name) for name in self.config.recorders}
+        return self._tokens <= recorders and self._unacknowledged.is_empty
+
     # ---------------------------------------------------------------- messages
 
     def _used(self, message: AnyMessage, now: float) -> None:
@@ -229,6 +272,32 @@ class LockstepPlant(PlantNode):
         if self.phase == "preparing":  # else it is the answer to a Prepare that was sent again
             self._barrier.came(ready.sender)
             self._barrier.renew(now)
+
+    def _on_request(self, command: Command, payload: bytes, now: float) -> None:
+        """Take a recorder's word on which Telemetry it needs next; publish again if it says the same once more."""
+        name, text = command.sender, command.argument
+        if command.verb != "telemetry" or name not in self._recorders_at or not (text.isascii() and text.isdigit()):
+            raise RejectedError("unexpected", f'"{command.verb}" of {name}, in simulated time')
+        self._recorders_at[name] = now
+        again = self._unacknowledged.acknowledged(name, int(text))
+        if again is not None:
+            answer = Answer(sender=PLANT, epoch=self.config.epoch, seq=command.seq, t=self.t, ok=True, text=text)
+            self._publish_aside(self.keys.answer(command.reply_to), encode(answer))
+            for kept in again:
+                self._publish_aside(self.keys.telemetry, kept)
+        self._close_if_alone()
+
+    def _recorder_is_silent(self, now: float) -> bool:
+        return any(now > at + SILENT for at in self._recorders_at.values())
+
+    def _publish(self, key: str, payload: bytes) -> None:
+        if key == self.keys.telemetry:
+            self._unacknowledged.keep(self._reporter.seq, payload)
+        super()._publish(key, payload)
+
+    def _publish_aside(self, key: str, payload: bytes) -> None:
+        """Publish what depends on the time that others take: the record, the same in every run, is without it."""
+        self._actions.append(Publish(key, payload))
 
     # ---------------------------------------------------------------- the roster
 
@@ -304,7 +373,9 @@ class LockstepPlant(PlantNode):
 
     def work(self, now: float) -> bool:
         """Do the next roster or tick if no message is missing; return whether anything was done."""
-        if self.phase not in ("preparing", "ticking", "joining") or not self._barrier.is_open:
+        if self.phase not in ("preparing", "ticking", "joining", "holding") or not self._barrier.is_open:
+            return False
+        if self.phase == "holding" and self._unacknowledged.is_full:
             return False
         ticked = self.phase == "ticking"
         if ticked:
@@ -317,9 +388,12 @@ class LockstepPlant(PlantNode):
             joined, self._joining, self._roster_changed = self._joining, (), True
             for name in joined:  # their inverters are on the network, at no load
                 self._connect(name, True, now)
-        if self.phase in ("preparing", "ticking", "joining"):
+        if self.phase in ("preparing", "ticking", "joining", "holding"):
             if self._roster_changed:
                 self._prepare(now)
+            elif self._unacknowledged.is_full:
+                self.phase, self._ask_at = "holding", now + AGAIN
+                self._barrier.rest()
             else:
                 self._grant(now)
         return True
@@ -368,7 +442,8 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- telemetry and the end
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
-        self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents)
+        others = self._unacknowledged.others(self._reporter.seq)
+        self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents, others=others)
 
     def _close(self, reason: str, now: float) -> None:
         if self._tick_traffic is not None:

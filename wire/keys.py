@@ -295,7 +295,8 @@ def describe() -> tuple[KeySpec, ...]:
             by_agent, ("plant", "agent"),
         ),
         row(
-            keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents", "before tick 0; at the end",
+            keys.control, "publication", "Prepare, Waiting, Stop", "plant", "agents",
+            "before tick 0; at the end; while the plant waits",
             by_plant, by_agent,
         ),
         row(
@@ -376,12 +377,14 @@ def describe() -> tuple[KeySpec, ...]:
         ),
         row(
             keys.request, "publication", "Command", "command line, recorder", "plant",
-            "wall-clock: once the plant's token is there, to learn something (status, links, telemetry)",
+            "wall-clock: once the plant's token is there, to learn something (status, links, telemetry); "
+            "simulated: by the recorder, after each Telemetry and every second",
             ROLES, by_plant,
         ),
         row(
             keys.answer("ASKER"), "publication", "Answer, LinkAcknowledgement", "plant", "the command line that asked",
-            "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too",
+            "wall-clock: one Answer for every command; to a link command every LinkAcknowledgement, too; "
+            "simulated: to a recorder that asks again",
             by_plant, ROLES,
         ),
     )  # fmt: skip

@@ -181,10 +181,10 @@ class Prepare(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
 
 
 class Waiting(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """Sign of life of a plant that has not reached t = 0 (plant -> agents, wall-clock time)."""
+    """Sign of life of a plant that waits: before t = 0, in simulated time between two ticks (plant -> agents)."""
 
     waits_for: Names
-    """Missing agents."""
+    """Missing agents; or the recorders that a plant in simulated time waits for."""
 
 
 class Ready(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
@@ -265,7 +265,7 @@ class LoadSetting(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Command(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):
-    """A command that a person gives the plant (command line -> plant, wall-clock time)."""
+    """A command that a person gives the plant (command line -> plant, wall-clock time), or a recorder's question."""
 
     verb: Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links", "telemetry"]
     """Open or close a switch; close it if its sides are in step; set a load; let an agent leave; end the run; answer
@@ -410,8 +410,7 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
     quiet: Annotated[tuple[tuple[Time, Count], ...], msgspec.Meta(max_length=2000)] = ()
     """Run time (s) of each tick, and its number of quiet states."""
     others: Count = 0
-    """Messages of other types on this key since the last Telemetry; only in wall-clock time. So a recorder knows
-    whether it has received them all."""
+    """Messages of other types on this key since the last Telemetry: so a recorder knows whether it has them all."""
 
     def __post_init__(self) -> None:
         check_names(self.sender)

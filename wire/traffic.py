@@ -86,8 +86,8 @@ class TickTraffic:
         for name in names:
             self._of_tick[keys.measurement(name)] = self._measurements
             self._of_tick[keys.state(name)] = self._states
-        self._elsewhere = {keys.telemetry, *map(keys.report, names), *map(keys.journal, names)}
-        """Keys whose messages the record has anyway."""
+        self._elsewhere = {keys.telemetry, keys.request, *map(keys.report, names), *map(keys.journal, names)}
+        """Keys whose messages the record has anyway, or, of recorders, has no use for."""
         self._rejected = 0
         """Messages rejected in this tick."""
 

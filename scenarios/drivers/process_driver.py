@@ -19,7 +19,7 @@ from scenarios.drivers.children import Child, Children
 from scenarios.drivers.free_endpoint import free_endpoint
 from scenarios.drivers.outcome import Outcome
 from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient, with_recorder
+from scenarios.drivers.telemetry_client import LOOK, RECORDER, TelemetryClient, with_recorder
 from scenarios.drivers.telemetry_stream import Recordable
 from wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
@@ -125,6 +125,7 @@ def run_processes(
             if on_start is not None:
                 on_start(supervisor.children)
             driver.run(supervisor)
+            driver.acknowledge_end(supervisor)
             driver.client.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
             supervisor.children.wait(AFTERMATH if driver.broke else LEAVING)
             driver.note_failures(supervisor)
@@ -182,7 +183,7 @@ class _ProcessDriver:
             asked = monotonic()
             words = client.take(limit)
             now = monotonic()
-            if words or now - asked > limit + STOOD_STILL:  # a process that stood still itself has not waited
+            if words or now - asked > min(limit, LOOK) + STOOD_STILL:  # who stood still itself has not waited
                 since = now
             elif now - max(since, client.message_at) >= deadline:
                 report = supervisor.children[PLANT].report(self._when)
@@ -198,6 +199,12 @@ class _ProcessDriver:
                 self._awaited.clear()
                 supervisor.work()
         supervisor.end_faults()
+
+    def acknowledge_end(self, supervisor: Supervisor) -> None:
+        """In simulated time acknowledge the last telemetry until the plant has left."""
+        until = monotonic() + (AFTERMATH if self.broke else LEAVING)
+        while not self._wall and supervisor.children[PLANT].status is None and (left := until - monotonic()) > 0.0:
+            self.client.take(left)
 
     def _take(self, message: Recordable) -> None:
         if isinstance(message, LinkReport):

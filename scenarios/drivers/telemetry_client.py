@@ -43,8 +43,8 @@ def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
 class TelemetryClient:
     """Pass on each message that the plant publishes for recorders, and keep the state of the run.
 
-    In wall-clock time it asks again for missing messages, e.g. after this process stood still for longer than Zenoh's
-    lease, and opens a new session when the old one brings nothing any more.
+    It asks again for missing messages, e.g. after this process stood still for longer than Zenoh's lease, and opens a
+    new session when the old one brings nothing any more. In simulated time the plant waits for its acknowledgements.
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ class TelemetryClient:
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far, in wall-clock time."""
         self.message_at = monotonic()
-        """Time of the last message, of any kind (s, monotonic)."""
+        """Time of the last message, of any kind, or answer (s, monotonic)."""
         self.progress: tuple[float, float] | None = None
         """Run time of the last rows, and when they came (s, monotonic); None before the first."""
-        self._stream = TelemetryStream() if clock == "wall" else None
+        self._stream = TelemetryStream(acknowledges=clock == "simulated")
         self._core = TelemetryEndpoint(name, run, self._stream)
         self._closed = False
         self.rejects = self._core.rejects
@@ -113,8 +113,7 @@ class TelemetryClient:
         timeout : float or None
             Longest wait (s); None for no end. It may return with nothing before.
         """
-        if self._stream is not None:
-            timeout = LOOK if timeout is None else min(timeout, LOOK)
+        timeout = LOOK if timeout is None else min(timeout, LOOK)
         words: list[str] = []
         for kind, key, payload, _ in self._session.take(1, timeout):
             if kind == "word":
@@ -124,17 +123,17 @@ class TelemetryClient:
             elif kind == "vanished":
                 self._core.vanished(key)
             elif kind == "message":
-                self._core.received(key, payload, monotonic())
+                self.message_at = monotonic()
+                self._core.received(key, payload, self.message_at)
                 for message in self._core.take():
                     self._pass_on(message)
         for loss in self._session.take_losses():
             self._core.lost(loss, monotonic())
-        if self._stream is not None and not self._closed:
-            self._look_after(self._stream)
+        if not self._closed:
+            self._look_after()
         return words
 
     def _pass_on(self, message: Recordable) -> None:
-        self.message_at = monotonic()
         if isinstance(message, Telemetry):
             self.latest, self.pacing = message, message.pacing or self.pacing
             if message.rows and not message.final:
@@ -145,6 +144,11 @@ class TelemetryClient:
         """Close the session, and with it the token: the plant knows then that the last telemetry is here."""
         self._closed = True
         self._session.close()
+
+    def renew_session(self) -> None:
+        """Go on with a new session: the plant publishes again what the old one had on its way."""
+        self._session.close()
+        self._session = self._open()
 
     def _open(self) -> Session:
         keys = self._core.keys
@@ -164,11 +168,10 @@ class TelemetryClient:
         session.hold_token(keys.alive_recorder(self._name))
         return session
 
-    def _look_after(self, stream: TelemetryStream) -> None:
+    def _look_after(self) -> None:
         now = monotonic()
-        if stream.is_astray(now):
-            self._session.close()
-            self._session = self._open()
+        if self._stream.is_astray(now):
+            self.renew_session()
         question = self._core.question(now)
         if question is not None:
             self._session.publish(self._core.keys.request, question)

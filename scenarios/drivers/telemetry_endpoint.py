@@ -19,11 +19,11 @@ class TelemetryEndpoint(PlantFollower):
         The recorder's name.
     run : str
         Name of the run.
-    stream : TelemetryStream or None
-        Puts messages in order; None if nothing is ever lost, as in simulated time.
+    stream : TelemetryStream
+        Puts messages in order.
     """
 
-    def __init__(self, name: str, run: str, stream: TelemetryStream | None) -> None:
+    def __init__(self, name: str, run: str, stream: TelemetryStream) -> None:
         super().__init__(name, run)
         self._name, self._stream = name, stream
         self._questions = 0
@@ -31,8 +31,7 @@ class TelemetryEndpoint(PlantFollower):
         self.routes[self.keys.telemetry] = Route(
             PLANT, (Telemetry, LinkReport, Journal, LinkRequest), self._on_recordable
         )
-        if stream is not None:
-            self.routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
+        self.routes[self.keys.answer(name)] = Route(PLANT, (Answer,), self._on_answer)
 
     @property
     def finished(self) -> bool:
@@ -62,9 +61,9 @@ class TelemetryEndpoint(PlantFollower):
     def is_known(self, key: str, payload: bytes) -> bool:
         """Whether a message looks like one of the plant; in simulated time whatever comes for recorders counts as such.
 
-        There the plant passes on what agents say, nothing is sent again, and nothing may be lost.
+        There the plant passes on what agents say, and goes as fast as the recorder reads.
         """
-        return (self._stream is None and key == self.keys.telemetry) or super().is_known(key, payload)
+        return (self._stream.acknowledges and key == self.keys.telemetry) or super().is_known(key, payload)
 
     def take(self) -> list[Recordable]:
         """Take out the messages that can be recorded now, in order."""
@@ -73,7 +72,7 @@ class TelemetryEndpoint(PlantFollower):
 
     def question(self, now: float) -> bytes | None:
         """Return the `Command` that asks the plant for missing messages, if it is to be asked now (s)."""
-        number = None if self._stream is None else self._stream.question(now)
+        number = self._stream.question(now)
         if number is None:
             return None
         self._questions += 1
@@ -97,11 +96,11 @@ class TelemetryEndpoint(PlantFollower):
             super()._admit(route, message, now)
 
     def _on_recordable(self, message: Recordable, payload: bytes, now: float) -> None:
-        self._recordable += [message] if self._stream is None else self._stream.take(message, now)
+        self._recordable += self._stream.take(message, now)
 
     def _on_answer(self, answer: Answer, payload: bytes, now: float) -> None:
         """Take the answer to the last question: those before may be late, as a question is asked again after 1 s."""
-        if self._stream is None or not 1 <= answer.seq <= self._questions:
+        if not 1 <= answer.seq <= self._questions:
             raise RejectedError("unexpected", f"an answer to question {answer.seq}, which this recorder has not asked")
         if answer.seq == self._questions:
             self._stream.answered(answer, now)

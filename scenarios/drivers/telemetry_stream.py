@@ -2,6 +2,8 @@
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
 keeps its latest messages (`plant.realtime.kept_telemetry`) and publishes them again when asked by a `Command`.
+In simulated time the same question acknowledges all before its number (`plant.unacknowledged_telemetry`): it is sent
+after each Telemetry, and again and again until the next.
 """
 
 from __future__ import annotations
@@ -17,6 +19,9 @@ AGAIN = 1.0
 ASTRAY = 3.0
 """Time (s) without any answer after which a new session is opened; twice as long after each that brought none."""
 
+ASTRAY_SIMULATED = 10.0
+"""The same in simulated time, where a plant answers between two steps, or once a full link of its is closed."""
+
 LONGEST = 60.0
 """Longest such time (s)."""
 
@@ -27,6 +32,11 @@ Recordable = Telemetry | LinkReport | Journal | LinkRequest
 
 class TelemetryStream:
     """Let messages through in the order in which the plant published them, each once.
+
+    Parameters
+    ----------
+    acknowledges : bool, optional
+        Whether the plant waits for acknowledgements, as in simulated time.
 
     Attributes
     ----------
@@ -46,7 +56,8 @@ class TelemetryStream:
     ([1, 1, 0, 1], None)
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, acknowledges: bool = False) -> None:
+        self.acknowledges = acknowledges
         self.lost = False
         self._next = 0
         """Number of the next Telemetry."""
@@ -57,7 +68,9 @@ class TelemetryStream:
         self._heard_at: float | None = None
         self._asked_at = self._opened_at = float("-inf")
         self._over = False
-        self._patience = ASTRAY
+        self._patience = self._shortest = ASTRAY_SIMULATED if acknowledges else ASTRAY
+        self._acknowledged = -1
+        """Number in the last question."""
 
     def take(self, message: Recordable, now: float) -> list[Recordable]:
         """Note a message (s, monotonic); return the messages that can be recorded now, in order."""
@@ -80,13 +93,18 @@ class TelemetryStream:
     def answered(self, answer: Answer, now: float) -> None:
         """Note the plant's answer: the number from which on it publishes again."""
         if answer.ok and answer.text.isascii() and answer.text.isdigit():
-            self._heard_at, self._patience, self._gap_since = now, ASTRAY, None
+            self._heard_at, self._patience, self._gap_since = now, self._shortest, None
             self._held.clear()
             if int(answer.text) > self._next:
                 self.lost, self._next = True, int(answer.text)
 
     def question(self, now: float) -> str | None:
         """Return the number of the first Telemetry to be published again, if the plant is to be asked for it now."""
+        if self.acknowledges:
+            if self._next == self._acknowledged and now - self._asked_at < AGAIN:
+                return None
+            self._acknowledged, self._asked_at = self._next, now
+            return str(self._next)
         if self._heard_at is None or self._over or now - self._asked_at < AGAIN:
             return None
         if self._gap_since is None:
@@ -99,7 +117,8 @@ class TelemetryStream:
 
     def is_astray(self, now: float) -> bool:
         """Return whether a new session is to be opened now, as questions have had no answer for long."""
-        if self._gap_since is None or now - max(self._gap_since, self._opened_at) < self._patience:
+        since = self._heard_at if self.acknowledges else self._gap_since
+        if since is None or now - max(since, self._opened_at) < self._patience:
             return False
         self._opened_at, self._patience = now, min(2.0 * self._patience, LONGEST)
         return True

@@ -180,7 +180,7 @@ class Recording:
         self._begin()
 
     def _begin(self) -> None:
-        self._endpoint = TelemetryEndpoint("history", "toy", TelemetryStream() if self._stream else None)
+        self._endpoint = TelemetryEndpoint("history", "toy", TelemetryStream(acknowledges=not self._stream))
         self._endpoint.appeared(KEYS.alive_plant(EPOCH))
         self._recorder: Recorder | None = Recorder(gaps=True)
         self._keys, self._taken = [*self._endpoint.routes], 0

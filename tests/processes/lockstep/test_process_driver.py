@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import re
@@ -12,15 +13,24 @@ import subprocess
 import sys
 from pathlib import Path
 from time import monotonic
+from typing import Any
 
 import msgspec
 import pytest
 
+from scenarios.drivers import process_driver
 from scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
+from scenarios.drivers.telemetry_client import TelemetryClient
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
-from tests.toy.toy_runs import ProcessRun
+from tests.toy.toy_plant import ToyPlant
+from tests.toy.toy_runs import ProcessRun, Rows, first_difference
+from wire.codec import decode
+from wire.driver.session import Session
+from wire.keys import Keys
+from wire.messages import Waiting
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -184,6 +194,73 @@ takes = []
 run_processes(plant, agents, Path(sys.argv[1]), lambda telemetry: takes[0](telemetry),
               on_start=lambda children: takes.append(told(children)), plant_command=(sys.argv[2],))
 """
+
+
+RECORDER = """
+import hashlib, sys
+from pathlib import Path
+import msgspec
+from scenarios.drivers.process_driver import run_processes
+from tests.toy.toy_configs import toy_configs
+plant, agents = toy_configs(12, end=60.0)
+rows = []
+def take(telemetry):
+    rows.extend(telemetry.rows)
+    print(telemetry.t, flush=True)
+outcome = run_processes(msgspec.structs.replace(plant, listen=(sys.argv[3],)), agents, Path(sys.argv[1]), take,
+                        plant_command=(sys.argv[2],), shared=2)
+print(repr(outcome.broke), outcome.reproducible, hashlib.sha256(repr(rows).encode()).hexdigest())
+"""
+
+
+def test_the_plant_waits_for_a_command_that_stands_still(tmp_path: Path) -> None:
+    """SIGSTOP, as by Ctrl-Z: the plant says that it waits; after SIGCONT the run goes on, and misses no row."""
+    endpoint = free_endpoint()
+    command = [sys.executable, "-c", RECORDER, str(tmp_path), toy_plant.__file__, endpoint]
+    root = Path(toy_plant.__file__).parents[2]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root) as recorder:
+        assert recorder.stdout is not None
+        recorder.stdout.readline()
+        recorder.send_signal(signal.SIGSTOP)
+        watcher = Session("watcher", connect=(endpoint,), gossip=False)
+        watcher.subscribe(Keys("toy").control)
+        while not (events := watcher.take(1, None)):
+            pass
+        watcher.close()
+        recorder.send_signal(signal.SIGCONT)
+        last = recorder.stdout.read().splitlines()[-1]
+    rows: Rows = []
+    run_inprocess(
+        *toy_configs(12, end=60.0), lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(toy_configs(12)[0])
+    )
+
+    waiting = decode(events[0][2])
+    assert isinstance(waiting, Waiting)
+    assert waiting.waits_for == ("history",)
+    assert waiting.t < 60.0
+    assert last == f"'' True {hashlib.sha256(repr(rows).encode()).hexdigest()}"
+
+
+def test_a_recorder_whose_link_breaks_misses_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What was on its way is lost with the link; the plant publishes it again, once the recorder is back."""
+    clients: list[TelemetryClient] = []
+
+    def client(*words: Any) -> TelemetryClient:
+        clients.append(TelemetryClient(*words))
+        return clients[0]
+
+    monkeypatch.setattr(process_driver, "TelemetryClient", client)
+    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)
+    for t in (0.4, 5.0, 20.0):
+        run.at(t, lambda: clients[0].renew_session())
+    outcome = run()
+    rows: Rows = []
+    run_inprocess(
+        *toy_configs(4, end=20.0), lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(toy_configs(4)[0])
+    )
+
+    assert (outcome.broke, outcome.reproducible) == ("", True)
+    assert first_difference(rows, run.rows) == ""
 
 
 @pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="watches processes that are not its children by pidfd")

@@ -14,7 +14,7 @@ from agents.agent import Agent
 from agents.agent_config import Control, GraphRule
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.lockstep_lab import KEYS, Lab, nameplate, ticking
-from wire.messages import State
+from wire.messages import State, Waiting
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 
@@ -294,6 +294,19 @@ def test_what_is_missing_is_named_in_the_order_of_the_neighbours() -> None:
     assert lab.missing == [("State(4)", "inv2")]
     lab.node.expire(lab.node.deadline or 0.0)
     assert lab.node.failed.startswith("inv1: no State(4) from inv2 within 20 s; last heard of inv2: tick ")
+
+
+def test_a_plant_that_says_that_it_waits_is_waited_for() -> None:
+    """Its recorder may stand still for any time: each word postpones the deadline."""
+    lab = ticking("inv2", tick=5)
+    for second in range(1, 600):
+        lab.node.expire(float(second))
+        waiting = Waiting(sender="plant", epoch=1, seq=5, t=0.1, waits_for=("history",))
+        lab.hear(KEYS.control, waiting, now=float(second))
+    assert not lab.node.failed
+
+    lab.node.expire(lab.node.deadline or 0.0)
+    assert lab.node.failed.startswith("inv1: no Measurement(5) from plant within 20 s")
 
 
 @pytest.mark.parametrize(("k", "kind"), [(4, "stale"), (6, "unexpected")])

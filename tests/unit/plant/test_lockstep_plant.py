@@ -8,6 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from agents.agent import Agent
+from plant import unacknowledged_telemetry
 from plant.lockstep_plant import AGAIN, LockstepPlant
 from plant.plant_config import ScheduledAction
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -15,7 +16,19 @@ from tests.toy.toy_plant import ToyPlant
 from wire.actions import Fetch, Publish
 from wire.codec import decode, encode
 from wire.keys import Keys
-from wire.messages import Measurement, Message, PlantEvent, Prepare, Ready, State, Stop, Telemetry
+from wire.messages import (
+    Answer,
+    Command,
+    Measurement,
+    Message,
+    PlantEvent,
+    Prepare,
+    Ready,
+    State,
+    Stop,
+    Telemetry,
+    Waiting,
+)
 
 KEYS = Keys("toy")
 NAMES = ("inv1", "inv2", "inv3", "inv4")
@@ -43,6 +56,7 @@ class Lab:
         self.now = 0.0
         self.sent: list[tuple[str, Message]] = []
         self.asked: list[tuple[str, ...]] = []
+        self._read = 0
         self.node.start(self.now)
         self.do()
 
@@ -81,6 +95,19 @@ class Lab:
             self.node.expire(self.now)
             self.do()
         self.now = end
+
+    def needs(self, number: int) -> None:
+        """The recorder says which Telemetry it needs next."""
+        command = Command(
+            sender="history", epoch=1, seq=1, t=0.0, verb="telemetry", argument=str(number), reply_to="history"
+        )
+        self.hear(KEYS.request, command)
+
+    def telemetry(self) -> list[int]:
+        """Numbers of the Telemetry sent since the last call."""
+        numbers = [message.seq for _, message in self.sent[self._read :] if isinstance(message, Telemetry)]
+        self._read = len(self.sent)
+        return numbers
 
     def join(self, *names: str) -> None:
         """Agents come, and answer for their nameplates."""
@@ -125,6 +152,17 @@ class Lab:
     def missing(self) -> list[tuple[str, str]]:
         """Missing messages: their kind and sender."""
         return [(what, who) for what, who in self.node.missing_messages()]
+
+
+def recorded(**changes: Any) -> Lab:
+    """A plant that ticks, beside a recorder that has all so far."""
+    lab = Lab(recorders=("history",), **changes)
+    lab.recorder("history")
+    lab.join(*NAMES)
+    lab.ready(0, *NAMES)
+    lab.needs(1)
+    assert lab.telemetry() == [0]
+    return lab
 
 
 def ticking(*schedule: tuple[float, str, Literal["leave", "join", "die"]], **changes: Any) -> Lab:
@@ -366,3 +404,94 @@ def test_a_death_while_the_run_goes_on_is_told() -> None:
     assert lab.last(Prepare).roster == ("inv1", "inv3", "inv4")
     assert not lab.node.reproducible
     assert lab.events() == [f"inv2 died at t = 0.2 s; {STAYS}"]
+
+
+# ---------------------------------------------------------------- recorders
+
+
+def test_the_plant_waits_for_its_recorder_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beyond a window it goes on with no tick; agents hear every second that it waits, and no deadline passes."""
+    lab = recorded(end=20.0)
+    monkeypatch.setattr(unacknowledged_telemetry, "WINDOW", 20_000)
+    while lab.node.phase == "ticking":
+        lab.tick(1)
+    tick = lab.node.tick
+    lab.wait(600.0)
+    waiting = [message for _, message in lab.sent if isinstance(message, Waiting)]
+
+    assert (lab.node.phase, lab.node.tick, lab.node.outcome) == ("holding", tick, "")
+    assert len(waiting) == 600
+    assert waiting[0].waits_for == ("history",)
+    lab.needs(2)
+    assert lab.node.phase == "ticking"
+    assert lab.last(Measurement).seq == tick
+
+
+def test_who_dies_while_the_plant_waits_for_its_recorder_is_off_the_next_roster(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A death is no reason to go on without the recorder, nor to wait for the dead."""
+    lab = recorded(end=20.0)
+    monkeypatch.setattr(unacknowledged_telemetry, "WINDOW", 0)
+    lab.tick(10)
+    assert lab.node.phase == "holding"
+    lab.token("inv4", gone=True)
+    assert lab.last(Prepare).seq == 0
+
+    lab.needs(2)
+    assert lab.last(Prepare).roster == NAMES[:3]
+
+
+def test_what_a_recorder_needs_once_more_is_published_again() -> None:
+    """From that number on and as it was; a recorder that goes on gets nothing twice; nobody else is heard."""
+    lab = recorded(end=20.0)
+    lab.tick(40)
+    assert lab.telemetry() == [1, 2, 3, 4]
+    lab.needs(2)
+    assert lab.telemetry() == []
+    lab.needs(2)
+
+    assert lab.telemetry() == [2, 3, 4]
+    assert lab.last(Answer).text == "2"
+    again = [message for _, message in lab.sent if isinstance(message, Telemetry) and message.seq == 3]
+    assert again[0] == again[1]
+    lab.hear(
+        KEYS.request,
+        Command(sender="other", epoch=1, seq=1, t=0.0, verb="telemetry", argument="9", reply_to="other"),
+    )
+    assert lab.node.rejects.counts == {"unexpected": 1}
+
+
+def test_the_plant_leaves_once_its_recorder_has_the_end() -> None:
+    """The recorder's token may go with its link: only its word counts, and what it misses comes again."""
+    lab = recorded(end=0.2)
+    lab.tick(10)
+    for name in NAMES:
+        lab.token(name, gone=True)
+    lab.node.vanished(KEYS.alive_recorder("history"), lab.now)
+    lab.wait(600.0)
+    assert lab.node.phase == "closing"
+    lab.recorder("history")
+    (final,) = lab.telemetry()
+    lab.needs(final)
+    assert lab.telemetry() == [final]
+    assert not lab.node.finished
+
+    lab.needs(final + 1)
+    assert lab.node.finished
+
+
+def test_no_agent_is_late_while_the_recorder_is_silent() -> None:
+    """The recorder's process starts the agents: if it stands still, they cannot come; it may come late itself."""
+    lab = Lab(recorders=("history",), deadline=10.0)
+    lab.wait(600.0)
+    assert lab.missing[-1] == ("token", "history")
+    lab.recorder("history")
+    for _ in range(9):
+        lab.needs(0)
+        lab.wait(1.0)
+    assert lab.node.outcome == ""
+    for _ in range(10):
+        lab.needs(0)
+        lab.wait(1.0)
+    assert lab.node.outcome.startswith("plant: no token from inv1 within 10 s")

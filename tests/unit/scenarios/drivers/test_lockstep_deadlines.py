@@ -38,9 +38,9 @@ def test_the_plants_deadline_names_who_is_missing() -> None:
 
 
 def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
-    """Agents that never came, and recorders, are named."""
+    """Agents that never came are named."""
     config, _ = toy_configs(2)
-    plant = LockstepPlant(msgspec.structs.replace(config, recorders=("fleet",)), ToyPlant(config))
+    plant = LockstepPlant(config, ToyPlant(config))
     plant.start(100.0)
     plant.appeared(plant.keys.alive_agent("inv2", "a"), 101.0)
 
@@ -48,8 +48,7 @@ def test_the_plant_says_whom_it_waits_for_before_the_start() -> None:
 
     assert plant.outcome == (
         "plant: no token from inv1 within 10 s; nothing was ever heard from inv1. "
-        "no nameplate from inv2 within 10 s; nothing was ever heard from inv2. "
-        "no token from fleet within 10 s; nothing was ever heard from fleet"
+        "no nameplate from inv2 within 10 s; nothing was ever heard from inv2"
     )
 
 

@@ -2,6 +2,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from msgspec.structs import replace
+
 from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
 from scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
 from wire.codec import encode
@@ -35,7 +37,7 @@ class Recorder:
 
 def recorder(stream: TelemetryStream | None = None) -> Recorder:
     """One that has just opened its session."""
-    return Recorder(TelemetryEndpoint("fleet", "demo", stream))
+    return Recorder(TelemetryEndpoint("fleet", "demo", stream or TelemetryStream(acknowledges=True)))
 
 
 def test_who_speaks_before_the_plant_does_not_take_its_place() -> None:
@@ -61,8 +63,9 @@ def test_a_report_that_the_plant_passes_on_is_taken_and_an_order_of_anybody_else
     it.hear(report)
     it.hear(order)
     it.hear(telemetry(0, sender="inv1"))
+    it.hear(replace(telemetry(0), others=1))
 
-    assert it.taken == [report]
+    assert it.taken == [report, replace(telemetry(0), others=1)]
     assert it.core.rejects.counts == {"foreign": 2}
 
 
