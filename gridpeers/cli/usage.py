@@ -111,7 +111,7 @@ def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
     import subprocess
 
-    from plant.wheels import damaged
+    from wire.packages import damaged
 
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)

@@ -11,7 +11,7 @@ from typing import Any
 from plant.helics.helics_settings import HelicsSettings, endpoint
 from plant.helics.topics import Topic, Value
 from plant.request_process import ProcessEndedError, RequestProcess
-from plant.wheels import damaged
+from wire.packages import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
 

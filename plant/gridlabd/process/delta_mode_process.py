@@ -11,7 +11,7 @@ from typing import Any
 from plant.gridlabd.process.gridlabd_messages import messages
 from plant.request_process import ProcessEndedError, RequestProcess
 from plant.transient_folder import TransientFolder
-from plant.wheels import damaged
+from wire.packages import damaged
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 

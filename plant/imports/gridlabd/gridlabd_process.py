@@ -15,7 +15,7 @@ from plant.imports.gridlabd.glm_text import GlmText
 from plant.request_process import program
 from plant.tables.read import FeederError
 from plant.transient_folder import TransientFolder, no_room
-from plant.wheels import damaged
+from wire.packages import damaged
 from wire.printable import printable
 
 POWER_FLOW = "plant.imports.gridlabd.gridlabd_power_flow"

@@ -18,7 +18,7 @@ from plant.imports.opendss.dss_circuit import DssCircuit, ImportRequest
 from plant.request_process import ProcessEndedError, RequestProcess, program
 from plant.tables.read import FeederError
 from plant.transient_folder import TransientFolder, no_room
-from plant.wheels import damaged
+from wire.packages import damaged
 from wire.printable import printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
