@@ -22,6 +22,7 @@ from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_lin
 from wire.driver.scheduling import schedule_as_batch
 from wire.driver.session import Session
 from wire.messages import PLANT
+from wire.packages import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:
@@ -101,6 +102,8 @@ def run_plant(
             raise ConfigurationError(str(error)) from error
         except RuntimeError as error:
             return f"plant: cannot start: {error}"
+        except ImportError as error:
+            return f"plant: cannot start: {not_importable(error)}"
         if config.credentials is not None:
             node.vouches = session.vouches
         for key in node.publications:

@@ -30,6 +30,7 @@ from scenarios.versions import version_of, versions
 from wire.driver.open_files import too_few_files
 from wire.driver.output import OutputLostError
 from wire.messages import Pacing
+from wire.packages import not_importable
 
 if TYPE_CHECKING:
     from scenarios.live.numbers.departures import Departures
@@ -69,6 +70,8 @@ def _logged(request: Request, progress: Progress) -> RunReport:
                 traceback.print_exc(file=log)
                 if why := too_few_files(error):
                     raise BrokenRunError(why) from error
+                if isinstance(error, ImportError):
+                    raise BrokenRunError(not_importable(error)) from error
                 raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
     except OSError as error:
         _log_no_room(file, f"broken: {refusal(request.folder, error)}\n")

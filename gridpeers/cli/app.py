@@ -27,6 +27,11 @@ def main() -> None:
 
         _tell("interrupted before anything had begun")
         sys.exit(INTERRUPTED)
+    except ImportError as error:
+        from wire.packages import not_importable
+
+        _tell(not_importable(error))
+        sys.exit(2)  # as BAD_INPUT, whose module may be what cannot be imported
     except SystemExit as end:
         leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
         raise
@@ -44,14 +49,12 @@ def _main() -> None:
     _start_ahead(driver_of(sys.argv[1:]))  # what servers import takes longer than all that comes before them here
     with speaking("gridpeers"):
         from gridpeers.cli.root import app
-        from gridpeers.cli.usage import BAD_INPUT, BROKEN, INSTALL, INTERRUPTED, fail
+        from gridpeers.cli.usage import BROKEN, INTERRUPTED, fail
 
         try:
             app()
         except KeyboardInterrupt:
             fail(["interrupted; everything that was started has ended"], INTERRUPTED)
-        except ModuleNotFoundError as error:
-            fail([f"{error.name} is not installed; {INSTALL}"], BAD_INPUT)
         except OSError as error:  # the machine refuses something: no memory for a process, no room on a disk
             fail([too_few_files(error) or _without_folder(error) or str(error)], BROKEN)
 

@@ -87,19 +87,26 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
     return spec if seed is None else msgspec.structs.replace(spec, seed=seed)
 
 
-INSTALL = "install gridpeers with its dependencies: pip install -e ."
-"""Advice when a package that all commands need is missing."""
+RUN = {
+    **dict.fromkeys(("numpy", "scipy", "numba", "llvmlite", "threadpoolctl"), "the plant"),
+    **dict.fromkeys(("mcap", "lz4", "zstandard", "msgpack"), "the record of a run"),
+    "matplotlib": "the figures",
+}
+"""Packages that a run needs in any driver, and what for."""
 
 
-def require(modules: dict[str, str], install: str = INSTALL) -> None:
+def require(modules: dict[str, str], install: str = "") -> None:
     """End with a clear line, and with advice, if a package that a part of gridpeers needs is missing or ill set up."""
     from importlib.util import find_spec
 
-    packages = {"zenoh": "eclipse-zenoh"}
+    from wire.packages import DISTRIBUTIONS, requirement
+
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
-        lines = [f"{packages.get(name, name)} is not installed; it is needed for {modules[name]}" for name in missing]
-        fail([*lines, install], BAD_INPUT)
+        packages = {name: DISTRIBUTIONS.get(name, name) for name in missing}
+        lines = [f"{packages[name]} is not installed; it is needed for {modules[name]}" for name in missing]
+        again = f"install what is missing: pip install {' '.join(map(requirement, missing))}"
+        fail([*lines, install or again], BAD_INPUT)
     if "zenoh" in modules:
         from wire.driver.zenoh_settings import RUNTIME, runtime_objection
 

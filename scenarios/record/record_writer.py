@@ -17,6 +17,8 @@ from tempfile import TemporaryFile
 from time import monotonic
 from typing import Any, NamedTuple, cast
 
+import lz4.frame  # noqa: F401  # without these two mcap fails at the first chunk
+import zstandard  # noqa: F401
 from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer

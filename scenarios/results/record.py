@@ -23,6 +23,7 @@ from scenarios.results.link_record import LinkRecord
 from scenarios.results.packed_events import PackedEvents
 from scenarios.results.run_files import write_whole
 from wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
+from wire.packages import not_importable
 
 if TYPE_CHECKING:
     from scenarios.record.record_info import RecordInfo
@@ -164,7 +165,7 @@ class Recorder:
 
                 self._recording = Recording(folder, record, QUANTITIES)
             except ImportError as error:
-                self._not_recorded = f"there is no run.mcap: {error}; install gridpeers with its dependencies"
+                self._not_recorded = f"there is no run.mcap: {not_importable(error)}"
             except OSError as error:
                 self._not_recorded = f"there is no run.mcap: it cannot be made: {error.strerror}"
         self._finished = False

@@ -33,6 +33,7 @@ from wire.driver.zenoh_settings import (
     zenoh_settings,
 )
 from wire.keys import LATEST_ONLY, is_token
+from wire.packages import not_importable
 from wire.token_queue import Stamped
 from wire.trust.credentials import Credentials
 from wire.trust.link_certificates import LinkCertificates
@@ -131,10 +132,7 @@ class Session:
             load_zenoh(one_thread=star and not rendezvous)
             import zenoh
         except ImportError as error:
-            raise SessionError(
-                f"{who}: the package eclipse-zenoh is missing or broken ({error}); "
-                "install gridpeers with its dependencies, or use --driver inprocess"
-            ) from None
+            raise SessionError(f"{who}: {not_importable(error)}; or use --driver inprocess") from None
         if "RUST_LOG" in os.environ:  # RUST_LOG=zenoh=debug shows what Zenoh does, in the process's log
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
         elif credentials is not None and rendezvous:

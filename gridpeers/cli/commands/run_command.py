@@ -14,6 +14,7 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
+    RUN,
     ScenarioName,
     chosen,
     fail,
@@ -159,8 +160,7 @@ def carry_out(
         refuse(error)
     if pace.get("keys") is not None:
         _check_keys(Path(pace["keys"] or ""), spec, feeder)
-    needed = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
-    require(needed | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    require(RUN | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     if spec.plant.simulator == "gridlabd":
         require_loadable("gridlabd", 'the plant of simulator "gridlabd"')
     federate = outside is not None or spec.plant.simulator == "helics"

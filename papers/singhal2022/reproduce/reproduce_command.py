@@ -8,10 +8,19 @@ from typing import Annotated, Literal
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, check_choice, fail, refuse, require, terminal
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    PASSED,
+    RUN,
+    check_choice,
+    fail,
+    refuse,
+    require,
+    terminal,
+)
 from papers.singhal2022.reproduce.parts import CHOICES, chosen
-
-_NEEDED = {"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant", "matplotlib": "the figures"}
 
 
 def reproduce(
@@ -47,7 +56,7 @@ def reproduce(
     check_choice("--driver: ", "driver", driver, ("processes", "inprocess"))
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
-    require(_NEEDED | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    require(RUN | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, out)
 
 

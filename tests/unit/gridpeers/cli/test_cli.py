@@ -138,15 +138,19 @@ def test_bad_input_is_told_and_leaves_nothing(elsewhere: Path, words: list[str],
     assert sorted(path for path in elsewhere.rglob("*")) == before
 
 
-@pytest.mark.parametrize(("module", "package"), [("zenoh", "eclipse-zenoh"), ("numba", "numba")])
+@pytest.mark.parametrize(
+    ("module", "package"),
+    [("zenoh", "eclipse-zenoh"), *((name, name) for name in ("numba", "mcap", "lz4", "zstandard", "msgpack"))],
+)
 def test_a_missing_package_is_told(monkeypatch: pytest.MonkeyPatch, module: str, package: str) -> None:
-    """Without Zenoh or numba nothing starts, and the message says what to install."""
+    """Without a package of the core nothing starts, and the message says what to install."""
     monkeypatch.setitem(sys.modules, module, None)
 
     code, text = invoke("run", "islanding")
 
     assert code == 2
     assert f"{package} is not installed" in text
+    assert f"pip install '{package}" in text
     assert not Path("runs").exists()
 
 

@@ -1,0 +1,90 @@
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from wire.packages import not_importable
+
+
+def error_of(folder: Path, statement: str) -> ImportError:
+    """Return the error of an import in a module of ours."""
+    file = folder / "module_of_ours.py"
+    file.write_text(statement)
+    with pytest.raises(ImportError) as caught:
+        exec(compile(statement, str(file), "exec"), {"__name__": "plant.module_of_ours"})
+    return caught.value
+
+
+@pytest.mark.parametrize(
+    ("package", "installs"), [("zenoh", "'eclipse-zenoh"), ("mcap", "'mcap"), ("pyarrow", "'gridpeers[sweep]'")]
+)
+def test_a_missing_package_is_named_with_what_to_install(
+    package: str, installs: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The name that pip knows, and the extra of gridpeers that has it."""
+    monkeypatch.setitem(sys.modules, package, None)
+
+    text = not_importable(error_of(tmp_path, f"import {package}"))
+
+    assert "is not installed; gridpeers needs it: pip install " + installs in text
+    assert "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (
+            "raise ImportError('libz.so.1: cannot open\\nshared object file')",
+            "ImportError: libz.so.1: cannot open shared",
+        ),
+        ("import a_part_of_it_that_is_gone", "ModuleNotFoundError: No module named 'a_part_of_it_that_is_gone'"),
+        ("from json import no_such_name", "ImportError: cannot import name 'no_such_name' from 'json'"),
+    ],
+)
+def test_a_package_that_does_not_load_is_named_with_its_reason(
+    text: str, reason: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A library of the system is missing, or half of an installation: to install it once more is what helps."""
+    (tmp_path / "broken_package.py").write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+
+    said = not_importable(error_of(tmp_path, "from broken_package import anything"))
+
+    assert said.startswith(f"broken_package is installed, but cannot be imported ({reason}")
+    assert said.endswith("gridpeers needs it: pip install --force-reinstall broken_package")
+
+
+@pytest.mark.parametrize("package", ["typer", "msgspec"])
+def test_a_command_without_a_package_that_it_starts_with_ends_in_one_line(package: str) -> None:
+    """The command line itself, or the checks of a scenario, cannot be imported."""
+    code = f"import sys; sys.modules['{package}'] = None; sys.argv = ['gridpeers', 'check', 'islanding']\n"
+    code += "from gridpeers.cli.app import main; main()"
+
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=False)
+
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"gridpeers: {package} is not installed; gridpeers needs it: pip install '{package}")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_run_with_a_damaged_package_says_which(tmp_path: Path) -> None:
+    """The run breaks with the package and its reason, not with the class of an error and a traceback."""
+    (tmp_path / "scipy.py").write_text("raise ImportError('libopenblas.so.0: cannot open shared object file')")
+    words = ["run", "islanding", "--case", "IV", "--driver", "inprocess", "--out", str(tmp_path / "out")]
+
+    done = subprocess.run(
+        [sys.executable, "-m", "gridpeers", *words],
+        env=os.environ | {"PYTHONPATH": str(tmp_path)},
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+
+    assert done.returncode == 3
+    assert "the run broke: scipy is installed, but cannot be imported (ImportError: libopenblas.so.0" in done.stderr
+    assert "pip install --force-reinstall scipy" in done.stderr
