@@ -14,7 +14,7 @@ from scenarios.live.client.run_address import RunAddress
 from scenarios.view.own_agents import OwnAgents
 from scenarios.view.page_actions import ActionClient, PageAction, command_line
 from scenarios.view.page_rights import looks_only
-from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts
+from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
 from scenarios.view.run_follower import RunFollower
 from scenarios.view.run_view import Cursor
 from scenarios.view.scenario_form import scenario_form
@@ -76,21 +76,21 @@ class LivePages:
     async def _send(self, socket: WebSocket) -> None:
         """Send frames; those that a slow page has no room for are left out, as each says all that is new."""
         hello = {"run": self._where.run, "where": str(self._where), "control": self._control, "silent_s": SILENT}
-        await socket.send_text(as_json({"hello": hello}))
+        await send(socket, as_json({"hello": hello}))
         cursor, drawn, news = Cursor(), False, asyncio.Event()
         self._news.add(news)
         try:
             while True:
                 news.clear()
                 if not drawn and (diagram := self._follower.feeder_map()) is not None:
-                    await socket.send_text(as_json({"map": diagram}))
+                    await send(socket, as_json({"map": diagram}))
                     drawn = True
                 frame, cursor = self._follower.frame(cursor)
                 if frame.reset:
                     drawn = False
-                await socket.send_text(as_json({"frame": frame}))
+                await send(socket, as_json({"frame": frame}))
                 for text in self._agents.take_endings():
-                    await socket.send_text(as_json({"done": {"ok": False, "text": text}}))
+                    await send(socket, as_json({"done": {"ok": False, "text": text}}))
                 await asyncio.sleep(FASTEST)
                 with contextlib.suppress(asyncio.TimeoutError):
                     await asyncio.wait_for(news.wait(), HEARTBEAT)
@@ -101,7 +101,7 @@ class LivePages:
         """Carry out what a page asks for, one after another."""
         loop = asyncio.get_running_loop()
         async for text in texts(socket):
-            await socket.send_text(as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
+            await send(socket, as_json({"done": await loop.run_in_executor(self._worker, self._do, text)}))
 
     def _do(self, text: str) -> dict[str, Any]:
         """Carry out an action; return what the page says of it."""

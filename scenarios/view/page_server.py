@@ -127,8 +127,10 @@ class PageServer:
             ws="websockets-sansio",
             ws_max_size=4096,
             ws_per_message_deflate=False,
+            ws_ping_interval=None,  # frames are the heartbeat; uvicorn tells nobody of a page that it gives up
             timeout_graceful_shutdown=1,
         )
+        logging.getLogger("uvicorn.error").addFilter(lambda line: "graceful shutdown" not in str(line.msg))
         signal.signal(signal.SIGTERM, _stop)  # uvicorn ends, and then raises the signal again
         try:
             uvicorn.Server(config).run(sockets=[listening])
@@ -248,3 +250,19 @@ async def texts(socket: WebSocket) -> AsyncIterator[str]:
 def as_json(value: Any) -> str:
     """Return a message to a page."""
     return msgspec.json.encode(value).decode()
+
+
+async def send(socket: WebSocket, text: str) -> None:
+    """Send a page a message.
+
+    Raises
+    ------
+    WebSocketDisconnect
+        If the page has gone, or the server has closed the connection.
+    """
+    from starlette.websockets import WebSocketDisconnect
+
+    try:
+        await socket.send_text(text)
+    except RuntimeError as error:  # of uvicorn, once it has closed the connection itself
+        raise WebSocketDisconnect(1006, str(error)) from error

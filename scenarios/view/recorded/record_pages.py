@@ -14,7 +14,7 @@ from msgspec.structs import replace
 
 from scenarios.record.record_reader import RecordFileError
 from scenarios.view.link_states import LinkView
-from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, texts
+from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
 from scenarios.view.recorded.record_view import RecordView
 from scenarios.view.recorded.recorded_run import RecordedRun
 from wire.bounds import Text
@@ -84,7 +84,7 @@ class RecordPages:
         loop, told = asyncio.get_running_loop(), float("-inf")
         where = str(self._run.path)
         hello = {"run": where, "where": where, "control": False, "record": True, "silent_s": SILENT}
-        await socket.send_text(as_json({"hello": hello}))
+        await send(socket, as_json({"hello": hello}))
         while True:
             if (now := loop.time()) - told >= HEARTBEAT:
                 told = now
@@ -99,9 +99,9 @@ class RecordPages:
         """Send an answer; a page that waits for it knows that its server is there."""
         future = asyncio.get_running_loop().run_in_executor(self._worker, lambda: list(answer()))
         while not (await asyncio.wait({future}, timeout=HEARTBEAT))[0]:
-            await socket.send_text(as_json({"beat": True}))
+            await send(socket, as_json({"beat": True}))
         for text in future.result():
-            await socket.send_text(text)
+            await send(socket, text)
 
     async def _receive(self, socket: WebSocket, page: RecordPage) -> None:
         async for text in texts(socket):
