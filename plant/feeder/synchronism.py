@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import compress
 from math import degrees
 
 import numpy as np
@@ -24,6 +25,9 @@ _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0
 
 LOCKED = 0.01
 """Difference of frequency (Hz) below which two islands count as held at one frequency: a beat lasts 100 s and more."""
+
+LEAST = 0.1
+"""Voltage without load (pu) below which a pole of a switch is a neutral's."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,7 +135,12 @@ class Synchronism:
         others
             Switches that close with it. A dead side that one of them energizes counts as the energizing island.
         """
-        phases = self._network.switches[switch].phases
+        device = self._network.switches[switch]
+        at = [self._network.index(device.from_bus, phase) for phase in device.phases]
+        live = np.abs(self._network.nominal[at]) > LEAST * self._network.V_nom[at]
+        phases = "".join(compress(device.phases, live))  # a neutral's pole has no voltage to compare
+        if not phases:
+            return None
         found = self._on_phases(switch, phases, closed, others)
         if found is None and len(phases) > 1:  # a single-phase inverter may feed one phase of a side alone
             single = (self._on_phases(switch, phase, closed, others) for phase in phases)

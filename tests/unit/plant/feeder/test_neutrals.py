@@ -277,3 +277,13 @@ def test_legs_of_a_split_phase_service_return_to_their_neutral(tmp_path: Path) -
     assert [row.neutral for row in feeder.inverters] == ["C", "C"]
     theirs = engine(CENTRE_TAPPED, *in_engine(network, dynamics, behind_filter=False))
     assert largest_difference(network, dynamics, frozenset(), theirs) < TOLERANCE
+
+
+def test_a_street_that_was_cut_off_is_judged_by_its_phases_when_it_closes_again(tmp_path: Path) -> None:
+    """The neutral's pole of a switch has no voltage to compare: the sides' differences are those of the phases."""
+    feeder, _ = imported(tmp_path, KINDS["earthed at the transformer"])
+    plant, _ = events_of(feeder.add_inverter("bat", "b1", "GFM", 6e4), 1.0)
+    found = plant.difference_across("a1")
+
+    assert found is not None
+    assert 0.0 < found.V < 0.03
