@@ -19,3 +19,17 @@ class NoSolutionError(PlantError):
     def __init__(self, islands: tuple[int, ...]) -> None:
         super().__init__(f"{len(islands)} islands have no solution")
         self.islands = islands
+
+
+class NoPowerFlowError(PlantError):
+    """No operating point at the start.
+
+    Attributes
+    ----------
+    weak : dict of int to float
+        Load branches that the network cannot feed even alone, and their short-circuit powers (VA).
+    """
+
+    def __init__(self, weak: dict[int, float]) -> None:
+        super().__init__("no initial operating point: the power flow did not converge")
+        self.weak = weak

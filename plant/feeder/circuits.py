@@ -61,16 +61,6 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
     """Make the circuit of a feeder with these switches closed; `loads` are at their own nodes."""
     merge = network.merge(closed)
     on = loads.on(merge)
-    n, m = len(network.nodes), len(on)
-    branch = np.arange(m)
-    delta = on.n_to >= 0
-    C = sp.csc_array(
-        (
-            np.concatenate([on.a_from, -on.a_to[delta]]),
-            (np.concatenate([on.n_from, on.n_to[delta]]), np.concatenate([branch, branch[delta]])),
-        ),
-        shape=(n, m),
-    )
     raw = np.array(
         [[network.index(unit.bus, phase) for phase in (3 * unit.phases)[:3]] for unit in network.inverters], np.int64
     )
@@ -85,7 +75,7 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
                 "switches or a regulator, without any impedance between them: move it behind a line"
             )
         owner.update(dict.fromkeys(nodes.tolist(), unit.name))
-    Y, reference = network.admittance(closed), None
+    Y, C, reference = network.admittance(closed), on.incidence(len(network.nodes)), None
     if any(unit.neutral for unit in network.inverters):
         reference = _references(network, merge, on, terminals)
         Y, C = _referred(Y, C, reference)

@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from plant.dynamics import Circuit, Dynamics, PlantError
+from plant.dynamics.error import NoPowerFlowError
 from plant.dynamics.foreseen_cache import ROOM
 from plant.dynamics.start.at_rest import require_within_limits
 from plant.feeder.circuits import Circuits
@@ -122,7 +123,10 @@ class Plant:
             self._settle,
         )
         n = len(self.inverters)
-        point = self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
+        try:
+            point = self._dynamics.start(np.full(n, settings.P_set0), V_set=np.full(n, settings.V_set0))
+        except NoPowerFlowError as error:
+            raise PlantError(f"{error}; {network.weak_loads(error.weak)}; or try another P_set0") from None
         require_within_limits(self._dynamics.inverters, self._dynamics.network.reduction.online)
         self._load_limits = LoadLimits(network, self._dynamics.network.V_branch)
         self._now = self._dynamics.readings()

@@ -56,6 +56,14 @@ class LoadBranches:
             a_to=self.a_to * merge.ratio[self.n_to],
         )
 
+    def incidence(self, n: int) -> sp.csc_array:
+        """Return C of n nodes: branch voltages are C^T V, and branch currents I draw C I out of the nodes."""
+        m = len(self)
+        branch, between = np.arange(m), self.n_to >= 0
+        values = np.concatenate([self.a_from, -self.a_to[between]])
+        where = np.concatenate([self.n_from, self.n_to[between]]), np.concatenate([branch, branch[between]])
+        return sp.csc_array((values, where), shape=(n, m))
+
     def nominal_admittance(self, n: int) -> sp.csc_array:
         """Admittances (S) that the loads with limits have at nominal voltage, between the n nodes."""
         at, rows = self.law.limited_at, self.law.law

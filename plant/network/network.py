@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import cmath
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from copy import copy
 from itertools import compress
 from math import pi, sqrt
@@ -17,9 +17,11 @@ from plant.dynamics.load_law import LoadLaw
 from plant.equipment import PHASES, Feeder, InverterRow, Switch
 from plant.equipment.bus_islands import bus_islands, switch_name
 from plant.equipment.imported_equipment import LoadPart
+from plant.equipment.named_loads import named_loads
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
+from wire.schema.suggestion import first_of
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""
@@ -145,6 +147,34 @@ class Network:
         own = self._load_branches([load.model != "Z" for load in self.feeder.loads])
         parts = [part for part in self.feeder.load_parts if not part.is_impedance]
         return own + self._load_part_branches(parts) if parts else own
+
+    def weak_loads(self, weak: Mapping[int, float]) -> str:
+        """Say which loads the network cannot feed even alone, and what to do; of none, that the load may be too much.
+
+        Parameters
+        ----------
+        weak
+            Branches of `loads`, and the short-circuit powers there (VA): see `plant.dynamics.weak_branches`.
+        """
+        pairs = zip(self.feeder.loads, self._first.loads, strict=True)
+        names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]
+        names += [part.name for part in self.feeder.load_parts if not part.is_impedance]
+        least: dict[str, float] = {}
+        for branch, S in weak.items():
+            least[names[branch]] = min(S, least.get(names[branch], S))
+        if not least:
+            return "the load may be more than the network can carry: try smaller loads"
+        sizes = named_loads(self.feeder)
+        told = [
+            f"{name} at bus {sizes[name].bus} ({abs(sizes[name].S) / 1e3:.3g} kVA where the short-circuit power is "
+            f"{least[name] / 1e3:.2g} kVA)"
+            for name in least
+        ]
+        return (
+            f"the network cannot feed the constant power of {first_of(told, 5)}: make it smaller, or a constant "
+            "impedance; where nothing holds a voltage to ground, as behind a delta winding, ground it, or connect the "
+            "load between phases"
+        )
 
     def with_loads(self, feeder: Feeder) -> Network:
         """Return the same network with the loads of `feeder`, which is this one's with other powers of loads.

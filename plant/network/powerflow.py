@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
+from plant.dynamics.weak_branches import weak_branches
 from plant.network.loads import LoadBranches
 from plant.network.network import Network
 
@@ -21,7 +22,7 @@ MOST_ITERATIONS = 200
 """Most iterations: a feeder that can carry its loads takes about 10, one that cannot diverges long before."""
 
 NOISE = 1e-8
-"""Change (pu) that may be rounding: the nodes behind a delta winding have next to nothing to ground."""
+"""Change (pu) that may be rounding in any network; more where a section has next to nothing to ground."""
 
 STALL = 8
 """Iterations without a smaller change after which it is rounding."""
@@ -95,6 +96,7 @@ def solve_power_flow(
     if shunt is not None:
         Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
     own = loads if loads is not None else network.loads()
+    without_loads = Y
     linear = own.nominal_admittance(len(network.nodes))
     if linear.nnz:  # without the loads' linear part the fixed point diverges where a phase is missing
         T = merge.matrix()
@@ -102,6 +104,11 @@ def solve_power_flow(
     unknown = _reached(Y, network.source_nodes, own.on(merge))
     solve = factorized(sp.csc_matrix(Y[unknown][:, unknown]))
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
+
+    def rounding(V: NDArray[np.complex128]) -> float:
+        """Return the change (pu) that rounding of the network's currents can make."""
+        lost = np.finfo(float).eps * (abs(Y[unknown][:, unknown]) @ np.abs(V))
+        return float(np.max(np.abs(solve(lost.astype(complex))) / network.V_nom[unknown], initial=0.0))
 
     V_rep = np.zeros(len(network.nodes), dtype=np.complex128)
     V_rep[unknown] = (network.nominal if start is None else start)[unknown]
@@ -119,15 +126,20 @@ def solve_power_flow(
         largest = float(change[worst]) if len(change) else 0.0
         if largest < smallest:
             smallest, since = largest, iteration
-        stalled = largest < NOISE and iteration - since >= STALL
+        stalled = iteration - since >= STALL and (largest < NOISE or largest < rounding(V_rep[unknown]))
         if largest < tolerance or stalled:
             return _balance(network, merge.expand(V_rep), own, injection, shunt, iteration)
         if not np.isfinite(largest):
             break
+    if largest < NOISE:  # it converges, but slowly
+        return _balance(network, merge.expand(V_rep), own, injection, shunt, iteration)
     bus, phase = network.nodes[unknown[worst]]
+    on = own.on(merge)
+    C = on.incidence(len(network.nodes)).tocsr()[unknown].tocsc()
+    weak = weak_branches(without_loads[unknown][:, unknown], C, on.law, on.V_nom)
     raise ArithmeticError(
         f"power flow did not converge: after {iteration} iterations bus {bus} phase {phase} still changes by "
-        f"{largest:.3g} pu; the load may be more than the feeder can carry"
+        f"{largest:.3g} pu; {network.weak_loads(weak)}"
     )
 
 

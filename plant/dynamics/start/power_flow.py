@@ -6,11 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import PlantError
+from plant.dynamics.error import NoPowerFlowError, PlantError
 from plant.dynamics.inverters import Inverters
 from plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
 from plant.dynamics.reduction.reduce_network import reduce_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from plant.dynamics.weak_branches import weak_branches
 
 MOST_ROUNDS = 500
 """Most rounds between the network and inverters of constant power."""
@@ -41,7 +42,7 @@ class PowerFlow:
         """Move the tangent to where Newton's method leads: across a limit of the loads' law it does not itself."""
         self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
         if failed:
-            raise _no_power_flow()
+            raise self._no_power_flow()
         self.net = self._linearise()
 
     def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
@@ -68,7 +69,7 @@ class PowerFlow:
             )
             if rounds == NO_NETWORK:
                 if renewed:
-                    raise _no_power_flow()
+                    raise self._no_power_flow()
                 renewed = True
                 self._renew(J)
                 continue
@@ -83,9 +84,12 @@ class PowerFlow:
             "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
         )
 
-
-def _no_power_flow() -> PlantError:
-    return PlantError(
-        "no initial operating point: the power flow did not converge; the load may be more than the "
-        "network can carry; try smaller loads or another P_set0"
-    )
+    def _no_power_flow(self) -> NoPowerFlowError:
+        reduction, at = self.reduction, self.reduction.unknown
+        weak = weak_branches(
+            reduction.Y[at][:, at].tocsc(),
+            reduction.C.tocsr()[at].tocsc(),
+            reduction.loads,
+            np.abs(self.circuit.V_branch[reduction.branches]),
+        )
+        return NoPowerFlowError({int(reduction.branches[k]): S for k, S in weak.items()})
