@@ -19,7 +19,7 @@ def kirchhoff_residual(dynamics: Dynamics) -> float:
 
     The network is solved as a step solves it. The start has a solver of its own, and cannot tell.
     """
-    V, J = _solution(dynamics)
+    V, J = solved_voltages(dynamics)
     reduction = dynamics.network.reduction
     C, at = reduction.C, reduction.unknown
     I_b = reduction.loads.currents(C.T @ V)
@@ -27,8 +27,12 @@ def kirchhoff_residual(dynamics: Dynamics) -> float:
     return float(np.max(np.abs(left), initial=0.0)) if np.isfinite(left).all() else np.inf
 
 
-def _solution(dynamics: Dynamics) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Return voltages (V) of all nodes and the currents (A) that inverters inject there; nan without a solution."""
+def solved_voltages(dynamics: Dynamics) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Return the voltages (V) of the circuit's nodes and the currents (A) that inverters inject there.
+
+    A step leaves voltages behind that it found before it moved the inverters' phasors for the last time; these go with
+    the phasors as they are. Without a solution they are nan.
+    """
     network, units = dynamics.network, dynamics.inverters
     net, reduction = network.net, network.reduction
     m, leader = network.x.size // 2, reduction.leader

@@ -113,6 +113,26 @@ object load { name ng; phases AN; nominal_voltage 7200; constant_power_A 3e4+2e4
 )
 """Switches that are open and closed, a recloser, a fuse."""
 
+ASYMMETRIC = (
+    HEAD.replace("z21 0.16+0.50j", "z21 0.26+0.30j")
+    .replace("z31 0.15+0.42j", "z31 0.05+0.60j")
+    .replace("z32 0.15+0.38j", "z32 0.22+0.45j")
+    + """object overhead_line { name one; phases ABCN; from b; to ring; length 9000; configuration uneven; }
+object overhead_line { name two; phases ABCN; from b; to far; length 7000; configuration uneven; }
+object switch { name tie; phases ABCN; from far; to end; status CLOSED; }
+object overhead_line { name three; phases ABCN; from end; to ring; length 4000; configuration uneven; }
+object node { name ring; phases ABCN; nominal_voltage 7200; }
+object node { name far; phases ABCN; nominal_voltage 7200; }
+object load { name at_far; phases ABCN; parent far; nominal_voltage 7200; constant_power_A 1.2e5+3e4j;
+  constant_current_B -4-10j; constant_impedance_C 500+150j; }
+object load { name end; phases ABCN; nominal_voltage 7200; constant_power_B 2e5+6e4j; constant_power_C 5e4+1e4j; }
+object overhead_line { name open_end; phases ABCN; from ring; to nothing; length 3000; configuration uneven; }
+object node { name nothing; phases ABCN; nominal_voltage 7200; }
+"""
+    + SECONDARY.replace("SHORT", "low").replace("CONNECT", "WYE_WYE").replace("PHASE", "N").replace("LOAD", WYE)
+)
+"""Lines with z12 unlike z21, in a ring with a switch, with an open end."""
+
 
 def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:
     """Write a model."""

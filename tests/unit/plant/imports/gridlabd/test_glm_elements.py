@@ -12,6 +12,7 @@ from plant.plant_config import PlantSettings
 from plant.tables import read_feeder
 from plant.tables.write import write_feeder
 from tests.unit.plant.imports.gridlabd.glm_models import (
+    ASYMMETRIC,
     HEAD,
     LOADS,
     SWITCHES,
@@ -24,7 +25,7 @@ from tests.unit.plant.imports.gridlabd.glm_models import (
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
 
 
-@pytest.mark.parametrize(("model", "count"), [(TRANSFORMERS, 23), (LOADS, 9), (SWITCHES, 16)])
+@pytest.mark.parametrize(("model", "count"), [(TRANSFORMERS, 23), (LOADS, 9), (SWITCHES, 16), (ASYMMETRIC, 21)])
 def test_voltages_are_gridlabds(tmp_path: Path, model: str, count: int) -> None:
     """Every voltage is GridLAB-D's within 1e-6 pu."""
     difference, nodes = largest_difference(write(tmp_path, model))

@@ -1,0 +1,197 @@
+"""A random feeder in our plant: its start, a load step and a switching, and the same states for OpenDSS."""
+
+from __future__ import annotations
+
+from cmath import phase as angle_of
+from math import degrees
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
+from bench.validation.random_feeders.random_script import RandomFeeder
+from plant.dynamics import Dynamics
+from plant.dynamics.reduction import reduce_network
+from plant.equipment import Feeder, InverterRow
+from plant.equipment.named_loads import with_powers
+from plant.feeder.circuits import circuit_of
+from plant.feeder.installed_inverters import installed_inverters
+from plant.imports.opendss import read_opendss
+from plant.network import Network, solve_power_flow
+from plant.plant_config import PlantSettings
+
+STEPS = 10
+"""Steps of 2 ms from an event to the state that is compared."""
+
+HELD = "vminpu=0 vlowpu=0 vmaxpu=99"
+"""An inverter of the engine keeps its power at any voltage."""
+
+STIFF = "r1=1e-9 x1=1e-9 r0=1e-9 x0=1e-9"
+"""Impedance (ohm) of the engine's source in an island."""
+
+
+class FeederStates(NamedTuple):
+    """What our plant finds in each state."""
+
+    V: list[NDArray[np.complex128]]
+    """Voltages of all nodes (V): at the start, after the load step, after the switching."""
+    names: list[str]
+    """The nodes as OpenDSS names them."""
+    V_nom: NDArray[np.float64]
+    commands: list[tuple[str, ...]]
+    """Commands that lead the engine from each state to the next."""
+    residual: float
+    """Largest current that is left at a node in any state (A)."""
+    start: float
+    """Largest difference of the start from `solve_power_flow` (pu)."""
+    asymmetry: float
+    """Largest y_ij - y_ji (S)."""
+    islanded: int
+    """Inverters that have no substation after the switching, and deliver."""
+
+
+def run_states(drawn: RandomFeeder, script: Path, *, dense: bool = False) -> FeederStates:
+    """Run our plant through the states of a feeder whose script is written, by sparse factors or by dense matrices.
+
+    Raises
+    ------
+    FeederError, PlantError, ArithmeticError
+        If the import or the plant refuses it, or an island has no solution.
+    """
+    before = reduce_network.MOST_DENSE
+    reduce_network.MOST_DENSE = before if dense else 0
+    try:
+        return _Run(drawn, read_opendss(script, switches=[drawn.switch])).states()
+    finally:
+        reduce_network.MOST_DENSE = before
+
+
+class _Run:
+    def __init__(self, drawn: RandomFeeder, feeder: Feeder) -> None:
+        V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+        rows = [
+            InverterRow(
+                name=f"inv{k}",
+                kind=place.kind,
+                bus=place.bus,
+                microgrid="1",
+                P_rated=place.P_rated,
+                V_nom=V_nom[place.bus],
+                m_p=0.01,
+                m_q=0.05,
+                phases=place.phases,
+                neutral=place.neutral,
+            )
+            for k, place in enumerate(drawn.inverters)
+        ]
+        self._drawn, self._rows = drawn, rows
+        self._network = network = Network(replace(feeder, inverters=tuple(rows)))
+        power = complex(*drawn.power) * 1e3
+        self._stepped = network.with_loads(with_powers(network.feeder, {drawn.load: power}))
+        self._circuit = circuit_of(network, network.closed0, network.loads())
+        units = installed_inverters(network, PlantSettings())
+        self._dynamics = Dynamics(self._circuit, units, 0.002)
+
+    def states(self) -> FeederStates:
+        """Run through them."""
+        dynamics, network, n = self._dynamics, self._network, len(self._rows)
+        dynamics.start(np.full(n, 0.2), V_set=np.full(n, 1.0))
+        start = self._difference_from_power_flow()
+        residual, V = kirchhoff_residual(dynamics), [self._voltages()]
+        commands = [(*self._created(), *self._held())]
+
+        kW, kvar = self._drawn.power
+        closed = network.closed0
+        for circuit, what in (
+            (
+                circuit_of(self._stepped, closed, self._stepped.loads()),
+                f"edit {self._drawn.load} kw={kW!r} kvar={kvar!r}",
+            ),
+            (circuit_of(self._stepped, frozenset(), self._stepped.loads()), f"open {self._drawn.switch} 1"),
+        ):
+            dynamics.connect(circuit)
+            residual = max(residual, kirchhoff_residual(dynamics))
+            dynamics.run(STEPS)
+            residual = max(residual, kirchhoff_residual(dynamics))
+            if dynamics.take_trips():
+                raise ArithmeticError(f"no solution after {what}")
+            closed = network.closed0 if what.startswith("edit") else frozenset()
+            V.append(self._voltages(closed))
+            commands.append((what, *self._held()))
+        reduction, Y = dynamics.network.reduction, self._circuit.Y
+        return FeederStates(
+            V=V,
+            names=[f"{bus}.{'ABC456789'.index(phase) + 1}" for bus, phase in network.nodes],
+            V_nom=network.V_nom,
+            commands=commands,
+            residual=residual,
+            start=start,
+            asymmetry=float(abs(Y - Y.T).max()),
+            islanded=int(np.sum(reduction.online & ~reduction.has_source[reduction.inverter_island])),
+        )
+
+    def _voltages(self, closed: frozenset[str] | None = None) -> NDArray[np.complex128]:
+        """Return the voltages of all nodes to earth (V)."""
+        merge = self._network.merge(self._network.closed0 if closed is None else closed)
+        V, _ = solved_voltages(self._dynamics)
+        return merge.expand(self._dynamics.network.circuit.to_earth(V))
+
+    def _phases(self) -> list[tuple[int, int, int]]:
+        """Inverter, position of its terminal, and number of its node in OpenDSS, of every phase."""
+        return [
+            (i, k, "ABC".index(phase) + 1) for i, row in enumerate(self._rows) for k, phase in enumerate(row.phases)
+        ]
+
+    def _created(self) -> list[str]:
+        """Return the commands that make the inverters: constant powers, and sources that hold a voltage."""
+        commands = []
+        for i, _, node in self._phases():
+            row = self._rows[i]
+            name, kV, back = f"{row.name}_{node}", row.V_nom / 1e3, row.neutral or "0"
+            at = f"bus1={row.bus}.{node}"
+            commands.append(f"New Load.{name} {at}.{back} phases=1 kv={kV!r} model=1 {HELD} kw=0 kvar=0")
+            source = f"{at} bus2={row.bus}.{back} phases=1 basekv={kV!r} {STIFF} enabled=no"
+            commands.append(f"New Vsource.{name} {source}")
+        return commands
+
+    def _held(self) -> list[str]:
+        """Return the commands that have the inverters deliver what ours do; an island's leader holds its voltage."""
+        units, reduction = self._dynamics.inverters, self._dynamics.network.reduction
+        V_all, at = solved_voltages(self._dynamics)[0], self._dynamics.network.circuit.terminals
+        commands = []
+        for i, k, node in self._phases():
+            name = f"{self._rows[i].name}_{node}"
+            V = complex(V_all[at[i, k]])
+            if reduction.leader[reduction.inverter_island[i]] == i:
+                commands += [
+                    f"edit Vsource.{name} enabled=yes basekv={abs(V) / 1e3!r} pu=1 angle={degrees(angle_of(V))!r}",
+                    f"edit Load.{name} enabled=no",
+                ]
+            elif reduction.online[i]:
+                S = V * np.conj(units.J[i, k] - units.y_f[i] * V)
+                commands.append(f"edit Load.{name} kw={-float(S.real) / 1e3!r} kvar={-float(S.imag) / 1e3!r}")
+            else:
+                commands.append(f"edit Load.{name} enabled=no")
+        return commands
+
+    def _difference_from_power_flow(self) -> float:
+        """Return the largest difference (pu) of the first point from the power flow with the inverters' powers."""
+        network, circuit, units = self._network, self._circuit, self._dynamics.inverters
+        own = ~circuit.copies
+        at, S = circuit.terminals[own], (units.V * np.conj(units.I))[own]
+        back = np.repeat(circuit.returns, 3).reshape(own.shape)[own]
+        through = back >= 0
+
+        def fed(V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+            delivered = np.conj(S / (V[at] - np.where(through, V[back], 0.0)))
+            currents = np.zeros(V.size, complex)
+            np.add.at(currents, at, delivered)
+            np.add.at(currents, back[through], -delivered[through])
+            return currents
+
+        V = self._voltages()
+        flow = solve_power_flow(network, network.closed0, injection=fed, tolerance=1e-12, start=V)
+        return float(np.max(np.abs(V - flow.V) / network.V_nom))

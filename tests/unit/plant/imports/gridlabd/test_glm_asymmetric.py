@@ -1,0 +1,62 @@
+"""Lines with z12 unlike z21 in what the inner loop solves, beside GridLAB-D."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
+from plant.dynamics import Dynamics
+from plant.dynamics.reduction import reduce_network
+from plant.equipment import InverterRow
+from plant.feeder.circuits import circuit_of
+from plant.feeder.installed_inverters import installed_inverters
+from plant.imports.gridlabd.read_glm import read_glm
+from plant.network import Network
+from plant.plant_config import PlantSettings
+from tests.unit.plant.imports.gridlabd.glm_models import ASYMMETRIC, TOLERANCE, gridlabd_voltages, write
+
+pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
+
+PLACES = {"ring": ("GFM", 7200.0), "end": ("GFL", 7200.0), "c_low": ("GFL", 277.0)}
+"""Inverters by their bus."""
+
+
+@pytest.mark.parametrize("most_dense", [0, 10_000])
+def test_the_inner_loop_has_gridlabds_voltages_where_z12_is_not_z21(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_dense: int
+) -> None:
+    """At the start and 20 ms after a switch opens, GridLAB-D given the inverters' powers as loads."""
+    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    rows = [
+        InverterRow(name=bus, kind=kind, bus=bus, microgrid="1", P_rated=2e5, V_nom=V, m_p=0.01, m_q=0.05)  # type: ignore[arg-type]
+        for bus, (kind, V) in PLACES.items()
+    ]
+    network = Network(replace(read_glm(write(tmp_path, ASYMMETRIC)), inverters=tuple(rows)))
+    loads, units = network.loads(), installed_inverters(network, PlantSettings())
+    dynamics = Dynamics(circuit_of(network, network.closed0, loads), units, 0.002)
+    dynamics.start(np.full(3, 0.3), V_set=np.full(3, 1.0))
+
+    for status in ("CLOSED", "OPEN"):
+        closed = network.closed0 if status == "CLOSED" else frozenset[str]()
+        if status == "OPEN":
+            dynamics.connect(circuit_of(network, closed, loads))
+            dynamics.run(10)
+        V, _ = solved_voltages(dynamics)
+        at = dynamics.network.circuit.terminals
+        S = V[at] * np.conj(dynamics.inverters.J - dynamics.inverters.y_f[:, None] * V[at])
+        held = "".join(
+            f"object load {{ parent {row.bus}; phases ABCN; nominal_voltage {row.V_nom}; "
+            + "".join(f"constant_power_{p} {-s.real!r}{-s.imag:+.17g}j; " for p, s in zip("ABC", powers, strict=True))
+            + "}\n"
+            for row, powers in zip(rows, S.tolist(), strict=True)
+        )
+        theirs = gridlabd_voltages(write(tmp_path, ASYMMETRIC.replace("CLOSED", status) + held, "held.glm"))
+
+        ours = dict(zip(network.nodes, network.merge(closed).expand(V) / network.V_nom, strict=True))
+        V_nom = dict(zip(network.nodes, network.V_nom, strict=True))
+        assert kirchhoff_residual(dynamics) < 1e-6
+        gaps = {node: abs(ours[node] - theirs[node] / V_nom[node]) for node in theirs}
+        assert len(gaps) == 21
+        assert max(gaps.values()) < TOLERANCE, max(gaps, key=lambda node: gaps[node])
