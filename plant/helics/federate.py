@@ -139,6 +139,8 @@ class HelicsFederate:
         self._process.send(request)
         try:
             answer = self._take(self._deadline if wait is None else wait, late)
+            if "died" in answer:
+                raise HelicsError(f"HELICS, {self._when}: {answer['died']}")
             if "error" in answer:
                 raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'], request['do'])}")
         except HelicsError as error:
@@ -169,7 +171,8 @@ class HelicsFederate:
             return self._process.answer(until)
         except ProcessEndedError as how:
             last = self._process.printed()[-300:].strip().rpartition("\n")[2]
-            raise HelicsError(f"HELICS, {self._when}: the process of the federate {how}; {last or 'no word'}") from None
+            name = self._settings.name
+            raise HelicsError(f"HELICS, {self._when}: our federate {name} {how}; {last or 'no word'}") from None
 
     def _explained(self, error: str, doing: str) -> str:
         """Return an error of HELICS with what it means."""

@@ -11,6 +11,9 @@ what HELICS prints goes to standard error.
     {"do": "end", "publish": {key: value}}              publish, leave the federation, end
     {"do": "times"}                                     times of the others; also in the middle of a wait
     {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
+
+HELICS takes half a minute to notice that a process was killed, or never does. So in a wait this process looks every
+second whether the broker and the others still listen at their ports: {"died": text} is the answer if one does not.
 """
 
 from __future__ import annotations
@@ -40,6 +43,13 @@ NOBODY = "any"
 PROBE = 0.1
 """Time (s) between two attempts to reach a broker."""
 
+LOOK = 1.0
+"""Time (s) of a wait after which it looks, and looks again, whether the others still listen. A process that stands
+still listens; only one that has ended does not."""
+
+Address = tuple[str, int]
+"""Host and port."""
+
 
 class RefusedError(Exception):
     """A request that cannot be done, in words for a person."""
@@ -59,6 +69,16 @@ class Federate:
         self.subscriptions: dict[str, tuple[Any, str]] = {}
         self.publishers: dict[str, set[str]] = {}
         """By federate: our subscriptions that it publishes."""
+        self.waits_since: float | None = None
+        """Since when (s, monotonic) it waits for the federation; None while it does not."""
+        self._broker_at: Address | None = None
+        """Where the broker of somebody else listens."""
+        self._has_broker = ""
+        """Name of the federate of gridpeers that has the broker in its process."""
+        self._others_at: dict[Address, list[str]] = {}
+        """Where the others' processes listen, and the names of the federates in each."""
+        self._cores: set[str] = set()
+        """HELICS's names of the processes that were asked for it."""
 
     def join(self, request: dict[str, Any]) -> dict[str, Any]:
         """Start the broker if asked for, and connect to it."""
@@ -68,11 +88,12 @@ class Federate:
         if request["federates"]:
             _require_free(host, port)
             options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
-            self.broker = helics.helicsCreateBroker("zmq", "", options)
+            self.broker = helics.helicsCreateBroker("zmq", self.name + _OF_BROKER, options)
             if not helics.helicsBrokerIsConnected(self.broker):
                 raise RefusedError(f"cannot start a broker at tcp://{host}:{port}")
         else:
             _reach(host, port, request["wait"])
+            self._broker_at = host, port
         info = helics.helicsCreateFederateInfo()
         helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
         options = f"--federates=1 --loglevel=no_print --broker_address=tcp://{host}:{port}"
@@ -97,9 +118,12 @@ class Federate:
         helics.helicsFederateSetFlagOption(self.fed, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True)
         for key, kind, unit in request["subscriptions"]:
             self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
+        self.waits_since = time.monotonic()
         helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)
+        self.waits_since = None
+        self.meet()
         others = [name for name in self._names("root", "federates") if name != self.name]
         for name in others:
             if keys := self.subscriptions.keys() & set(self._names(name, "publications")):
@@ -114,7 +138,9 @@ class Federate:
         """Publish, go to a time, and return what was published since the last step."""
         helics = self.helics
         self._publish(request["publish"])
+        self.waits_since = time.monotonic()
         helics.helicsFederateRequestTime(self.fed, request["time"])
+        self.waits_since = None
         read = {
             "double": helics.helicsInputGetDouble,
             "boolean": lambda topic: bool(helics.helicsInputGetBoolean(topic)),
@@ -160,6 +186,39 @@ class Federate:
                     found.append(f"{name} stands at t = {max(federate.get('granted_time', 0.0), 0.0):g} s")
         return found
 
+    def meet(self) -> None:
+        """Note where the processes of the others listen that have joined by now."""
+        state = self._state()
+        name, of_ours, _ = str(state.get("attributes", {}).get("name", "")).partition(_OF_BROKER)
+        self._has_broker = name if of_ours else ""
+        for core in state.get("cores", []):
+            attributes = core["attributes"]
+            each = [federate["attributes"] for federate in state.get("federates", [])]
+            names = [its["name"] for its in each if its["parent"] == attributes["id"]]
+            if not names or self.name in names or attributes["name"] in self._cores:
+                continue
+            self._cores.add(attributes["name"])
+            host, _, port = str(self._query(attributes["name"], "address")).rpartition("://")[2].rpartition(":")
+            if port.isdecimal() and not _has_ended((host, int(port))):
+                self._others_at[host, int(port)] = names
+
+    def dead(self) -> str:
+        """Return who has ended without leaving the federation, as a sentence; empty if nobody has."""
+        if self._broker_at is not None and _has_ended(self._broker_at):
+            broker = f"the broker at tcp://{self._broker_at[0]}:{self._broker_at[1]}"
+            return f"{self._has_broker} died, and with it {broker}" if self._has_broker else f"{broker} has ended"
+        ended = {name: at for at, names in self._others_at.items() if _has_ended(at) for name in names}
+        if not ended:
+            return ""
+        left = {it["attributes"]["name"] for it in self._state().get("federates", []) if it["state"] in _GONE}
+        died = [f"{name} died: nothing listens at tcp://{at[0]}:{at[1]} any more" for name, at in ended.items()]
+        return "; ".join(text for name, text in zip(ended, died, strict=True) if name not in left)
+
+    def _state(self) -> dict[str, Any]:
+        """Return what the broker knows of the federation, which it answers at once."""
+        state = self._query("root", "current_state")
+        return state if isinstance(state, dict) else {}
+
     def _publish(self, values: dict[str, Any]) -> None:
         helics = self.helics
         write = {
@@ -183,6 +242,9 @@ class Federate:
         finally:
             self.helics.helicsQueryFree(query)
 
+
+_OF_BROKER = "-broker"
+"""What the name of a broker of ours has after that of its federate."""
 
 _GONE = ("disconnected", "finalized", "error")
 """States of a federate that publishes no more."""
@@ -212,6 +274,17 @@ def _reach(host: str, port: int, wait: float) -> None:
                 why = error.strerror or str(error)
                 raise RefusedError(f"no broker at tcp://{host}:{port} within {wait:g} s ({why})") from None
             time.sleep(PROBE)
+
+
+def _has_ended(at: Address) -> bool:
+    """Return whether a host that answers refuses connections on a port."""
+    try:
+        socket.create_connection(at, timeout=LOOK).close()
+    except ConnectionRefusedError:
+        return True
+    except OSError:  # as of a host that is out of reach: HELICS may have other ways
+        return False
+    return False
 
 
 def _reason(error: Exception) -> str:
@@ -248,8 +321,20 @@ def main() -> None:
             else:
                 requests.put(request)
         if federate:
-            federate.abort("gridpeers ended without a word")
+            federate.abort(f"{federate.name}: its gridpeers was killed")
         os._exit(0)
+
+    def look() -> None:
+        """In a wait, look who has died, and who has come."""
+        while True:
+            time.sleep(LOOK)
+            since = federate.waits_since if federate else None
+            if federate and since is not None and time.monotonic() - since >= LOOK:
+                with contextlib.suppress(Exception):
+                    if died := federate.dead():
+                        answer({"died": died})
+                        return
+                    federate.meet()
 
     try:
         federate = Federate()
@@ -259,6 +344,7 @@ def main() -> None:
         return
     answer({"ready": True})
     threading.Thread(target=listen, daemon=True).start()
+    threading.Thread(target=look, daemon=True).start()
     while True:
         request = requests.get()
         try:

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -108,7 +109,7 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
         ("leaves", " s: strange left the federation before the end", 30.0, 30.0),  # when, the broker decides
         ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0, 30.0),
         ("hangs", "strange did not let time go on to 0.1 s within 4 s: strange stands at t = 0.1 s", 4.0, 30.0),
-        ("dies", "strange did not let time go on to 0.1 s within 4 s", 4.0, 30.0),
+        ("dies", "t = 0.09 s: strange died: nothing listens at tcp://127.0.0.1:", 30.0, 30.0),
         ("not beginning", "did not begin within 2 s (the broker waits for 2 federates)", 30.0, 2.0),
     ],
 )
@@ -148,9 +149,31 @@ def test_a_broker_that_is_missing_is_one_line() -> None:
         scenario.run("IV")
 
 
+@pytest.mark.parametrize("begun", [False, True])
+def test_a_broker_that_is_killed_is_named_by_those_who_wait(begun: bool) -> None:
+    """Within seconds, before t = 0 and later; HELICS itself says nothing for half a minute."""
+    address = free_broker()
+    me, other = (HelicsSettings(broker=address, name=name) for name in ("me", "other"))
+    P_set, V_set = topics.set_points("grid", "inv2")
+    with federate("-c", BROKER, address, "2") as broker, ThreadPoolExecutor() as pool:
+        one = HelicsFederate(me, 30.0)
+        two = HelicsFederate(other, 30.0)
+        waits = pool.submit(one.begin, [], [P_set, V_set], {})
+        if begun:
+            two.begin([P_set, V_set], [], {})
+            waits.result()
+            waits = pool.submit(one.step, {}, 1.0)
+        broker.kill()
+        with pytest.raises(HelicsError, match=f"the broker at {address} has ended"):
+            waits.result()
+        two.abort("enough")
+
+    assert not left_behind()
+
+
 BROKER = (
     "import sys, helics\n"
-    "broker = helics.helicsCreateBroker('zmq', '', f'-f 1 --localinterface={sys.argv[1]}')\n"
+    "broker = helics.helicsCreateBroker('zmq', '', f'-f {sys.argv[2]} --localinterface={sys.argv[1]}')\n"
     "helics.helicsBrokerWaitForDisconnect(broker, 30000)\n"
 )
 """A broker that prints its warnings, as `helics_broker` does."""
@@ -159,7 +182,7 @@ BROKER = (
 def test_a_broker_of_others_warns_of_no_topic_that_may_be_missing() -> None:
     """Optional topics that nobody publishes are no warning in its log, where one of theirs would be lost among them."""
     address = free_broker()
-    with federate("-c", BROKER, address) as broker:
+    with federate("-c", BROKER, address, "1") as broker:
         me = HelicsFederate(HelicsSettings(broker=address, name="me"), 30.0)
         federation = me.begin([], [topics.events("grid"), *topics.held("grid", "inv1")], {})
         me.end({})
