@@ -100,7 +100,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     chosen = [section for section in sections if section.load >= SMALLEST][:MOST_GROUPS] or sections[:1]
     if not chosen:
         raise NoProposalError(f'beyond switch "{switch}" no bus has phases A, B and C, which an inverter needs')
-    there = [len(possible_places(feeder, section.along, 0.0, GROUP)) for section in chosen]
+    there = [len(possible_places(feeder, known, section.along, 0.0, GROUP)) for section in chosen]
     groups = group_sizes([section.load for section in chosen], there, count)
     chosen = chosen[: len(groups)]
     carried = sum(section.load for section in chosen) or 1.0
@@ -109,7 +109,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     microgrid = 0
     for section, sizes in zip(chosen, groups, strict=True):
         rating = RATING * heaviest * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
-        places = possible_places(feeder, section.along, LEADER * rating / len(sizes), sum(sizes))
+        places = possible_places(feeder, known, section.along, LEADER * rating / len(sizes), sum(sizes))
         places = spread(section.along, set(places), sum(sizes), load)
         for size in sizes:
             microgrid += 1

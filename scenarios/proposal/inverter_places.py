@@ -7,23 +7,29 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import accumulate
 
 from plant.equipment import Feeder
+from plant.equipment.connectivity import Connectivity
 from plant.equipment.imported_equipment import is_behind
 from plant.tables.feeder_columns import RATED_CURRENT, power_of
 
 
 def three_phase(feeder: Feeder) -> list[str]:
-    """Return the buses that have phases A, B and C."""
-    return [bus.name for bus in feeder.buses if set("ABC") <= set(bus.phases)]
+    """Return the buses that have phases A, B and C, unless some of them are de-energised and others not."""
+    graph = Connectivity(feeder)
+    fed = {node for part in graph.fed(graph.closed_at_start(), ())[0] for node in part}
+    rows = [bus for bus in feeder.buses if set("ABC") <= set(bus.phases)]
+    return [bus.name for bus in rows if len({(bus.name, phase) in fed for phase in "ABC"}) == 1]
 
 
-def possible_places(feeder: Feeder, section: Collection[str], rating: float, count: int) -> list[str]:
-    """Return the buses of a section at which inverters of this rating (W) can stand.
+def possible_places(
+    feeder: Feeder, known: Collection[str], section: Collection[str], rating: float, count: int
+) -> list[str]:
+    """Return the buses of a section, out of those with three phases, at which inverters of this rating (W) can stand.
 
     They are of the highest voltage that has as many as `count`, else of the most frequent one: behind a customer's
     transformer an inverter that carries its neighbours, too, raises the voltage beyond all bounds.
     """
-    within, known = set(section), set(three_phase(feeder))
-    rows = [bus for bus in feeder.buses if bus.name in within and bus.name in known]
+    within = set(section).intersection(known)
+    rows = [bus for bus in feeder.buses if bus.name in within]
     rows = [bus for bus in rows if not is_behind(bus.name)] or rows
     rows = [bus for bus in rows if rating <= most_rated(bus.V_nom)] or rows
     if not rows:

@@ -66,6 +66,18 @@ def test_a_section_with_one_bus_leaves_its_inverters_to_the_others(buses: int, c
     assert sorted(groups.values()) == sorted(sizes)
 
 
+def test_no_inverter_stands_where_one_phase_is_de_energised() -> None:
+    """A bus whose phase B an open switch leaves without voltage gets no inverter; its neighbours do."""
+    feeder = two_sections(9)
+    first, second = feeder.switches
+    open_B = tuple(replace(second, name=f"{second.name}.{phase}", phases=phase, closed=phase != "B") for phase in "ABC")
+
+    buses = {row.bus for row in propose(replace(feeder, switches=(first, *open_B)), 6).inverters}
+
+    assert buses
+    assert not buses & {"b", "b1"}
+
+
 def test_a_load_too_large_for_three_inverters_a_section_gets_more() -> None:
     """Without a count there are as many as their voltage needs; a count that is too small is refused with the limit."""
     feeder = read_feeder("standard123")
