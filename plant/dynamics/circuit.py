@@ -99,8 +99,8 @@ class Circuit:
         first = np.repeat(self.terminals[:, :1], 2, axis=1).ravel()
         rest = self.terminals[:, 1:].ravel()
         tie = sp.csc_array((np.ones(first.size), (first, rest)), shape=(n, n))
-        if self.sources.size > 1:  # the phases of one ideal source, too
-            s = self.sources
+        s = self.sources if self.reference is None else self.sources[self.reference[self.sources] < 0]
+        if s.size > 1:  # the phases of one ideal source, too
             tie = tie + sp.csc_array((np.ones(s.size - 1), (np.repeat(s[:1], s.size - 1), s[1:])), shape=(n, n))
         if (back := self.returns >= 0).any():
             ends = self.terminals[back, 0], self.returns[back]
