@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
 
 from plant.dynamics import Dynamics
 from plant.equipment.imported_equipment import is_behind
@@ -26,9 +28,12 @@ class NeutralEvents:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._neutrals = [node for node in neutrals_of(network.feeder).items() if not is_behind(node[0])]
+        all_neutrals = neutrals_of(network.feeder).items()
+        self._all = np.array([network.index(*node) for node in all_neutrals], np.int64)
+        self._neutrals = [node for node in all_neutrals if not is_behind(node[0])]
         self._nodes = np.array([network.index(*node) for node in self._neutrals], np.int64)
         self._earthing: set[int] = set()
+        self._tied: set[int] = set()
         self._off: set[int] = set()
 
     def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
@@ -47,6 +52,19 @@ class NeutralEvents:
             )
             for row in rows
         ]
+        tied = set(self._tied_alone(closed, dynamics))
+        rows = [self._network.inverters[i] for i in sorted(tied - self._tied)]
+        self._tied = tied
+        events += [
+            PlantEvent(
+                t=t,
+                kind="warning",
+                subject=row.name,
+                text=f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
+                "the switch open the neutral, too",
+            )
+            for row in rows
+        ]
         V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
         off = set(np.flatnonzero(V > TOUCHABLE).tolist())
         new, self._off = off - self._off, off
@@ -61,3 +79,19 @@ class NeutralEvents:
             )
             events.append(PlantEvent(t=t, kind="warning", subject=bus, text=text))
         return events
+
+    def _tied_alone(self, closed: frozenset[str], dynamics: Dynamics) -> list[int]:
+        """Return the grid-forming inverters that nothing but a neutral connects with the substation."""
+        network, reduction = self._network, dynamics.network.reduction
+        forming = np.flatnonzero(dynamics.inverters.forming & reduction.online)
+        forming = forming[reduction.has_source[reduction.inverter_island[forming]]]
+        if not forming.size:
+            return []
+        merge = network.merge(closed)
+        keep = np.ones(len(network.nodes))
+        keep[merge.representative[self._all]] = 0.0
+        phases = sp.diags_array(keep)
+        _, label = connected_components(phases @ abs(network.admittance(closed)) @ phases, directed=False)
+        first = [merge.representative[network.index(*network.inverters[i].node)] for i in forming.tolist()]
+        alone = ~np.isin(label[first], label[network.source_nodes])
+        return [int(i) for i in forming[alone]]

@@ -287,3 +287,39 @@ def test_a_street_that_was_cut_off_is_judged_by_its_phases_when_it_closes_again(
 
     assert found is not None
     assert 0.0 < found.V < 0.03
+
+
+THREE_POLES = (
+    STREET.format(n=4).replace(
+        "New Line.a1 phases=4 bus1=b0.1.2.3.4 bus2=b1.1.2.3.4 linecode=alu4 length=180 units=m",
+        "New Line.a1 phases=3 bus1=b0.1.2.3 bus2=b1.1.2.3 r1=0.06 x1=0.05 r0=0.06 x0=0.05 c1=0 c0=0\n"
+        "New Line.pen phases=1 bus1=b0.4 bus2=b1.4 r1=0.1 x1=0.05 r0=0.1 x0=0.05 c1=0 c0=0",
+    )
+    + AT_TRANSFORMER
+)
+"""A street behind a switch of three poles, past which its neutral goes on to the transformer."""
+
+
+def test_a_switch_that_leaves_the_neutral_closed_is_told(tmp_path: Path) -> None:
+    """An island that its neutral still ties to the grid counts as fed by the grid, and a warning says so, once."""
+    feeder, _ = imported(tmp_path, THREE_POLES)
+    feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4).add_inverter("roof", "b3", "GFL", 5e3, phases="A")
+    plant, told = events_of(feeder, 0.4)
+
+    assert len([text for text in told if text.startswith("bat: the neutral alone ties its part to the grid")]) == 1
+    assert all(220.0 < reading.V < 236.0 for reading in plant.measure().values())
+
+
+def test_the_next_grid_forming_inverter_earths_the_neutral_when_the_first_leaves(tmp_path: Path) -> None:
+    """An island keeps an earth as long as a grid-forming inverter is on its neutral."""
+    feeder, _ = imported(tmp_path, KINDS["earthed at the transformer"])
+    feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4).add_inverter("other", "b2", "GFM", 6e4)
+    plant, told = events_of(feeder, 0.3)
+    plant.connect("bat", on=False)
+    plant.advance()
+    told += [event.text for event in plant.take_events()]
+
+    assert [text.partition(",")[0] for text in told if "earths" in text] == [
+        "bat earths its neutral",
+        "other earths its neutral",
+    ]
