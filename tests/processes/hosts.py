@@ -66,14 +66,6 @@ class Hosts:
         """Bring a host back."""
         self._ip("-n", self._switch, "link", "set", self._port(host), "master", "br0")
 
-    def unplug(self, host: int) -> None:
-        """Pull a host's cable: its interface has no carrier."""
-        self._ip("-n", self._switch, "link", "set", self._port(host), "down")
-
-    def plug(self, host: int) -> None:
-        """Put the cable in again."""
-        self._ip("-n", self._switch, "link", "set", self._port(host), "up")
-
     def readdress(self, host: int, address: str) -> None:
         """Give a host another address in place of its own, as a DHCP server does."""
         self._ip("-n", self._name(host), "address", "flush", "dev", "eth0")

@@ -13,6 +13,7 @@ from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.node_fault import NodeFault, Skew
 from plant.equipment import Feeder
+from plant.equipment.imported_equipment import LoadPart
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.live.numbers.departures import compare
 from scenarios.live.numbers.live_figures import live_drawing
@@ -124,6 +125,18 @@ def test_a_load_that_the_scenario_sets_is_none_of_the_people() -> None:
 
     assert compare(planned, feeder, [mine], 9.0).events == ()
     assert compare(planned, feeder, [mine, other, later], 9.0).events == (other, later)
+
+
+@pytest.mark.parametrize("planned", ["l1", "load.l1", "Load.l1"])
+def test_a_planned_load_of_an_imported_feeder_is_recognised_with_and_without_its_class(planned: str) -> None:
+    """The plant's events have OpenDSS's name; the scenario may leave "load." out."""
+    scenario, feeder = one_case("islanding")
+    part = LoadPart(name="load.l1", bus="48", ends=("A", ""), S=1e4 + 0j, V_nom=2400.0, exponents=(2.0, 2.0))
+    event = Event(label="load", t_s=5.0, load={planned: LoadChange(factor=1.5)})
+    mine = told("load", 5.0, "load.l1", "load load.l1 set to 15 kW")
+    scenario = msgspec.structs.replace(scenario, events=(*scenario.events, event))
+
+    assert compare(scenario, msgspec.structs.replace(feeder, load_parts=(part,)), [mine], 9.0).events == ()
 
 
 def test_a_death_that_the_scenario_tells_of_is_none_of_the_people() -> None:
