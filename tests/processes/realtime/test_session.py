@@ -28,7 +28,7 @@ def test_a_missing_zenoh_is_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whoever installed without Zenoh is told the package's name and the driver that needs none."""
     monkeypatch.setitem(sys.modules, "zenoh", None)
 
-    with pytest.raises(SessionError, match=r"inv1: the package eclipse-zenoh is missing .* or use --driver inprocess"):
+    with pytest.raises(SessionError, match=r"inv1: eclipse-zenoh is not installed; .*; or use --driver inprocess"):
         Session("inv1")
 
 
