@@ -56,7 +56,8 @@ KINDS = {
     "another number": STREET.format(n=9) + AT_TRANSFORMER,
     "loads to ground beside": STREET.format(n=4)
     + AT_TRANSFORMER
-    + "New Load.g phases=1 bus1=b2.3 kv=0.23 kw=1 pf=0.9\nNew Load.d phases=1 bus1=b2.2.3 kv=0.4 kw=2 pf=1\n",
+    + "New Load.g phases=1 bus1=b2.3 kv=0.23 kw=1 pf=0.9\nNew Load.d phases=1 bus1=b2.2.3 kv=0.4 kw=2 pf=1\n"
+    + "New Load.g2 phases=1 bus1=b3.1 kv=0.23 kw=1.2 pf=1 model=5\n",
     "two neutrals at a bus": STREET.format(n=4)
     + AT_TRANSFORMER
     + "New Reactor.n5 phases=1 bus1=b2.4 bus2=b2.5 R=0.3 X=0\nNew Load.n5 phases=1 bus1=b2.1.5 kv=0.23 kw=1.5 pf=1\n",
