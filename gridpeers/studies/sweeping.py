@@ -25,7 +25,7 @@ from scenarios.sweep.file.sweep_model import Sweep
 from scenarios.sweep.file.sweep_reading import plan_of
 from scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
 from scenarios.sweep.sweep_table import results_frame
-from scenarios.sweep.workers import cores, on_this_machine
+from scenarios.sweep.workers import cores, on_workers
 from wire.schema.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
@@ -42,6 +42,7 @@ def sweep(
     metrics: str | Iterable[Any] | None = None,
     histories: bool = False,
     jobs: int | None = None,
+    dask: str = "",
     progress: Callable[[int, int], None] | None = None,
 ) -> pd.DataFrame:
     """Run a scenario over values of its keys, and return a row per run.
@@ -65,6 +66,8 @@ def sweep(
         Whether each row has its history, in a column of that name, as `Result.history`.
     jobs : int, optional
         Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
+    dask : str, optional
+        Address of a Dask scheduler to use instead, e.g. "tcp://10.0.0.1:8786" (docs/sweeps.md).
     progress : Callable[[int, int], None], optional
         Is called with the number of runs that are done, and of all runs.
 
@@ -79,19 +82,23 @@ def sweep(
     ------
     ScenarioError
         With everything that is wrong with the values, before anything is run.
+    WorkersError
+        If the scheduler does not answer, or a worker has gone.
 
     Examples
     --------
     >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
     """
     known = as_scenario(scenario)
-    _check_words(grid, zip, cases, metrics, jobs, progress)
+    _check_words(grid, zip, cases, metrics, jobs, dask, progress)
     checked, chosen = _with_metrics(known, metrics)
     plan = _plan(checked, grid or {}, zip or {}, (cases,) if isinstance(cases, str) else tuple(cases or ()), seeds)
     done: dict[int, SweepRow] = {}
     kept: dict[int, pd.DataFrame | None] = {}
     calls = [(number, run.scenario, run.case) for number, run in enumerate(plan.runs)]
-    results = on_this_machine(calls, _jobs(plan, jobs), run_with_history if histories else _run)
+    if dask:
+        _require_dask(plan)
+    results = on_workers(calls, 1 if dask else _jobs(plan, jobs), run_with_history if histories else _run, dask)
     with closing(results):
         for row, history in results:
             done[row.number] = row
@@ -109,7 +116,7 @@ def sweep(
     return frame
 
 
-def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, progress: Any) -> None:
+def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, dask: Any, progress: Any) -> None:
     """Check the kind of each argument, all at once."""
     wrong = [
         f'{name}: needs lists of values by the path of their key, as {{"gains.k_p": [0.001, 0.002]}}, got {it!r:.60}'
@@ -121,6 +128,8 @@ def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, pr
             wrong.append(f"{name}: needs a list of names, or None for all, got {it!r:.60}")
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
         wrong.append(f"jobs: must be a whole number, 1 or more, or None for one per core; got {jobs!r:.60}")
+    if not isinstance(dask, str):
+        wrong.append(f'dask: must be the address of a scheduler, as "tcp://10.0.0.1:8786", got {dask!r:.60}')
     if progress is not None and not callable(progress):
         wrong.append(f"progress: must be a function of two whole numbers, got {progress!r:.60}")
     if wrong:
@@ -163,6 +172,15 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
     problems.raise_if_any()
     request = Sweep(name=scenario.name, scenario=scenario.name, cases=cases, seeds=seeds, grid=crossed, zip=paired)
     return plan_of(request, BaseScenario(scenario.tables, scenario.path, scenario.spec, scenario.feeder))
+
+
+def _require_dask(plan: Plan) -> None:
+    """Raise a ScenarioError if runs cannot be done on a Dask cluster."""
+    if find_spec("joblib") is None or find_spec("distributed") is None:
+        raise ScenarioError(["dask: needs joblib and distributed: pip install 'gridpeers[sweep]'"])
+    unknown = (text for run in plan.runs for text in check_portable(run.scenario, measures=True))
+    if wrong := list(dict.fromkeys(unknown)):
+        raise ScenarioError(wrong)
 
 
 def _jobs(plan: Plan, jobs: int | None) -> int:

@@ -25,7 +25,7 @@ from scenarios.chaos.schedule_search import BATCH, drawn
 from scenarios.checks.check_registry import RETURNS, chosen_checks
 from scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
 from scenarios.run_request import Driver
-from scenarios.sweep.workers import on_this_machine
+from scenarios.sweep.workers import on_workers
 from wire.counted import counted
 
 REPEATED = 20
@@ -45,6 +45,8 @@ class Campaign:
     driver: Driver = "inprocess"
     jobs: int = 1
     """Processes for runs in one process each."""
+    dask: str = ""
+    """Address of a Dask scheduler to use instead; its workers have their own folders for temporary files."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,8 +185,9 @@ def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Fail
 def _results(campaign: Campaign, rows: Mapping[int, ChaosRow], within: Path) -> Generator[ChaosRow, None, None]:
     """Yield the results of all runs that have none, and those of the repeated ones once more."""
     text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
-    calls = ((text, seed, number, schedule, driver, within) for number, schedule in _numbered(campaign, dict(rows)))
-    yield from on_this_machine(calls, 1 if driver == "processes" else campaign.jobs, run_number)
+    place = None if campaign.dask else within
+    calls = ((text, seed, number, schedule, driver, place) for number, schedule in _numbered(campaign, dict(rows)))
+    yield from on_workers(calls, 1 if driver == "processes" else campaign.jobs, run_number, campaign.dask)
 
 
 def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
@@ -217,11 +220,12 @@ def _shrunk(
     """Yield for each failure the run of the simplest schedule found."""
     if not failures:
         return
+    place = None if campaign.dask else within
     calls = [
-        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated), within)
+        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated), place)
         for it in failures
     ]
-    yield from on_this_machine(calls, min(campaign.jobs, len(calls)), _shrink)
+    yield from on_workers(calls, min(campaign.jobs, len(calls)), _shrink, campaign.dask)
 
 
 def _driver(campaign: Campaign, violated: str) -> Driver:
@@ -229,5 +233,7 @@ def _driver(campaign: Campaign, violated: str) -> Driver:
     return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
 
 
-def _shrink(text: str, seed: int, number: int, violated: str, driver: Driver, within: Path) -> tuple[str, ChaosRow]:
+def _shrink(
+    text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None
+) -> tuple[str, ChaosRow]:
     return violated, shrink_number(text, seed, number, violated, driver, within)

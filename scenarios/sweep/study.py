@@ -13,7 +13,7 @@ from scenarios.sweep.file import Plan
 from scenarios.sweep.sweep_case import run_one
 from scenarios.sweep.sweep_folder import SweepFolder
 from scenarios.sweep.sweep_table import as_written, results_frame, write_table
-from scenarios.sweep.workers import on_dask, on_this_machine
+from scenarios.sweep.workers import on_workers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,8 +55,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
     left = [(i, run.scenario, run.case) for i, run in enumerate(plan.runs) if i not in folder.done]
     try:
         if left:
-            results = on_dask(left, dask, run_one) if dask else on_this_machine(left, min(jobs, len(left)), run_one)
-            with closing(results):
+            with closing(on_workers(left, min(jobs, len(left)), run_one, dask)) as results:
                 for row in results:
                     folder.add(row)
                     tell(len(folder.done))

@@ -39,6 +39,17 @@ def cores() -> int:
     return int(cpu_count())
 
 
+def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generator[T, None, None]:
+    """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here.
+
+    Raises
+    ------
+    WorkersError
+        If there is no scheduler at the address, or it has no worker.
+    """
+    return on_dask(runs, dask, task) if dask else on_this_machine(runs, jobs, task)
+
+
 def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None, None]:
     """Do the runs in `jobs` processes; each result comes as soon as it is there, in whatever order.
 

@@ -15,6 +15,7 @@ from gridpeers.cli.usage import (
     BROKEN,
     CLAIM_FAILED,
     PASSED,
+    Dask,
     ScenarioName,
     chosen,
     fail,
@@ -58,6 +59,7 @@ def chaos(
         str | None, typer.Option(metavar="NAME", help="Case to disturb; the last one of the file when left out.")
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
+    dask: Dask = "",
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the results, new or empty; runs/SCENARIO-chaos/TIME if left out."),
@@ -84,7 +86,12 @@ def chaos(
     spec, feeder = load(scenario)
     spec = chosen(spec, case or list(spec.cases)[-1], None)
     _refuse_unless_possible(scenario, spec, case, driver)
-    require(_PACKAGES, "install what chaos needs: pip install 'gridpeers[chaos]'")
+    if dask and driver == "processes":
+        fail(["--dask: its workers run each run in one process; leave --driver processes out"], BAD_INPUT)
+    require(
+        _PACKAGES | ({"distributed": "--dask"} if dask else {}),
+        "install what chaos needs: pip install 'gridpeers[chaos]'",
+    )
     from scenarios.chaos.campaign import Campaign
     from scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
     from scenarios.chaos.disturbed_scenario import ChaosBase
@@ -99,7 +106,7 @@ def chaos(
     first_seed, first_runs = (None, None) if resume is None else asked_of(resume)
     seed = next(it for it in (seed, first_seed, 1) if it is not None)
     runs = runs or first_runs or RUNS
-    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores())
+    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores(), dask=dask)
     try:
         rows, opened = (
             _new_campaign(context, out, campaign) if resume is None else _resumed_campaign(context, resume, campaign)
@@ -208,6 +215,8 @@ def _work(campaign: Campaign) -> str:
     runs = f"{counted(campaign.runs, 'run')} with disturbances"
     if campaign.driver == "processes":
         return f"{runs}, each with processes and again in one"
+    if campaign.dask:
+        return f"{runs}, by the workers of {campaign.dask}"
     if campaign.jobs == 1:
         return f"{runs}, one after another"
     return f"{runs}, {campaign.jobs} at a time, once {counted(campaign.jobs, 'worker')} have started"

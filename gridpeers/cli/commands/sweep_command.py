@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, fail, refuse, require, terminal
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, Dask, fail, refuse, require, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -25,9 +25,7 @@ def sweep(
         typer.Option(metavar="DIR", help="Folder, new or this sweep's from before; runs/sweeps/NAME when left out."),
     ] = None,
     jobs: Annotated[int | None, typer.Option(min=1, metavar="N", help="Processes; one per core when left out.")] = None,
-    dask: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Dask scheduler to use instead, e.g. tcp://10.0.0.1:8786.")
-    ] = None,
+    dask: Dask = "",
     dry_run: Annotated[
         bool, typer.Option("--dry-run", help="Check everything, tell the size, and run nothing.")
     ] = False,
@@ -55,7 +53,7 @@ def sweep(
     from scenarios.sweep.sweep_folder import folder_of
 
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
-    summary = finish(file, plan, folder_of(out, plan.name), jobs, dask or "", again)
+    summary = finish(file, plan, folder_of(out, plan.name), jobs, dask, again)
     for line in failure_lines(summary):
         typer.secho(line, fg="red", bold=True)
     for line in _result_lines(summary):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, check_choice, fail, refuse, require, terminal
+from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, Dask, check_choice, fail, refuse, require, terminal
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -28,6 +28,7 @@ def experiment(
     jobs: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Processes of a sweep; one per core when left out.")
     ] = None,
+    dask: Dask = "",
 ) -> None:
     """Run an experiment on late, lossy or broken links.
 
@@ -50,9 +51,12 @@ def experiment(
     check_choice("", "experiment", name, tuple(EXPERIMENTS))
     source, folder = EXPERIMENTS[name], RUNS / "experiments" / name if out is None else out
     again = ["experiment", name, *(["--out", str(out)] if out else [])]
-    result = (
-        _from_sweep(source, folder, jobs, again) if isinstance(source, FromSweep) else _from_scenario(source, folder)
-    )
+    if isinstance(source, FromSweep):
+        result = _from_sweep(source, folder, jobs, dask, again)
+    elif dask:
+        fail([f"--dask: goes with the experiments that are sweeps; {name} is one run"], BAD_INPUT)
+    else:
+        result = _from_scenario(source, folder)
     try:
         files = result.write(folder)
     except OSError as error:
@@ -61,11 +65,11 @@ def experiment(
         typer.echo(shown(path))
 
 
-def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequence[str]) -> ExperimentResult:
+def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, again: Sequence[str]) -> ExperimentResult:
     """Do the runs of the sweep that are not done yet, and draw."""
     from gridpeers.cli.commands.sweep_command import check_packages, failure_lines, finish
 
-    check_packages()
+    check_packages(dask=bool(dask))
     import pandas as pd
 
     from gridpeers.sweep_files import read_sweep
@@ -75,7 +79,7 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, again: Sequen
         plan = read_sweep(source.sweep)
     except gp.ScenarioError as error:
         refuse(error)
-    summary = finish(source.sweep, plan, folder, jobs, "", again)
+    summary = finish(source.sweep, plan, folder, jobs, dask, again)
     if summary.law_failed:
         fail(failure_lines(summary), CLAIM_FAILED)
     if sum(summary.broke.values()):

@@ -29,7 +29,7 @@ BANKS: dict[str, dict[str, int]] = {
 
 
 def study(
-    base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None
+    base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None, dask: str = ""
 ) -> dict[str, EventValues]:
     """Run all cases over all variants, and return their MQSI by variant, case and event.
 
@@ -43,6 +43,8 @@ def study(
         Is called with the number of runs that are done, and of all runs.
     jobs : int or None
         Runs at a time; None is one per core, or one where joblib is not installed.
+    dask : str, optional
+        Address of a Dask scheduler to use instead.
     """
     standard = feeder_folder(base.spec.plant.feeder)
     feeders = {
@@ -51,7 +53,7 @@ def study(
     }
     tell(0, len(BANKS) * len(CASES))
     varied = {"plant.feeder": list(feeders)}
-    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, progress=tell)
+    rows = gp.sweep(base.replace({"paper": None}), varied, cases=CASES, jobs=jobs, dask=dask, progress=tell)
     found: dict[str, dict[tuple[str, str], float]] = {variant: {} for variant in BANKS}
     for row in rows.fillna(dict.fromkeys((f"{event}.MQSI" for event in EVENTS), 0.0)).to_dict("records"):
         variant = feeders[row["plant.feeder"]]

@@ -14,6 +14,7 @@ from gridpeers.cli.usage import (
     CLAIM_FAILED,
     PASSED,
     RUN,
+    Dask,
     check_choice,
     fail,
     refuse,
@@ -39,6 +40,7 @@ def reproduce(
     jobs: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Random graphs at a time; one per core when left out.")
     ] = None,
+    dask: Dask = "",
     out: Annotated[
         Path | None,
         typer.Option(metavar="DIR", help="Folder for the report, new or empty; runs/reproduce/TIME when left out."),
@@ -56,12 +58,18 @@ def reproduce(
     check_choice("--driver: ", "driver", driver, ("processes", "inprocess"))
     if only is not None:
         check_choice("--only: ", "part", only, CHOICES)
-    require(RUN | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
-    _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, out)
+    packages = RUN | ({"joblib": "--dask", "distributed": "--dask"} if dask else {})
+    require(packages | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
+    _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, dask, out)
 
 
 def _reproduce(
-    driver: Literal["processes", "inprocess"], only: str | None, seed: int | None, jobs: int | None, out: Path | None
+    driver: Literal["processes", "inprocess"],
+    only: str | None,
+    seed: int | None,
+    jobs: int | None,
+    dask: str,
+    out: Path | None,
 ) -> None:
     from datetime import datetime
 
@@ -79,7 +87,7 @@ def _reproduce(
         fail([str(error)], BAD_INPUT)
 
     console = terminal()
-    work = Work(chosen(only), driver, folder / "runs", seed, jobs)
+    work = Work(chosen(only), driver, folder / "runs", seed, jobs, dask)
     results = []
     try:
         with interruptible():

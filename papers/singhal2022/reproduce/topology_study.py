@@ -54,7 +54,7 @@ def graphs(inverters: int, seed: int) -> Iterator[Edges]:
         yield from connected_graphs(inverters, links, PER_COUNT, seed)
 
 
-def study(seed: int, tell: TellProgress, *, jobs: int | None) -> GraphFindings:
+def study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str = "") -> GraphFindings:
     """Run the islanding of case IV on every graph, always in one process each.
 
     Parameters
@@ -65,6 +65,8 @@ def study(seed: int, tell: TellProgress, *, jobs: int | None) -> GraphFindings:
         Is called with the progress.
     jobs : int or None
         How many runs at a time; None is one per core, or one where joblib is not installed.
+    dask : str, optional
+        Address of a Dask scheduler to use instead.
     """
     scenario = gp.load("islanding")
     names = scenario.inverters
@@ -73,7 +75,7 @@ def study(seed: int, tell: TellProgress, *, jobs: int | None) -> GraphFindings:
     first = {"case.IV.graph": "links", "case.IV.links": links[0], "time.end_s": END_S, "paper": None}
     base = scenario.replace({**first, "event": scenario.tables["event"][:1]})
     tell(0, len(drawn))
-    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, progress=tell)
+    rows = gp.sweep(base, {"case.IV.links": links}, cases=["IV"], jobs=jobs, dask=dask, progress=tell)
     for edges, (_, row) in zip(drawn, rows.iterrows(), strict=True):
         if row["status"] != "ran":
             raise RuntimeError(f"topology, a graph with {len(edges)} links: {row['why']}")

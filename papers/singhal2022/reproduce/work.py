@@ -46,12 +46,20 @@ class Work:
         In place of the scenarios' own.
     jobs : int
         Runs of the topologies at a time.
+    dask : str, optional
+        Address of a Dask scheduler for these instead.
     """
 
     def __init__(
-        self, parts: tuple[Part, ...], driver: ReproduceDriver, folder: Path, seed: int | None, jobs: int | None
+        self,
+        parts: tuple[Part, ...],
+        driver: ReproduceDriver,
+        folder: Path,
+        seed: int | None,
+        jobs: int | None,
+        dask: str = "",
     ) -> None:
-        self.parts, self.driver, self.folder, self.jobs = parts, driver, folder, jobs
+        self.parts, self.driver, self.folder, self.jobs, self.dask = parts, driver, folder, jobs, dask
         changes = {} if seed is None else {"seed": seed}
         self._loaded = {
             part.name: gp.load("islanding" if part.name in _STUDIES else part.name).replace(changes) for part in parts
@@ -126,7 +134,7 @@ class Work:
         def note(done: int, of: int) -> None:
             tell(f"topology, {done} of {of} graphs", self._before + done * topology.END_S)
 
-        found = topology.study(self.seed, note, jobs=self.jobs)
+        found = topology.study(self.seed, note, jobs=self.jobs, dask=self.dask)
         if figures:
             from gridpeers.figures import save
             from papers.singhal2022.figures.topologies import topologies
@@ -140,7 +148,7 @@ class Work:
         def note(done: int, of: int) -> None:
             tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
 
-        ours = banks.study(scenario, folder, note, self.jobs)
+        ours = banks.study(scenario, folder, note, self.jobs, self.dask)
         cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
         paper = {(cell.case, cell.event): cell.paper for cell in cells}
         if figures:
