@@ -106,9 +106,12 @@ def test_a_rule_that_cannot_be_is_told_in_one_line(
         (lambda members: {"inv9": []}, "graph mine names inv9, which is no agent of the run"),
         (lambda members: {"inv1": ["inv1"]}, "graph mine lets inv1 listen to itself; leave it out"),
         (lambda members: {"inv1": [3]}, "graph mine lets inv1 listen to 3, which is no agent of the run"),
-        (lambda members: {"inv1": 3}, "graph mine of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
-        (lambda members: None, "graph mine of inv1, inv2 failed: TypeError"),
-        (lambda members: 1 / 0, "graph mine of inv1, inv2 failed: ZeroDivisionError: division by zero"),
+        (lambda members: {"inv1": 3}, "of inv1, inv2 failed: TypeError: 'int' object is not iterable"),
+        (lambda members: None, "of inv1, inv2 failed: TypeError"),
+        (
+            lambda members: 1 / 0,
+            "of inv1, inv2 failed: ZeroDivisionError: division by zero",
+        ),
     ],
 )
 def test_what_is_no_graph_is_told_in_one_line(rule: object, said: str) -> None:
@@ -145,7 +148,7 @@ def test_an_agent_whose_rule_fails_in_a_run_stands_still_and_says_so(folder: str
     agent.in_neighbours(("inv1", "inv2", "inv3"))
     third = agent.tick(now)
 
-    assert first.fault == "graph my_graphs:of_three of inv1, inv3 failed: KeyError: 'nobody'"
+    assert first.fault == "graph my_graphs:of_three (my_graphs.py:19) of inv1, inv3 failed: KeyError: 'nobody'"
     assert (first.idle, first.P_set) == (True, 3e4)
     assert (second.idle, second.fault) == (True, "")
     assert (third.idle, third.fault) == (False, "")

@@ -77,8 +77,9 @@ def test_a_law_that_fails_is_told_once_and_the_agent_says_nothing_more() -> None
         lab.go(T_C)
     said: list[State] = lab.decided()
 
+    step = "step at t = 0.02 s raised ZeroDivisionError: float division by zero"
     assert [state.idle for state in said] == [True]
-    assert said[0].fault == "law consensus: step at t = 0.02 s raised ZeroDivisionError: float division by zero"
-    assert lab.said[-1].startswith("inv1: law consensus: step at t = 0.02 s raised ZeroDivisionError")
+    assert said[0].fault == f"law consensus (test_realtime_laws.py:35): {step}"
+    assert lab.said[-1].startswith(f"inv1: {said[0].fault}")
     assert not lab.side.finished
     assert not lab.side.session_broken
