@@ -71,6 +71,8 @@ class Federate:
         """By federate: our subscriptions that it publishes."""
         self.waits_since: float | None = None
         """Since when (s, monotonic) it waits for the federation; None while it does not."""
+        self.begun = False
+        """Whether all federates are at t = 0, so that nobody comes any more."""
         self._broker_at: Address | None = None
         """Where the broker of somebody else listens."""
         self._has_broker = ""
@@ -122,7 +124,7 @@ class Federate:
         helics.helicsFederateEnterInitializingMode(self.fed)
         self._publish(request["publish"])
         helics.helicsFederateEnterExecutingMode(self.fed)
-        self.waits_since = None
+        self.waits_since, self.begun = None, True
         self.meet()
         others = [name for name in self._names("root", "federates") if name != self.name]
         for name in others:
@@ -325,15 +327,15 @@ def main() -> None:
         os._exit(0)
 
     def look() -> None:
-        """In a wait, look who has died, and who has come."""
+        """Look who has come, until all are at t = 0; and in a wait, who has died."""
         while True:
             time.sleep(LOOK)
             since = federate.waits_since if federate else None
-            if federate and since is not None and time.monotonic() - since >= LOOK:
-                with contextlib.suppress(Exception):
-                    if died := federate.dead():
-                        answer({"died": died})
-                        return
+            with contextlib.suppress(Exception):
+                if federate and since is not None and time.monotonic() - since >= LOOK and (died := federate.dead()):
+                    answer({"died": died})
+                    return
+                if federate and federate.fed is not None and not federate.begun:
                     federate.meet()
 
     try:
