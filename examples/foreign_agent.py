@@ -191,7 +191,7 @@ class ForeignAgent:
 
 if __name__ == "__main__":
     config = json.load(sys.stdin) if len(sys.argv) == 1 else None
-    lease = 2_000 if config is None or config["clock"] == "wall" else 60_000
+    lease = 2_000 if config is None or config["clock"] == "wall" else 86_400_000
     endpoint = config["connect"][0] if config else sys.argv[1]
     with zenoh.open(zenoh.Config.from_json5(SETTINGS % (endpoint, lease))) as session:
         while config is None:

@@ -24,9 +24,10 @@ _SETTING = rf"(?:(?:worker_threads|max_blocking_threads)\s*:\s*[1-9][0-9]{{0,2}}
 _POOL = rf"(?:{_POOLS})\s*:\s*\(\s*(?:{_SETTING}(?:,\s*{_SETTING})*,?\s*)?\)\s*"
 _RUNTIME_FORM = re.compile(rf"\s*\(\s*(?:{_POOL}(?:,\s*{_POOL})*,?\s*)?\)\s*")
 
-LEASE = 60_000
-"""Time (ms) after which a silent link counts as dead, in lock-step. It is long because it must not decide: the death of
-a process closes its links at once, and the deadlines of the lock-step detect a frozen one."""
+LEASE = 86_400_000
+"""Time (ms) after which a silent link counts as dead, in lock-step. It is a day because it must not decide: the death
+of a process closes its links at once, the deadlines of the lock-step detect a frozen one, and a whole run may be frozen
+for hours."""
 
 WALL_LEASE = 2_000
 """The same in wall-clock time: after a cut Zenoh must renew the link soon. Control does not wait for it."""
