@@ -8,6 +8,27 @@ BEHIND = "~"
 """Stands in the name of a bus that an import adds, behind the name of the bus whose voltage and place it has."""
 
 
+OVERVOLTAGE = 1.2
+"""Voltage (pu) above which generation disconnects: OV2 of IEEE 1547-2018."""
+
+HIGH = 1.1
+"""Voltage (pu) above which what it usually has is taken for nominal: the nominal voltage is wrong."""
+
+
+def cut_off(usual: float) -> float:
+    """Return the `LoadPart.V_off` of generation that usually has this voltage (pu).
+
+    Other programs have no such limit: beyond their own limits it is a negative impedance, and an island in which it
+    prevails has no voltage at which to rest.
+
+    Examples
+    --------
+    >>> cut_off(1.02), cut_off(1.7)
+    (1.2, 2.04)
+    """
+    return OVERVOLTAGE * (usual if usual > HIGH else 1.0)
+
+
 def bus_behind(bus: str, element: str) -> str:
     """Return the name of the bus that an import puts between a bus and an element.
 
@@ -61,7 +82,7 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
     exponents: tuple[float, float]
     """Powers of the voltage with which P and Q go: 0 constant power, 1 constant current, 2 constant impedance."""
     V_low: float = 0.0
-    """Voltage (pu) below which it is its nominal impedance."""
+    """Voltage (pu) below which it is its nominal impedance. If it is `V_min`, the current stays as at `V_min` below."""
     V_min: float = 0.0
     """Voltage (pu) below which it is limited; 0: nowhere."""
     V_max: float = 0.0
@@ -69,7 +90,8 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
     edge: float = 0.0
     """Exponent that sets its current at the limits: 0 as of constant power, 1 as of current, 2 as of impedance."""
     V_off: float = 0.0
-    """Voltage (pu) at which it switches off, half of it off at that voltage, all of it 0.01 pu below; 0: nowhere."""
+    """Voltage (pu) at which it switches off, half of it off at that voltage, all of it 0.01 pu below, or above if it is
+    1.2 pu or more; 0: nowhere."""
 
     @property
     def is_impedance(self) -> bool:

@@ -18,7 +18,7 @@ from plant.equipment import PHASES, Feeder, InverterRow, Switch
 from plant.equipment.bus_islands import bus_islands, switch_name
 from plant.equipment.imported_equipment import LoadPart
 from plant.equipment.named_loads import named_loads
-from plant.network.loads import LoadBranches
+from plant.network.loads import LoadBranches, law_row
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
 from wire.schema.suggestion import first_of
@@ -283,25 +283,11 @@ class Network:
         first = np.array([self.index(part.bus, part.ends[0]) for part in parts], np.int64)
         to = np.array([self.index(part.bus, part.ends[1]) if part.ends[1] else -1 for part in parts], np.int64)
         across = self.nominal[first] - np.where(to < 0, 0.0, self.nominal[to])
-        rows = [
-            (
-                part.S.real,
-                part.S.imag,
-                part.V_nom,
-                *part.exponents,
-                part.V_low * part.V_nom,
-                part.V_min * part.V_nom,
-                part.V_max * part.V_nom,
-                part.edge,
-                part.V_off * part.V_nom,
-            )
-            for part in parts
-        ]
-        none = np.zeros(len(parts), np.complex128)
+        none, rows = np.zeros(len(parts), np.complex128), np.array([law_row(part) for part in parts])
         return LoadBranches(
             n_from=first,
             n_to=to,
-            law=LoadLaw(S=none, I0=none, limited_at=np.arange(len(parts)), law=np.array(rows)),
+            law=LoadLaw(S=none, I0=none, limited_at=np.arange(len(parts)), law=rows),
             V_nom=np.array([part.V_nom for part in parts]),
             phi0=np.angle(across),
             a_from=np.ones(len(parts)),

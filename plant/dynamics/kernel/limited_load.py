@@ -12,7 +12,11 @@ COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "
 
 
 STEEPNESS = 500.0
-"""How fast a load drops out around V_off: the hyperbolic tangent of this times the distance (pu), as in OpenDSS."""
+"""How fast a load drops out around V_off: the hyperbolic tangent of this times the distance (pu), as in OpenDSS.
+Generation drops out above it: its V_off is `ABOVE` or more."""
+
+ABOVE = 1.2
+"""V_off (pu) from which on a load drops out above it, not below."""
 
 
 @compiled
@@ -40,9 +44,12 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
     """
     P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off = row
     per_square = 1.0 / (V_nom * V_nom)
-    if V_low >= V or V <= 0.0:
+    if (V_low >= V and V_low != V_min) or V <= 0.0:
         return complex(P * per_square, -Q * per_square), 0.0j
-    if V_min >= V:  # current in proportion: from the nominal impedance's at V_low to the load's own at V_min
+    if V_min >= V and V_low == V_min:  # a current limit: as at V_min
+        p = q = per_square * V_nom * power(V_min / V_nom, edge - 1.0) / V
+        p_slope = q_slope = -p / V
+    elif V_min >= V:  # current in proportion: from the nominal impedance's at V_low to the load's own at V_min
         at_min = V_nom * power(V_min / V_nom, edge - 1.0)
         rise = (at_min - V_low) / (V_min - V_low)
         p = q = per_square * (V_low + rise * (V - V_low)) / V
@@ -55,9 +62,10 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
         p_slope, q_slope = (n_p - 2.0) * p / V, (n_q - 2.0) * q / V
     g, slope = complex(P * p, -Q * q), complex(P * p_slope, -Q * q_slope)
     if V_off > 0.0:
-        t = np.tanh(STEEPNESS * (V - V_off) / V_nom)
+        steepness = STEEPNESS if V_off < ABOVE * V_nom else -STEEPNESS
+        t = np.tanh(steepness * (V - V_off) / V_nom)
         on = 0.5 * (1.0 + t)
-        return g * on, slope * on + g * (0.5 * STEEPNESS / V_nom * (1.0 - t * t))
+        return g * on, slope * on + g * (0.5 * steepness / V_nom * (1.0 - t * t))
     return g, slope
 
 

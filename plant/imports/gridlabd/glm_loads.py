@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.equipment.imported_equipment import LinearElement, LoadPart
+from plant.equipment.imported_equipment import LinearElement, LoadPart, cut_off
 
 Taken = dict[str, dict[str, complex]]
 """By branch of a load ("A", "BC", "12"): constant power `P` (VA), current as power at nominal voltage `I` (VA), `Y`."""
@@ -61,7 +61,8 @@ class BusLoads:
         found = []
         for branch, kinds in taken.items():
             V = self._V_nom(branch)
-            usual = min(1.0, abs(self._across(branch)) / V) or 1.0
+            across = abs(self._across(branch)) / V
+            usual = min(1.0, across) or 1.0
             for kind, value in kinds.items():
                 S = V * V * value.conjugate() if kind == "Y" else value
                 low, least = (0.0, 0.0) if kind == "Y" else (V_LOW * usual, V_MIN * usual)
@@ -76,6 +77,7 @@ class BusLoads:
                         V_low=low,
                         V_min=least,
                         edge=EDGE[kind],
+                        V_off=cut_off(across) if S.real < 0.0 else 0.0,
                     )
                 )
         return found

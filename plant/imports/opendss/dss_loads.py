@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from plant.equipment.imported_equipment import LoadPart
+from plant.equipment.imported_equipment import LoadPart, cut_off
 from plant.imports.opendss.dss_branches import branches_of
+from plant.imports.opendss.dss_elements import complex_of
 from plant.imports.opendss.dss_engine import DssEngine
 
 EXPONENTS = {1: (0.0, 0.0), 2: (2.0, 2.0), 3: (0.0, 2.0), 5: (1.0, 1.0)}
@@ -67,6 +68,10 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
 def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, problems: list[str]) -> list[LoadPart]:
     branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
     shares = _shares(element, name, load, int(element.NumPhases), scale, impedances, problems)
+    V_off = 0.0
+    if load.kW < 0.0:
+        V = complex_of(element.Voltages)
+        V_off = cut_off(max(abs(V[start] - V[end]) for start, end in branches.conductors) / branches.V_nom)
     found = []
     for ends in branches.ends():
         for share in shares:
@@ -83,7 +88,7 @@ def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, p
                     V_min=float(load.Vminpu) if limited and float(load.Vminpu) > share.V_low else 0.0,
                     V_max=float(load.Vmaxpu) if limited else 0.0,
                     edge=share.edge,
-                    V_off=share.V_off,
+                    V_off=share.V_off or V_off,
                 )
             )
     return found
