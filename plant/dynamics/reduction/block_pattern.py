@@ -8,16 +8,19 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, add_tangent
+from plant.dynamics.reduction.elimination import WEAK
 from plant.dynamics.reduction.reduced import Complex
 
 
 def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:
     """Return the order of the nodes, by minimum degree, in which elimination couples few of the others.
 
+    Those without an own admittance come last: elimination of the others gives them one.
+
     Parameters
     ----------
     Y
-        Admittances between the nodes (S); only where they have entries matters.
+        Admittances between the nodes (S).
     C
         Incidence of the load branches.
     """
@@ -26,7 +29,10 @@ def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:
     if not link.shape[0]:
         return np.zeros(0, np.int64)
     lu = splu(sp.csc_matrix(link), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True, "DiagPivotThresh": 0.0})
-    return np.argsort(lu.perm_c).astype(np.int64)
+    order = np.argsort(lu.perm_c).astype(np.int64)
+    size = abs(Y)
+    weak = size.diagonal() <= WEAK * np.maximum(*(size.max(axis=axis).toarray().ravel() for axis in (0, 1)))
+    return np.concatenate([order[~weak[order]], order[weak[order]]])
 
 
 class BlockPattern:

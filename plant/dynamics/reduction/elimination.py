@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 MOST_NEIGHBOURS = 8
 """Neighbours up to which taking a node out makes the matrix smaller: it couples all of them with each other."""
 
+WEAK = 1e-6
+"""Part of a node's largest coupling below which its own admittance is no pivot: what is in series there cancels."""
+
 
 def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int64], sp.csc_array]:
     """Take out nodes that need not be kept, those of fewest neighbours first.
@@ -20,7 +23,7 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     Y
         Admittances (S), symmetric or not.
     keep
-        Nodes to keep: those with a load, a terminal or a link to a source.
+        Nodes to keep: those with a load, a terminal or a link to a source. Weak ones are kept, too.
 
     Returns
     -------
@@ -48,6 +51,8 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
         if size - 1 > MOST_NEIGHBOURS:
             break
         own = rows[node]
+        if abs(own.get(node, 0.0)) <= WEAK * max(map(abs, own.values()), default=0.0):
+            continue
         pivot = own.pop(node)
         for neighbour in own:
             beside = rows[neighbour]

@@ -13,6 +13,7 @@ from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
 from plant.dynamics.kernel.sparse import COPY, SparseMaps
 from plant.dynamics.load_law import LoadLaw
 from plant.dynamics.reduction.block_pattern import BlockPattern
+from plant.dynamics.reduction.elimination import WEAK
 from plant.dynamics.reduction.kept_network import kept_network
 from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 from plant.dynamics.switch_state import SwitchState
@@ -164,7 +165,8 @@ class SparseIsland:
         self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
         self.without_load: Complex = splu(sp.csc_matrix(Y)).solve(right) if right.size else right
         self.V_nom: Real = np.maximum(np.abs(self.without_load), 1.0)
-        self._scale = np.abs(Y.diagonal()) * self.V_nom
+        own, most = np.abs(Y.diagonal()), abs(Y).max(axis=1).toarray().ravel() if right.size else 0.0
+        self._scale = np.where(own <= WEAK * most, most, own) * self.V_nom
         self._pattern = BlockPattern(Y, C)
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:

@@ -84,3 +84,26 @@ def test_elimination_is_that_of_the_matrix_where_couplings_are_not_mutual(seed: 
     assert gone.size, "nothing is eliminated"
     want = Y[np.ix_(kept, kept)] - Y[np.ix_(kept, gone)] @ np.linalg.solve(Y[np.ix_(gone, gone)], Y[np.ix_(gone, kept)])
     np.testing.assert_allclose(reduced.toarray(), want, atol=1e-12)
+
+
+def in_series(cancels: bool) -> np.ndarray:
+    """Return admittances (S) of nodes 0 and 1 with a reactance and its negative in series between, and a line on."""
+    y = -2.0j
+    Y = np.diag([3.0 - 1.0j, 4.0 + 0.0j, 0.0, 1.0 - 1.0j])
+    for i, j, value in ((0, 2, y), (2, 1, -y if cancels else y), (1, 3, 1.0 - 1.0j)):
+        Y[[i, j], [i, j]] += value
+        Y[[i, j], [j, i]] -= value
+    return Y
+
+
+@pytest.mark.parametrize("cancels", [True, False])
+@pytest.mark.parametrize("kept_nodes", [(0, 1), (0, 1, 2, 3)])
+def test_a_node_whose_admittances_cancel_is_no_pivot(cancels: bool, kept_nodes: tuple[int, ...]) -> None:
+    """Between a reactance and its negative in series a node has no own admittance, and yet its voltage."""
+    Y = in_series(cancels)
+    keep = np.isin(np.arange(4), kept_nodes)
+    right = np.array([1.0, 2.0 - 1.0j, 0.0, 0.0])
+
+    kept, reduced = eliminated(sp.csr_array(Y), keep)
+
+    np.testing.assert_allclose(solved(reduced, right[kept]), np.linalg.solve(Y, right)[kept], rtol=1e-12)

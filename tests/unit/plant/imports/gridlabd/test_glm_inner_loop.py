@@ -1,4 +1,4 @@
-"""Lines with z12 unlike z21 in what the inner loop solves, beside GridLAB-D."""
+"""What the inner loop solves of imported models: lines with z12 unlike z21, and lines of negative impedance."""
 
 from pathlib import Path
 
@@ -12,9 +12,11 @@ from plant.dynamics.reduction import reduce_network
 from plant.equipment import InverterRow
 from plant.feeder.circuits import circuit_of
 from plant.feeder.installed_inverters import installed_inverters
+from plant.gridlabd.model.export_glm import export_glm
 from plant.imports.gridlabd.read_glm import read_glm
 from plant.network import Network
 from plant.plant_config import PlantSettings
+from plant.tables import read_feeder
 from tests.unit.plant.imports.gridlabd.glm_models import ASYMMETRIC, TOLERANCE, gridlabd_voltages, write
 
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
@@ -60,3 +62,26 @@ def test_the_inner_loop_has_gridlabds_voltages_where_z12_is_not_z21(
         gaps = {node: abs(ours[node] - theirs[node] / V_nom[node]) for node in theirs}
         assert len(gaps) == 21
         assert max(gaps.values()) < TOLERANCE, max(gaps, key=lambda node: gaps[node])
+
+
+def test_a_node_between_an_impedance_and_its_negative_is_solved(tmp_path: Path) -> None:
+    """Our own feeder as we write it for GridLAB-D has such nodes at its regulators: it starts, and is islanded."""
+    own = read_feeder("microgrid123")
+    path = write(tmp_path, export_glm(own, PlantSettings(), 1, "voltages.csv"))
+    feeder = read_glm(path, leave_out=("inverter_dyn.*",))
+    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    rows = tuple(replace(row, bus=f"n{row.bus}", V_nom=V_nom[f"n{row.bus}"]) for row in own.inverters)
+    network = Network(replace(feeder, inverters=rows))
+    loads, n = network.loads(), len(rows)
+    dynamics = Dynamics(
+        circuit_of(network, network.closed0, loads), installed_inverters(network, PlantSettings()), 0.002
+    )
+
+    dynamics.start(np.full(n, 0.3), V_set=np.full(n, 1.0))
+    assert kirchhoff_residual(dynamics) < 1e-6
+
+    opened = {name for name in network.switches if "13-152" in name}
+    dynamics.connect(circuit_of(network, network.closed0 - opened, loads))
+    assert len(opened) == 1
+    assert dynamics.take_trips() == []
+    assert kirchhoff_residual(dynamics) < 1e-6
