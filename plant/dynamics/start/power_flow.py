@@ -14,7 +14,8 @@ from plant.dynamics.reduction.reduced import Complex, Real, Reduced
 from plant.dynamics.weak_branches import weak_branches
 
 MOST_ROUNDS = 500
-"""Most rounds between the network and inverters of constant power."""
+"""Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:
+near the largest power that a network carries a round leaves most of an error."""
 
 NEAR = 4
 """Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
@@ -50,6 +51,7 @@ class PowerFlow:
         units, m = self.units, self.V_b.size
         J, V = J.copy(), np.empty(J.shape, complex)
         tolerance, left, renewed = 1e-12 * float(units.V_b.max()), MOST_ROUNDS, False
+        total, before = MOST_ROUNDS, 1.0
         while left > 0:
             most = left if self._near else min(left, NEAR)
             x = np.concatenate([self.V_b.real, self.V_b.imag])
@@ -79,8 +81,10 @@ class PowerFlow:
                 return J, V
             if not self._near:
                 self.net, self._near = self._linearise(), True
+            if left <= 0 and change < 0.5 * before:
+                left, total, before = MOST_ROUNDS, total + MOST_ROUNDS, change
         raise PlantError(
-            f"no initial operating point: injections still change by {change:.1e} pu after {MOST_ROUNDS} iterations; "
+            f"no initial operating point: injections still change by {change:.1e} pu after {total} iterations; "
             "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
         )
 
