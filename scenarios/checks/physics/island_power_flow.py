@@ -1,6 +1,6 @@
 """The power flow of islands from what a row of a run says of their inverters: what loads and losses take.
 
-A row has P, Q and V of every inverter. One grid-forming inverter of each island keeps its internal voltage here, the
+A row has P, Q and V of every inverter. One grid-forming inverter of each island keeps its terminal voltage here, the
 others deliver their recorded P and Q, and the feeder's tables say what its lines and loads take, but for loads that
 were set in the run. What is left for the one inverter is generation as it should be; the row says what it was.
 """
@@ -25,6 +25,12 @@ from scenarios.results.history import Flags, Floats
 
 MOST_NODES = 1500
 """Nodes above which a feeder takes seconds."""
+
+NEAR, MOST_CORRECTIONS = 1e-6, 20
+"""Difference (pu) of a terminal voltage from that of the row at which to end, and most corrections until then."""
+
+FIRST = 0.1
+"""Part of the difference by which the internal voltage is corrected at first; then the secant says how far."""
 
 KEPT = 32
 """Number of factored networks to keep: loads of a long run may change hundreds of times."""
@@ -106,10 +112,17 @@ class IslandPowerFlow:
         S = P + 1j * Q
         I = np.conj(np.where(units.single, 3.0, 1.0) * S / (3.0 * np.where(V > 0.0, V, 1.0)))  # noqa: E741  # current
         J = (flow.y * V + np.where(online, I, 0.0))[:, None] * PHASES
-        J, at_terminals = flow.solve(J, P / units.S_b, Q / units.S_b, frozen)
-        nearer = V[swings] / np.abs(at_terminals[swings]).mean(axis=1)  # unbalanced phases shift the mean a little
-        J[swings] *= nearer[:, None]
-        J, at_terminals = flow.solve(J, P / units.S_b, Q / units.S_b, frozen)
+        before = step = np.zeros(len(swings))
+        for correction in range(MOST_CORRECTIONS):
+            J, at_terminals = flow.solve(J, P / units.S_b, Q / units.S_b, frozen)
+            off = V[swings] / np.abs(at_terminals[swings]).mean(axis=1) - 1.0  # unbalanced phases shift the mean
+            if np.abs(off).max() < NEAR:
+                break
+            change = before - off  # followers of constant power can make it many times the step
+            secant = np.divide(off, change, out=np.zeros_like(off), where=change != 0.0)
+            step = secant * step if correction else FIRST * off
+            J[swings] *= 1.0 + step[:, None]
+            before = off
         delivered = np.sum(at_terminals * np.conj(J - flow.y[:, None] * at_terminals), axis=1)
         found = []
         for swing in swings:
