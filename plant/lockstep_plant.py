@@ -168,9 +168,7 @@ class LockstepPlant(PlantNode):
                 self._barrier.deadline = now + CLOSING
                 if self._unacknowledged.is_empty:
                     self._be_over()
-            elif (
-                self.phase in ("gathering", "joining") and now > min(self._recorders_at.values(), default=now) + SILENT
-            ):
+            elif self.phase in ("gathering", "joining") and self._recorder_is_silent(now):
                 self._barrier.renew(now)
             elif missing := self.missing_messages():  # else the last awaited message has just arrived
                 self.abort(self._barrier.complaint(missing, now), now)
@@ -221,8 +219,9 @@ class LockstepPlant(PlantNode):
         elif self.phase != "holding":
             for name, instance in self.members.next_unmet():
                 self._ask(name, instance)
-        if self.phase in ("holding", "joining"):
-            waits_for = self._joining or self.config.recorders
+        if self.phase in ("gathering", "holding", "joining"):
+            missing = dict.fromkeys(who for _, who in self.missing_messages())
+            waits_for = tuple(missing) or self.config.recorders
             waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=self.tick, t=self.t, waits_for=waits_for)
             self._publish_aside(self.keys.control, encode(waiting))
 
@@ -288,6 +287,7 @@ class LockstepPlant(PlantNode):
         self._close_if_alone()
 
     def _recorder_is_silent(self, now: float) -> bool:
+        """Whether a recorder that the run waits for has not spoken for `SILENT`."""
         return any(now > at + SILENT for at in self._recorders_at.values())
 
     def _publish(self, key: str, payload: bytes) -> None:

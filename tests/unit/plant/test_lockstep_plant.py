@@ -484,8 +484,12 @@ def test_the_plant_leaves_once_its_recorder_has_the_end() -> None:
 def test_no_agent_is_late_while_the_recorder_is_silent() -> None:
     """The recorder's process starts the agents: if it stands still, they cannot come; it may come late itself."""
     lab = Lab(recorders=("history",), deadline=10.0)
+    lab.join("inv1")
     lab.wait(600.0)
     assert lab.missing[-1] == ("token", "history")
+    waiting = [message for _, message in lab.sent if isinstance(message, Waiting)]
+    assert len(waiting) == 600  # else the agents that have come would give the plant up
+    assert waiting[0].waits_for == ("inv2", "inv3", "inv4", "history")
     lab.recorder("history")
     for _ in range(9):
         lab.needs(0)
@@ -494,4 +498,4 @@ def test_no_agent_is_late_while_the_recorder_is_silent() -> None:
     for _ in range(10):
         lab.needs(0)
         lab.wait(1.0)
-    assert lab.node.outcome.startswith("plant: no token from inv1 within 10 s")
+    assert lab.node.outcome.startswith("plant: no token from inv2 within 10 s")
