@@ -18,6 +18,7 @@ from scenarios.drivers.outcome import Outcome
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.figure_processes import prepare_figures
+from scenarios.results.law_failures import ended_by_a_law
 from scenarios.results.record import Recorded, Recorder, RecordError
 from scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
 from scenarios.schema.configs import configs
@@ -101,7 +102,7 @@ def run_case(
                     shared=request.processes,
                 )
             if outcome.broke:
-                stopped = plant.on_law_failure == "stop" and any(event.kind == "law" for event in outcome.events)
+                stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
                 raise (LawStopError if stopped else BrokenRunError)(f"case {case}: {outcome.broke}")
             recorded = recorder.finish(time.end_s, time.record_s)
             if recorder.record_failure:

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from agents.graphs import natural_order
+from plant.plant_config import OnLawFailure
 from plant.plant_node import IDLE
 from wire.messages import PlantEvent
 
@@ -49,6 +50,11 @@ def law_failures(events: Iterable[PlantEvent]) -> tuple[LawFailure, ...]:
             line = _LINE.match(why)
             found.append(LawFailure(event.t, event.subject, why, line["line"] if line else ""))
     return tuple(sorted(found, key=lambda failure: (failure.t, natural_order(failure.agent))))
+
+
+def ended_by_a_law(on_law_failure: OnLawFailure, events: Iterable[PlantEvent]) -> bool:
+    """Return whether a failed law has ended a run that broke; with "droop" something else has."""
+    return on_law_failure == "stop" and any(event.kind == "law" for event in events)
 
 
 def first_of(failures: tuple[LawFailure, ...]) -> str:

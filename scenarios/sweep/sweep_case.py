@@ -24,7 +24,7 @@ from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.findings import Findings, find
 from scenarios.results.history import History
-from scenarios.results.law_failures import first_of, law_failures
+from scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from scenarios.results.record import Recorder
@@ -98,10 +98,10 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     recorder = Recorder()
     ready = plant_at_start(plant) if plant.settings.simulator == "gridpeers" else None
     outcome = run_inprocess(plant, agents, recorder, plant=ready, on_links=recorder)
-    failed_laws = first_of(law_failures(outcome.events))
     if outcome.broke:
-        status: Literal["broke", "law failed"] = "law failed" if failed_laws else "broke"
-        return SweepRow(number=number, status=status, why=outcome.broke), None
+        stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
+        return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke), None
+    failed_laws = first_of(law_failures(outcome.events))
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
     record = CaseRecord.of(scenario, feeder, case, recorded)

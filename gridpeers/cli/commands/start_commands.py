@@ -91,8 +91,6 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
-        from dataclasses import replace
-
         from scenarios.checks.check_registry import LAW_FAILED
         from scenarios.live.launch.link_log import LinkLog, check_new
         from scenarios.live.launch.live_folders import folders, live_record
@@ -101,7 +99,7 @@ def _start(
         from scenarios.live.numbers.live_report import conclude
         from scenarios.record.record_info import LIVE
         from scenarios.results.file_sizes import HOUR, file_sizes, require_room
-        from scenarios.results.law_failures import first_of, law_failures
+        from scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
         from scenarios.results.metrics_file import RunMetrics
         from scenarios.schema.plugin_keys import checks_off
 
@@ -153,7 +151,9 @@ def _start(
                 outcome = conclude(outcome, metrics, kept)
             elif outcome.failed_laws:
                 typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
-        _finish(outcome if LAW_FAILED not in checks_off(spec) else replace(outcome, failed_laws=()))
+        stopped = ended_by_a_law(spec.on_law_failure, outcome.failed_laws)
+        judged = bool(outcome.failed_laws) and LAW_FAILED not in checks_off(spec)
+        _finish(outcome, law_failed=stopped or (judged and not outcome.broke))
 
 
 def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
@@ -235,11 +235,12 @@ def agent(
         _finish(agent_here(where, tuple(inverters), listening or None, wait, trusts=own_code))
 
 
-def _finish(outcome: ProcessOutcome) -> None:
+def _finish(outcome: ProcessOutcome, *, law_failed: bool = False) -> None:
+    """End with the exit code of an outcome; `law_failed` takes the place of one that broke, or ended well."""
     if outcome.interrupted:
         code = TERMINATED if outcome.interrupted == "SIGTERM" else INTERRUPTED
         fail([f"{outcome.interrupted}: everything that was started here has ended"], code)
     if outcome.broke:
-        fail([outcome.broke], CLAIM_FAILED if outcome.failed_laws else BROKEN)
-    if outcome.failed_laws:
+        fail([outcome.broke], CLAIM_FAILED if law_failed else BROKEN)
+    if law_failed:
         raise typer.Exit(CLAIM_FAILED)

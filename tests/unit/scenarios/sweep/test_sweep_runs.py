@@ -23,6 +23,7 @@ from plant.dynamics import Circuit
 from plant.dynamics.live_network import LiveNetwork
 from plant.dynamics.reduction.sparse_reduction import SparseReduction
 from scenarios.drivers.inprocess import run_inprocess
+from scenarios.drivers.outcome import Outcome
 from scenarios.results.record import Recorder
 from scenarios.results.run_files import FolderError
 from scenarios.schema.configs import configs
@@ -33,6 +34,7 @@ from scenarios.sweep.study import Summary, study
 from scenarios.sweep.sweep_case import plant_at_start
 from scenarios.sweep.sweep_folder import SweepFolder
 from tests.unit.scenarios.sweep.conftest import Write
+from wire.messages import PlantEvent
 
 MANY = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'
 """With 20 seeds 40 runs: enough that a tenth of them is not the end."""
@@ -307,3 +309,20 @@ event = [{ label = "event1", t_s = 0.1, open = ["13-152", "sw1_2"] }]
     assert 0.0 < row["event1.islands.inv4.MPSI"] < 1.0
     assert "event1.islands.inv1.MQSI" in row
     assert row["event1.t_f_s"] is None or row["event1.t_f_s"] > 0.0
+
+
+@pytest.mark.parametrize(("on_law_failure", "status"), [("droop", "broke"), ("stop", "law failed")])
+def test_a_failed_law_is_why_a_run_broke_only_where_it_ends_runs(
+    on_law_failure: str, status: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With "droop" a run goes on after the failure, and something else breaks it later."""
+    failed = PlantEvent(t=1.2, kind="law", subject="inv1", text="inv1: law mine: no idea")
+    outcome = Outcome(
+        broke="no solution", reproducible=False, events=(failed,), notes=(), ticks=60, start_s=0.0, run_s=0.0
+    )
+    monkeypatch.setattr(sweep_case, "run_inprocess", lambda *_, **__: outcome)
+    scenario, _ = load_scenario("islanding")
+
+    row = sweep_case.run_one(0, msgspec.structs.replace(scenario, on_law_failure=on_law_failure), "IV")
+
+    assert (row.status, row.why) == (status, "no solution")
