@@ -196,18 +196,30 @@ def _remedy(feeder: Tables, proposal: Proposal) -> str:
 
 
 def _shared(file: Path, case: str, settings: str, rewritten: Callable[[str], Project]) -> None:
-    """Run the agents' case of a project; weigh var sharing more where vars stay unequal, and say which checks fail."""
+    """Run the agents' case of a project: choose what passes its checks, and say which fail.
+
+    Where more than var sharing fails and a leader was at its current limit, leaders get more current; where vars stay
+    unequal, var sharing weighs more.
+    """
     import gridpeers as gp
 
-    def failed() -> dict[str, str]:
-        verdicts = gp.load(file).run(case).check_verdicts
-        return {row.check: row.violations[0].sentence for row in verdicts if row.status == "failed"}
+    def failed() -> tuple[dict[str, str], bool]:
+        result = gp.load(file).run(case)
+        told = {row.check: row.violations[0].sentence for row in result.check_verdicts if row.status == "failed"}
+        return told, "limit" in set(result.events["kind"])
 
-    first = found = failed()
-    beta, betas = 1.0, iter(BETAS)
+    first, limited = failed()
+    if set(first) - {"var_sharing"} and limited and MORE_CURRENT not in settings:
+        rewritten(settings + MORE_CURRENT)
+        found, _ = failed()
+        if set(found) <= {"var_sharing"}:
+            check, sentence = next(iter(first.items()))
+            typer.echo(f"NOTE  case {case} fails its check {check}: {sentence}: so {REMEDIES[MORE_CURRENT]}")
+            first, settings = found, settings + MORE_CURRENT
+    found, beta, betas = first, 1.0, iter(BETAS)
     while set(found) == {"var_sharing"} and (beta := next(betas, 0.0)):
         rewritten(settings + BETA.format(beta=beta))
-        found = failed()
+        found, _ = failed()
     if first and not found:
         words = f"so [gains] weighs var sharing more, beta_GFM = beta_GFL = {beta:g}"
         typer.echo(f"NOTE  case {case}, {first['var_sharing']}: {words}")

@@ -116,6 +116,23 @@ def test_a_phase_that_would_stay_at_its_limit_gets_more_current(
     assert "I_max_pu = 3.0" in Path("mine/islanding.toml").read_text()
 
 
+def test_a_case_of_the_agents_that_stays_at_a_limit_gets_more_current(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On droop alone the island recovers from the limit; with agents it does not, until leaders give 3 pu."""
+    monkeypatch.setattr(feeder_proposal, "RATING", 1.1)
+    milder = UNEVEN.replace("kw=900 kvar=400", "kw=1200 kvar=600").replace("kw=2700 kvar=1200", "kw=2600 kvar=1300")
+    Path("uneven.dss").write_text(milder.replace("kw=2200", "kw=2000"))
+
+    made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")[1]
+    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--case", "ring")
+
+    assert "on droop alone" not in made
+    assert "NOTE  case ring fails its check frequency: no grid-forming inverter is on the network" in made
+    assert "so [plant.gfm] allows more current, I_max_pu = 3" in made
+    assert end == 0, ran
+
+
 def string_of_loads(buses: int, km: float, kvar: float) -> str:
     """A line with equal loads, 6 MW in all, and a capacitor at its end."""
     rows = ["New Circuit.long basekv=12.47 pu=1.02 r1=0.1 x1=0.5 r0=0.2 x0=0.9"]
@@ -141,7 +158,7 @@ def test_gains_are_chosen_with_which_the_agents_share_vars(elsewhere: Path) -> N
     assert "NOTE  case ring, MQSI, islanding: inv" in made
     assert "so [gains] weighs var sharing more" in made
     assert end == 0
-    assert "CHECKS  case ring: 11 of 11 checks passed" in ran
+    assert re.search(r"CHECKS  case ring: (\d+) of \1 checks passed", ran)
 
 
 def test_a_check_that_no_gains_pass_is_said(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
