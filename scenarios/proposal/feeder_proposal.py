@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from plant.equipment import Feeder, InverterRow
 from plant.equipment.connectivity import Connectivity, by_bus
-from plant.equipment.neutrals import neutrals_of
+from plant.equipment.neutrals import neutral_for, neutrals_of
 from scenarios.proposal.feeder_walk import depth_first, neighbours
 from scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
 from scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
@@ -104,7 +104,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     groups = group_sizes([section.load for section in chosen], there, count)
     chosen = chosen[: len(groups)]
     carried = sum(section.load for section in chosen) or 1.0
-    V_nom, neutrals = {bus.name: bus.V_nom for bus in feeder.buses}, neutrals_of(feeder)
+    rows, neutrals = {bus.name: bus for bus in feeder.buses}, neutrals_of(feeder)
     inverters: list[InverterRow] = []
     microgrid = 0
     for section, sizes in zip(chosen, groups, strict=True):
@@ -125,10 +125,10 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
                         bus=bus,
                         microgrid=f"MG{microgrid}",
                         P_rated=max(round(rating / len(sizes) * share, -4), 10e3),
-                        V_nom=V_nom[bus],
+                        V_nom=rows[bus].V_nom,
                         m_p=DROOPS[0],
                         m_q=DROOPS[1],
-                        neutral=neutrals.get(bus, ""),
+                        neutral=neutral_for("", rows[bus], "ABC", neutrals.get(bus, "")),
                     )
                 )
     large = max(inverters, key=lambda row: row.P_rated / most_rated(row.V_nom))

@@ -78,6 +78,14 @@ def test_no_inverter_stands_where_one_phase_is_de_energised() -> None:
     assert not buses & {"b", "b1"}
 
 
+def test_a_load_between_two_phases_is_no_neutral_of_a_proposed_inverter() -> None:
+    """One with the voltage of a phase to ground, as people write it by mistake, leaves the inverters on earth."""
+    feeder = two_sections(9)
+    mistaken = tuple(replace(part, ends=("A", "C")) for part in feeder.load_parts)
+
+    assert {row.neutral for row in propose(replace(feeder, load_parts=mistaken), 6).inverters} == {""}
+
+
 def test_a_load_too_large_for_three_inverters_a_section_gets_more() -> None:
     """Without a count there are as many as their voltage needs; a count that is too small is refused with the limit."""
     feeder = read_feeder("standard123")
