@@ -240,6 +240,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     from gridpeers.cli.progress import TRYING, explained_work
     from plant.equipment.neutrals import returns_in_words
     from scenarios.proposal.proposal_errors import NoProposalError
+    from scenarios.run_request import BrokenRunError
     from scenarios.schema import load_scenario
     from scenarios.start_check import start_problem
     from wire.counted import counted
@@ -276,7 +277,11 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
                 rewritten = partial(written, part)
                 settings = _calmed(project, rewritten, proposal)
                 if settings is not None:
-                    _shared(file, graph, settings, rewritten)
+                    try:
+                        _shared(file, graph, settings, rewritten)
+                    except BrokenRunError as error:
+                        rewritten(settings)
+                        typer.echo(f"NOTE  case {graph} was not checked, as a run of it broke: {error}")
                 break
             problem = problem or found
     if found:

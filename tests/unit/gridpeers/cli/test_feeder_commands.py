@@ -10,7 +10,7 @@ from tempfile import gettempdir
 import pandas as pd
 import pytest
 
-from gridpeers import Feeder
+from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.cli.commands import init
 from plant.tables import read_feeder
 from scenarios.proposal import feeder_proposal
@@ -170,6 +170,22 @@ def test_a_check_that_no_gains_pass_is_said(elsewhere: Path, monkeypatch: pytest
 
     assert "NOTE  case ring fails its check var_sharing: MQSI, islanding: inv" in made
     assert "[gains]" not in Path("mine/islanding.toml").read_text()
+
+
+def test_a_case_that_breaks_when_it_is_tried_is_a_note(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The project is there all the same, with the settings that it had before the trial."""
+
+    def run(*_: object) -> None:
+        raise BrokenRunError("case ring: no room")
+
+    monkeypatch.setattr(Scenario, "run", run)
+    Path("uneven.dss").write_text(UNEVEN)
+
+    code, made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")
+
+    assert code == 0, made
+    assert "NOTE  case ring was not checked, as a run of it broke: case ring: no room" in made
+    assert Path("mine/islanding.toml").exists()
 
 
 TINY = {
