@@ -120,6 +120,6 @@ def _at_places(
         )
     Q = Q.copy()
     Q[free] += solution.x
-    Q[place == INSIDE] = 0.0
+    Q = np.where(place == INSIDE, at_rest.within(), Q)
     J, V = flow.solve(J, P, Q, swing)
     return J, V, Q

@@ -48,11 +48,15 @@ class VoltVarAtRest(NamedTuple):
         low = self.V_set - v
         return np.where(self.from_edge, low - np.clip(low, -self.db_OV, self.db_UV), low)
 
+    def within(self) -> Real:
+        """Return the vars within the band (pu): none, unless the limits exclude that."""
+        return np.clip(np.zeros(self.m_q.size), self.Q_min, self.Q_max)
+
     def mismatch(self, place: NDArray[np.int64], v: Real, Q: Real) -> Real:
         """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
         low = self.V_set - v
         wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
-        off = (np.where(place == INSIDE, 0.0, wanted) - Q) * self.m_q
+        off = (np.where(place == INSIDE, self.within(), wanted) - Q) * self.m_q
         off = np.where(place == UNDER, low - self.db_UV, off)
         return np.where(place == OVER, low + self.db_OV, off)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -52,6 +53,19 @@ def test_an_inverter_beyond_its_dead_band_starts_on_its_droop(band: float, sign:
 
     assert q == pytest.approx((1.0 - v) / M_Q, abs=1e-10)
     assert sign * q == pytest.approx(0.3, abs=0.01)
+    assert moved(dynamics) < 1e-4
+
+
+@pytest.mark.parametrize(("low", "high", "vars"), [(0.1, 0.44, 0.1), (-0.44, -0.1, -0.1)])
+@pytest.mark.parametrize("dead_band", ["gridlabd", "ieee1547"])
+def test_an_inverter_within_its_dead_band_starts_within_its_limits(
+    dead_band: Literal["gridlabd", "ieee1547"], low: float, high: float, vars: float
+) -> None:
+    """Limits of Q that exclude 0 hold within the band, too, so that nothing moves after the start."""
+    limited = replace(VOLT_VAR, dead_band=dead_band, db_UV=0.02, db_OV=0.02, Q_min=low, Q_max=high)
+    dynamics = started(limited, 1.0)
+
+    assert powers(dynamics)[1] == pytest.approx(vars, abs=1e-9)
     assert moved(dynamics) < 1e-4
 
 
