@@ -103,7 +103,11 @@ class SwitchState:
             self.to_ground = np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
             y_diagonal += self.to_ground
         self.Y = (circuit.Y + sp.diags_array(y_diagonal)).tocsr()
-        self.earthing = tuple(self._earthing(np.flatnonzero(forming & self.online & (circuit.returns >= 0))))
+        following = np.flatnonzero(np.tile(~forming & (circuit.returns < 0), 3) & injects)
+        no_earth = np.zeros(n, complex)
+        np.add.at(no_earth, G[following], np.tile(y_f, 3)[following])
+        formers = np.flatnonzero(forming & self.online & (circuit.returns >= 0))
+        self.earthing = tuple(self._earthing(formers, sp.csr_array(sp.diags_array(no_earth))))
         self.C = C[:, self.branches]
         self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)
         """Rows of `terminals` at which an inverter injects."""
@@ -112,15 +116,19 @@ class SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
         return self
 
-    def _earthing(self, formers: NDArray[np.int64]) -> Iterator[int]:
-        """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does."""
+    def _earthing(self, formers: NDArray[np.int64], no_earth: sp.csr_array) -> Iterator[int]:
+        """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
+
+        A filter of `no_earth` earths nothing: it is that of a GFL, which injects its current whatever the voltage is.
+        """
         circuit = self.circuit
         for i in formers.tolist():
             neutral, island = circuit.returns[i], self.inverter_island[i]
             own = circuit.sources[self.label[circuit.sources] == island]
             if self.place[neutral] < 0 or circuit.reference is None or (circuit.reference[own] < 0).any():
                 continue
-            earthed = self.Y + sp.csr_array(([EARTHING], ([neutral], [neutral])), shape=self.Y.shape)
+            earth = sp.csr_array(([EARTHING], ([neutral], [neutral])), shape=self.Y.shape)
+            earthed = self.Y - no_earth + earth
             nodes = self.unknown[self.label[self.unknown] == island]
             at = int(np.searchsorted(nodes, neutral))
             unit = np.zeros(nodes.size, complex)
@@ -128,7 +136,7 @@ class SwitchState:
             seen = 1.0 / splu(sp.csc_matrix(earthed[nodes][:, nodes])).solve(unit)[at]
             if abs(seen - EARTHING) < UNEARTHED:
                 self.to_ground[neutral] += EARTHING
-                self.Y = earthed
+                self.Y = self.Y + earth
                 yield i
 
     def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:

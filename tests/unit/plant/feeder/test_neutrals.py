@@ -195,6 +195,21 @@ def test_a_street_that_is_cut_off_keeps_its_loads_and_its_star_point_is_earthed(
     assert all(226.0 < reading.V < 232.0 for reading in now.values())
 
 
+def test_a_grid_following_inverter_to_earth_does_not_earth_the_neutral(tmp_path: Path) -> None:
+    """Its current finds no way back in an island without earth: the grid-forming inverter earths the star point."""
+    feeder, script = imported(tmp_path, KINDS["earthed at the transformer"])
+    feeder = feeder.add_inverter("street", "b1", "GFM", 3e4)
+    for phase in "AB":
+        feeder = feeder.add_inverter(phase, "b2", "GFL", 4e3, phases=phase, neutral="earth", params={"P_min_pu": 0.0})
+    network, dynamics = started(feeder, frozenset(), 0.4)
+
+    earth = EARTH.format("k", "b1.4", "b1", 1e-3).strip()
+    theirs = engine(script, *in_engine(network, dynamics, behind_filter=True), earth, "open line.a1 1")
+
+    assert dynamics.network.reduction.earthing == (0,)
+    assert largest_difference(network, dynamics, frozenset(), theirs, "mv b0") < TOLERANCE
+
+
 def test_a_neutral_that_keeps_its_earths_needs_none_of_an_inverter(tmp_path: Path) -> None:
     """Where houses earth the neutral, no inverter does when the street becomes an island."""
     feeder, _ = imported(tmp_path, KINDS["earthed at every house"])
