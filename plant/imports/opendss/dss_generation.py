@@ -21,7 +21,7 @@ IMPEDANCE = 2
 """Model whose power goes with the square of the voltage; that of the other models is constant within limits."""
 
 NO_LIMITS, FIXED_Q, FIXED_X, LIMITED_CURRENT = 3, 4, 5, 7
-"""Further models of a Generator; of the other classes, LimitCurrent=yes is the last one."""
+"""Further models of a Generator; LimitCurrent=yes of PVSystem is the last one."""
 
 CLOSE = 1e-6
 """Largest difference between the engine's current and that of the parts, beside the largest current."""
@@ -78,11 +78,14 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
 
 
 def _kind(element: Any, name: str) -> int:
-    """Return the model of an element, as that of a Generator that has the same law."""
+    """Return the model of an element, as that of a Generator that has the same law.
+
+    The engine does not limit the current of Storage, whatever its LimitCurrent is.
+    """
     model = int(_property(element, "model") or 1)
     if name.startswith("generator."):
         return model
-    limited = _property(element, "limitcurrent").lower().startswith(("y", "t"))
+    limited = name.startswith("pvsystem.") and _property(element, "limitcurrent").lower().startswith(("y", "t"))
     return IMPEDANCE if model == IMPEDANCE else LIMITED_CURRENT if limited else 1
 
 

@@ -57,6 +57,7 @@ BEYOND = {
     "photovoltaic": f"New PVSystem.p bus1=c kva=50 pmpp=40 kvar=12 {LIMITS}",
     "photovoltaic of limited current": f"New PVSystem.p bus1=c kva=50 pmpp=40 kvar=12 limitcurrent=yes {LIMITS}",
     "storage": f"New Storage.s bus1=c kwrated=50 kwhrated=100 state=discharging {LIMITS}",
+    "storage of limited current": f"New Storage.s bus1=c kwrated=50 limitcurrent=yes state=discharging {LIMITS}",
     "negative load": f"New Load.l bus1=c phases=3 kw=-90 kvar=30 {LIMITS}",
 }
 """Generation of each law; that of the Generator's model 7 beyond its limit has its vars reversed in the engine."""
