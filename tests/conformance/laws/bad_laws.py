@@ -19,6 +19,10 @@ class UntoldError(Exception):
         raise RuntimeError("no text")
 
 
+class PanicException(BaseException):
+    """What a library written in Rust raises when it panics."""
+
+
 class Unshown:
     """An object that cannot be shown."""
 
@@ -61,6 +65,8 @@ class Failing(gp.Law):
                 sys.exit(3)
             case "raises what cannot be told":
                 raise UntoldError
+            case "panics":
+                raise PanicException("no index")
             case "returns what cannot be shown":
                 return Unshown()
             case "is a generator":

@@ -27,6 +27,7 @@ BAD = "tests.conformance.laws.bad_laws"
     ("a list", r"step at t = 1.2 s returned V_set = \[1.0\]; it must be a number"),
     ("too great a number", r"step at t = 1.2 s returned P_set = 10{96}...; it must be a number"),
     ("leaves", r"step at t = 1.2 s raised SystemExit: 3"),
+    ("panics", r"step at t = 1.2 s raised ForeignError: PanicException: no index"),
     ("raises what cannot be told", r"step at t = 1.2 s raised UntoldError: its text cannot be had"),
     ("returns what cannot be shown", r"step at t = 1.2 s returned a Unshown that cannot be shown; return SetPoints.*"),
     ("is a generator", r"step at t = 1.2 s returned <generator object Failing.*>>; return .*"),
