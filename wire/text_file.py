@@ -29,7 +29,7 @@ _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
 
 class TextFileError(ValueError):
-    """The file is no text, or no table, that can be read; its message goes behind the file's name."""
+    """The file cannot be read as text or as a table; its message goes behind the file's name."""
 
 
 def text_of(data: bytes) -> str:
@@ -53,7 +53,9 @@ def text_of(data: bytes) -> str:
         text = data.decode(encoding)
     except UnicodeDecodeError as error:
         if encoding != "utf-8":
-            raise TextFileError(f"is not whole: it begins as {encoding.upper()}, and ends as none") from None
+            raise TextFileError(
+                f"is damaged: it begins as {encoding.upper()}, but not all of it is; copy it again"
+            ) from None
         line = data.count(b"\n", 0, error.start) + 1
         raise TextFileError(
             f"line {line} has byte {data[error.start]:#04x}, which is not UTF-8 (Windows or Latin-1?); save it as UTF-8"
@@ -148,7 +150,7 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
 
 
 def _separator(header: str, known: Collection[str]) -> str:
-    """Return the separator of a header; of one column it is no comma, for numbers below may have one."""
+    """Return the separator of a header; for a single column a semicolon, as its numbers may have decimal commas."""
 
     def fit(separator: str) -> tuple[int, int]:
         cells = [cell.strip(' "') for cell in header.split(separator)]
@@ -164,7 +166,7 @@ def _replace_commas(rows: Iterable[tuple[int, list[str]]], columns: Collection[i
     Raises
     ------
     TextFileError
-        If they may part thousands, or points are there as well.
+        If they may separate thousands, or there are decimal points as well.
     """
     places = [(row, cells, i) for row, cells in rows for i in columns if i < len(cells)]
     commas = [(row, cells, i) for row, cells, i in places if _DECIMAL_COMMA.fullmatch(cells[i])]
@@ -177,7 +179,7 @@ def _replace_commas(rows: Iterable[tuple[int, list[str]]], columns: Collection[i
         )
     if all(_THOUSANDS.fullmatch(each[k]) for _, each, k in commas):
         raise TextFileError(
-            f'"{cells[i]}" (row {row}) has a comma that may part decimals or thousands; write it with a point, or none'
+            f'"{cells[i]}" (row {row}) has a comma for decimals or thousands; write it with a point, or none'
         )
     for _, each, k in commas:
         each[k] = each[k].replace(",", ".")

@@ -101,7 +101,7 @@ RUN = {
 
 
 def require(modules: dict[str, str], install: str = "") -> None:
-    """End with a clear line, and with advice, if a package that a part of gridpeers needs is missing or ill set up."""
+    """End with a clear line, and with advice, if a package that is needed is missing, or ZENOH_RUNTIME is wrong."""
     from importlib.util import find_spec
 
     from wire.packages import DISTRIBUTIONS, requirement

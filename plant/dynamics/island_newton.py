@@ -25,8 +25,8 @@ SHORTEST_STEP = 2.0**-10
 TOLERANCE = 2e-12
 """Largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here."""
 ROUNDING, STALL = 1e-8, 4
-"""A step (pu) that may be rounding where the residual is, and the number of steps in a row that shrink no more: next to
-a very small impedance steps do not come below some 1e-11."""
+"""Largest step (pu) that may be rounding, and how many such steps in a row that do not halve end the search. Next to a
+very small impedance steps stay above 1e-11 pu."""
 NOISE = 1e-12
 """Residual (pu) below which it need not shrink: it is rounding."""
 

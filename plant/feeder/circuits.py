@@ -13,7 +13,7 @@ from plant.network.loads import LoadBranches
 from plant.network.merging import Merge
 
 ROUNDING = 1e-14
-"""Part of its terms below which a sum of admittances is what rounding leaves of 0."""
+"""Size of a sum of admittances relative to its terms below which the sum is 0 but for rounding."""
 
 
 class Circuits:

@@ -323,7 +323,7 @@ def main() -> None:
             else:
                 requests.put(request)
         if federate:
-            federate.abort(f"{federate.name}: its gridpeers was killed")
+            federate.abort(f"{federate.name}: its gridpeers process was killed")
         os._exit(0)
 
     def look() -> None:

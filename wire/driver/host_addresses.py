@@ -47,9 +47,9 @@ def listed_addresses(ipv4: str, ipv6: str) -> frozenset[str]:
 
 
 def at_addresses(listen: Collection[str], addresses: Collection[str]) -> tuple[str, ...]:
-    """Return endpoints to listen on, those of any address and any port at each address of its family.
+    """Return endpoints to listen on, with the addresses of this host in place of any address with any port.
 
-    Nobody can know such a port but from Zenoh, which then names these addresses. Without any address they stay.
+    Zenoh then tells others these addresses. Without any address the endpoints stay.
 
     Examples
     --------
@@ -72,7 +72,7 @@ def at_addresses(listen: Collection[str], addresses: Collection[str]) -> tuple[s
 
 
 def address_in(locator: str) -> str:
-    """Return the address in a locator of Zenoh; "" if it is one that reaches no other host, or a name.
+    """Return the address in a locator of Zenoh; "" for a name, or an address that other hosts cannot reach.
 
     Examples
     --------
@@ -117,7 +117,7 @@ class LinkAddresses:
         """Addresses that links came from while the host had them."""
 
     def moved(self, sources: Collection[str], here: Collection[str]) -> bool:
-        """Return whether a new session would tell others an address of links that this one does not, or one is lost.
+        """Return whether links use an address that the host has lost, or that this session does not tell others.
 
         Parameters
         ----------

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 STOOD_STILL = 1.0
-"""Time (s) after a deadline beyond which a process that looks has stood still itself, with its clock running on."""
+"""Time (s) after a deadline. A process that is woken later was stopped itself, while its clock went on."""
 
 
 class Awaited(NamedTuple):
@@ -87,8 +87,8 @@ class TickBarrier:
     def is_over(self, now: float) -> bool:
         """Whether the deadline has passed.
 
-        A process that is woken much later than it asked for has stood still itself, as after Ctrl-Z or a closed lid.
-        Messages may wait for it, so it waits anew.
+        A process that is woken much later than it asked for was stopped itself, as by Ctrl-Z or a closed lid. Messages
+        may be waiting for it, so the deadline starts again.
         """
         if self.deadline is None or now < self.deadline:
             return False

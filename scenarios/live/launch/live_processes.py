@@ -46,7 +46,7 @@ CHECK = 0.25
 """Time (s) between two checks for process faults that are due."""
 
 UNHEARD = "the plant has ended, and nothing was ever heard of it here: no link to it was made"
-"""Why a run has failed whose plant ended well by its own account."""
+"""Failure of a run whose plant ended without an error, but was never heard here."""
 
 LEAVING = 5.0
 """Time (s) that processes have to close by themselves once the plant has."""

@@ -3,9 +3,9 @@
 import logging
 
 
-def _is_no_note_on_its_folder(record: logging.LogRecord) -> bool:
-    """Whether a line of matplotlib's log is another than that its folder in the user's home cannot be written."""
+def _is_relevant(record: logging.LogRecord) -> bool:
+    """Return False for matplotlib's warning that it cannot write its folder in the user's home."""
     return "MPLCONFIGDIR" not in record.msg and not record.msg.startswith("mkdir -p failed")
 
 
-logging.getLogger("matplotlib").addFilter(_is_no_note_on_its_folder)
+logging.getLogger("matplotlib").addFilter(_is_relevant)

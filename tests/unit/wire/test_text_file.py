@@ -21,7 +21,7 @@ def test_bytes_of_a_code_page_are_named_with_their_line(encoding: str) -> None:
 
 def test_a_truncated_text_is_refused() -> None:
     """Half a letter at the end, as a download that broke off leaves it."""
-    with pytest.raises(TextFileError, match="is not whole"):
+    with pytest.raises(TextFileError, match="is damaged: it begins as UTF-16"):
         text_of("bus".encode("utf-16")[:-1])
 
 
@@ -54,7 +54,10 @@ def test_decimal_commas_of_one_column_are_no_separators() -> None:
 @pytest.mark.parametrize(
     ("rows", "said"),
     [
-        ("a;1,500\nb;20", r'^"1,500" \(row 2\) has a comma that may part decimals or thousands; write it with a point'),
+        (
+            "a;1,500\nb;20",
+            r'^"1,500" \(row 2\) has a comma for decimals or thousands; write it with a point',
+        ),
         ("a;1,5\nb;1.5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.5" \(row 3\); write all numbers'),
         ("a;1,5\nb;1.500,5", r'^has decimal commas, "1,5" \(row 2\), and points, "1.500,5" \(row 3\)'),
         ('a;"1', "^not a CSV file"),

@@ -265,7 +265,7 @@ def test_unreadable_file_is_told(folder: Path) -> None:
     """A file that is no text is a problem of the feeder, not an exception of another kind."""
     (folder / "loads_main.csv").write_bytes(b"\xff\xfebus")
 
-    assert problems(folder)[0].startswith("loads_main.csv: is not whole")
+    assert problems(folder)[0].startswith("loads_main.csv: is damaged")
 
 
 @pytest.mark.parametrize(
