@@ -12,7 +12,7 @@ from scenarios.proposal.feeder_walk import depth_first, neighbours
 from scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
 from scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
 from scenarios.proposal.islanding_switch import islanding_switch
-from scenarios.proposal.phase_loads import heaviest_phase
+from scenarios.proposal.phase_loads import heaviest_phase, phase_powers
 from scenarios.proposal.proposal_errors import NoProposalError, TooLargeError
 
 RATING = 1.3
@@ -49,7 +49,8 @@ def propose(feeder: Feeder, count: int | None = None) -> Proposal:
     """Return where to island a feeder, and inverters that can then carry its load.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
-    rated by its load and that of the heaviest phase, and spread over it in equal parts of the load.
+    rated by its load and that of the heaviest phase, or by what its cables deliver, and spread over it in equal parts
+    of the load.
 
     Parameters
     ----------
@@ -87,7 +88,10 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     load = {bus: everywhere.get(bus, 0.0) for bus in beyond}
     total = sum(load.values())
     generation = sum(P for bus, P in feeder.generation_by_bus().items() if bus in beyond)
-    heaviest = heaviest_phase(feeder, switch, head)
+    S = phase_powers(feeder, switch, head)
+    heaviest = heaviest_phase(S)
+    # leaders alone can take the reactive power that cables deliver
+    needed = max(RATING * heaviest * total, -S.imag.sum() / LEADER)
     near = {bus: [other for other in others if other in beyond] for bus, others in neighbours(feeder).items()}
     along = depth_first(near, [head, *(bus.name for bus in feeder.buses if bus.name in beyond)])
     known = set(three_phase(feeder))
@@ -108,7 +112,7 @@ def _propose(feeder: Feeder, count: int | None) -> Proposal:
     inverters: list[InverterRow] = []
     microgrid = 0
     for section, sizes in zip(chosen, groups, strict=True):
-        rating = RATING * heaviest * total * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
+        rating = needed * (section.load / carried if carried > 1.0 else 1.0 / len(chosen))
         places = possible_places(feeder, known, section.along, LEADER * rating / len(sizes), sum(sizes))
         places = spread(section.along, set(places), sum(sizes), load)
         for size in sizes:

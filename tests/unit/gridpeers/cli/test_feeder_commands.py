@@ -116,6 +116,31 @@ def test_a_phase_that_would_stay_at_its_limit_gets_more_current(
     assert "I_max_pu = 3.0" in Path("mine/islanding.toml").read_text()
 
 
+CABLE = """New Circuit.cable basekv=12.47 pu=1.0 r1=0.1 x1=0.5 r0=0.2 x0=0.9
+New Line.sw bus1=sourcebus bus2=a r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
+New Line.cable bus1=a bus2=b r1=0.2 x1=0.15 r0=0.5 x0=0.4 c1=300 c0=300 length=10 units=km
+New Line.l2 bus1=a bus2=c r1=0.2 x1=0.4 r0=0.5 x0=1.2 c1=0 c0=0 length=1
+New Load.b bus1=b kv=12.47 kw=40 kvar=10
+New Load.c bus1=c kv=12.47 kw=40 kvar=10
+Set VoltageBases=[12.47]
+CalcVoltageBases
+"""
+"""A feeder whose cable delivers 176 kvar, beside 80 kW of load."""
+
+
+def test_inverters_are_rated_for_what_cables_deliver(elsewhere: Path) -> None:
+    """The leader alone can take it: a smaller one would excite the island beyond OV2."""
+    Path("cable.dss").write_text(CABLE)
+
+    made = invoke("init", "mine", "--feeder", "cable.dss", "--switch", "Line.sw")[1]
+    end, ran = invoke("run", "mine/islanding.toml", "--driver", "inprocess", "--case", "ring")
+
+    assert "NOTE" not in made
+    assert end == 0, ran
+    inverters = pd.read_csv("mine/cable/inverters.csv").set_index("kind")
+    assert inverters.loc["GFM", "P_rated_kW"] == pytest.approx(176.0 - 20.0, abs=10.0)
+
+
 def test_a_case_of_the_agents_that_stays_at_a_limit_gets_more_current(
     elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
