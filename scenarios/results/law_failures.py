@@ -11,8 +11,8 @@ from plant.plant_config import OnLawFailure
 from plant.plant_node import IDLE
 from wire.messages import PlantEvent
 
-_LINE = re.compile(r"(?:law|graph) .*? \((?P<line>[^()]+:\d+)\)(?::| of )")
-"""Beginning of the reason of a failure whose line is known."""
+_LINE = re.compile(r"(?:law|graph) (?:(?!: ).)*? \((?P<line>[^()]+:\d+)\)(?::| of )")
+"""Beginning of the reason of a failure whose line is known: what follows a colon and a blank is the reason itself."""
 
 
 class LawFailure(NamedTuple):
