@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from bench.validation.opendss.difference_figure import difference_figure
 from bench.validation.opendss.opendss_engines import ENGINES, solve_scripts
 from bench.validation.opendss.switch_states import SwitchStates
 from bench.validation.opendss.write_opendss import write_opendss
@@ -107,20 +108,12 @@ def _differences(
     return np.array([abs(ours.get(name, complex("nan")) - V) / nominal.get(name, 1.0) for name, V in theirs.items()])
 
 
-def _draw(results: Sequence[CaseResult]) -> Figure:
-    """Draw the distribution of the differences over the nodes."""
-    figure = Figure(figsize=(8.0, 2.8), layout="constrained")
-    panels = figure.subplots(1, len(ENGINES), sharey=True)
-    for axes, engine in zip(panels, ENGINES, strict=True):
-        for result in results:
-            gap = np.sort(result.curves[engine])
-            axes.semilogx(np.maximum(gap, 1e-16), np.linspace(0.0, 1.0, gap.size), label=result.case)
-        axes.axvline(LIMIT, color="black", linestyle=":", linewidth=1.0)
-        axes.set_title(engine)
-        axes.set_xlabel("difference of V at a node (pu)")
-    panels[0].set_ylabel("share of nodes below")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper")
-    return figure
-
-
-POWER_FLOW = ValidationPart("power-flow", "Power flow, beside OpenDSS", TEXT, ENGINES, CASES, _run, _draw)
+POWER_FLOW = ValidationPart(
+    "power-flow",
+    "Power flow, beside OpenDSS",
+    TEXT,
+    ENGINES,
+    CASES,
+    _run,
+    partial(difference_figure, limit=LIMIT, of="nodes", what="difference of V at a node"),
+)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import get_args
 
 import numpy as np
-from matplotlib.figure import Figure
 
+from bench.validation.opendss.difference_figure import difference_figure
 from bench.validation.opendss.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.random_feeders.feeder_states import FeederStates, run_states
 from bench.validation.random_feeders.random_script import Shape, random_feeder
@@ -89,22 +88,6 @@ def _largest(ours: FeederStates, theirs: SolvedStates) -> float:
     return float(np.max(gaps))
 
 
-def _draw(results: Sequence[CaseResult]) -> Figure:
-    """Draw the distribution of the largest differences over the feeders."""
-    figure = Figure(figsize=(8.0, 2.8), layout="constrained")
-    panels = figure.subplots(1, len(ENGINES), sharey=True)
-    for axes, engine in zip(panels, ENGINES, strict=True):
-        for result in results:
-            gap = np.sort(result.curves[engine])
-            axes.semilogx(np.maximum(gap, 1e-16), np.linspace(0.0, 1.0, gap.size), label=result.case)
-        axes.axvline(LIMIT, color="black", linestyle=":", linewidth=1.0)
-        axes.set_title(engine)
-        axes.set_xlabel("largest difference of V in a feeder (pu)")
-    panels[0].set_ylabel("share of feeders below")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside right upper")
-    return figure
-
-
 RANDOM_FEEDERS = ValidationPart(
     "random-feeders",
     "Random feeders, beside OpenDSS",
@@ -112,6 +95,6 @@ RANDOM_FEEDERS = ValidationPart(
     ENGINES,
     CASES,
     _run,
-    _draw,
+    partial(difference_figure, limit=LIMIT, of="feeders", what="largest difference of V in a feeder"),
     partial(_run, count=IN_TESTS),
 )
