@@ -268,7 +268,7 @@ class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
     V_low_pu: LimitOfV = 0.0
     """Voltage below which it is its nominal impedance."""
     V_min_pu: LimitOfV = 0.0
-    """Voltage below which it turns into that impedance; 0: nowhere."""
+    """Voltage below which it turns into that impedance, or whose current it keeps if V_low is the same; 0: nowhere."""
     V_max_pu: LimitOfV = 0.0
     """Voltage above which it is an impedance; 0: nowhere."""
     edge: Exponent = 0.0

@@ -37,8 +37,8 @@ def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str
         many = [key for key in ("from_phase", "to_phase") if len(getattr(it, key)) > 1]
         for key in many:
             row.problem(f'{key}: "{getattr(it, key)}" must be one phase (as "A"); give each phase a row of its own')
-        if it.V_min_pu and not it.V_low_pu < it.V_min_pu:
-            row.problem(f"V_min_pu: {it.V_min_pu:g} pu must be above V_low_pu, {it.V_low_pu:g} pu")
+        if it.V_min_pu and not it.V_low_pu <= it.V_min_pu:
+            row.problem(f"V_min_pu: {it.V_min_pu:g} pu must not be below V_low_pu, {it.V_low_pu:g} pu")
         if it.V_max_pu and not it.V_min_pu < it.V_max_pu:
             row.problem(f"V_max_pu: {it.V_max_pu:g} pu must be above V_min_pu, {it.V_min_pu:g} pu")
         for column in ("P_kW", "Q_kvar"):

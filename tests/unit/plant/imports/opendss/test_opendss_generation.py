@@ -7,6 +7,8 @@ from msgspec.structs import replace
 
 from plant.imports.opendss import read_opendss
 from plant.network import Network, solve_power_flow
+from plant.tables import read_feeder
+from plant.tables.write import write_feeder
 from tests.unit.plant.imports.opendss.opendss_solutions import (
     LETTERS,
     LINE,
@@ -80,6 +82,16 @@ def test_generation_beyond_its_limits_is_that_of_the_engine(tmp_path: Path, kind
         bus, _, number = name.rpartition(".")
         node = network.index(bus, LETTERS[int(number) - 1])
         assert abs(V[node] - theirs) < TOLERANCE * network.V_nom[node]
+
+
+@pytest.mark.parametrize("kind", BEYOND)
+def test_tables_have_generation_of_each_law(tmp_path: Path, kind: str) -> None:
+    """What is read from the tables of an imported feeder is what was imported."""
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, BEYOND[kind]))
+
+    write_feeder(feeder, tmp_path / "tables")
+
+    assert read_feeder(str(tmp_path / "tables")).load_parts == feeder.load_parts
 
 
 @pytest.mark.parametrize("kind", ["photovoltaic", "negative load"])
