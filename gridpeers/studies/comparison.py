@@ -134,9 +134,9 @@ class Comparison:
         changes = self.changes.to_string() if len(self.changes) else "The scenarios are the same."
         table = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
         verdict = "The histories are the same, byte by byte." if self.same else "The histories differ."
-        return "\n\n".join((*self._failures(), changes, table, verdict))
+        return "\n\n".join((*self.failures(), changes, table, verdict))
 
-    def _failures(self) -> Iterator[str]:
+    def failures(self) -> Iterator[str]:
         """Yield a line for each run in which a law failed: its numbers are not those of its law."""
         for case, pair in self._pairs.items():
             for name, run in zip(self.names, pair, strict=True):

@@ -12,7 +12,7 @@ import pandas as pd
 
 from gridpeers.runs.result import Result
 from gridpeers.runs.run_folder import RunFolder, new_home
-from gridpeers.runs.running import read
+from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.runs.showing import shown_in_notebooks
 from gridpeers.studies.comparison import Comparison
 from gridpeers.values import plain
@@ -110,7 +110,10 @@ def counterfactual(
         raise ReplayError(f"a change cannot be read: {error}") from None
     rule = changed_rule(record, changes)
     home = _temporary() if folder is None else new_home(folder)
-    return counterfactual_in(record, rule, home, temporary=folder is None)
+    done = counterfactual_in(record, rule, home, temporary=folder is None)
+    first = done.would_be.failures[:1]
+    warn_of_laws({f"what would have been, {row.agent}": row.why for row in first.itertuples()}, depth=1)
+    return done
 
 
 def counterfactual_in(
@@ -164,7 +167,11 @@ class Counterfactual:
     @cached_property
     def table(self) -> pd.DataFrame:
         """Metrics of both and their difference, a row per (window, metric)."""
-        return Comparison({"": (self.was, self.would_be)}, ("was", "would be")).table
+        return self._comparison.table
+
+    @property
+    def _comparison(self) -> Comparison:
+        return Comparison({"": (self.was, self.would_be)}, ("was", "would be"))
 
     def plot(self) -> Figure:
         """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
@@ -175,9 +182,10 @@ class Counterfactual:
         return counterfactual_figure(self.was.drawing(), self.would_be.drawing(), str(self.changes), since)
 
     def __str__(self) -> str:
-        """Return the table as text."""
+        """Return the table as text; above it a line for each of both in which a law failed."""
         text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
-        return f"{text}\n{MISSING}" if self.table.isna().any(axis=None) else text
+        missing = [MISSING] if self.table.isna().any(axis=None) else []
+        return "\n".join((*self._comparison.failures(), text, *missing))
 
     def __repr__(self) -> str:
         return f"<Counterfactual of {self.was.spec.name} {self.was.case}: {self.changes}>"

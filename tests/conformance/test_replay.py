@@ -84,6 +84,20 @@ def test_other_gains_from_the_start(run: Result) -> None:
     assert done.would_be.sha256 == other.sha256
 
 
+def test_a_law_that_fails_in_what_would_have_been_fails_it(run: Result, elsewhere: Path) -> None:
+    """The command says so above the table and exits with 1, and Python warns: the numbers are those of droop."""
+    law = "tests.conformance.laws.bad_laws:Failing"
+    told = rf"inv1: law {law} \(\S*bad_laws.py:\d+\): step at t = 0.4 s raised AssertionError"
+
+    with pytest.warns(RuntimeWarning, match=rf"what would have been, {told}"):
+        done = gp.counterfactual(run, law=law)
+    assert re.match(rf"FAILED  would be, case IV: {told}", str(done))
+
+    code, text = invoke("replay", str(run.folder), "--law", law, "--out", "would")
+    assert code == 1
+    assert re.search(rf"^FAILED  would be, case IV: {told}", text, re.MULTILINE), text
+
+
 def test_a_replay_is_written_as_a_run_with_table_and_figure(run: Result, elsewhere: Path) -> None:
     """The command prints what was beside what would have been, and the folder is one of a run."""
     code, text = invoke("replay", str(run.folder), "--set", "gains.k_p=0.002", "--out", "would")

@@ -54,8 +54,8 @@ def replay(
     is closed on our plant from then on. docs/replay.md explains both.
 
     Exit code: 0 all that was compared is the same (notes say what was not), or what would have been is written,
-    1 something differs from the record, 2 bad usage, no record, or nothing in it to be replayed, 130 Ctrl-C,
-    143 SIGTERM.
+    1 something differs from the record, or a law failed in what would have been, 2 bad usage, no record, or nothing in
+    it to be replayed, 130 Ctrl-C, 143 SIGTERM.
 
     Example:  gridpeers replay runs/islanding/latest/IV --without "inv4 <-> inv7" --from 2
     """
@@ -139,7 +139,7 @@ def _tell_notes(notes: Iterable[str]) -> None:
 
 
 def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bool:
-    """Run a counterfactual, print its table and write its folder; return whether it differs before the change."""
+    """Run a counterfactual, print its table, write its folder; return whether it differs before, or a law failed."""
     require({"matplotlib": "the figure", "pandas": "the table"})
 
     from datetime import datetime
@@ -166,7 +166,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
     if done.difference is not None:
         typer.echo(f"It is not to be trusted: before the change, {done.difference}")
-    return done.difference is not None
+    return done.difference is not None or len(done.would_be.failures) > 0
 
 
 def _about(record: RunRecord) -> str:
