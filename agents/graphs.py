@@ -19,9 +19,9 @@ from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from wire.plugins.anybody import ANYTHING, line_of, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import Plugin, callable_objection, made
 from wire.plugins.registry import PluginError, Registry
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 from wire.schema.suggestion import suggestion
 
@@ -256,7 +256,7 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
     """Return each agent's in-neighbours as the rule has them."""
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
-        with unreplaced():
+        with foreign_code():
             result = rule(ordered)
             return {one: frozenset(result[one]) for one in result}
     except ANYTHING as error:  # a rule is foreign code

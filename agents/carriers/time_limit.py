@@ -14,7 +14,7 @@ from typing import Any
 from agents.laws.call import LawError
 from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
 from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.unreplaced_output import unreplaced
+from wire.plugins.foreign_code import foreign_code
 
 _forks = threading.local()
 """Forks of this process by each of its threads: `number`."""
@@ -68,7 +68,7 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
 @contextmanager
 def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
-        with unreplaced():
+        with foreign_code():
             yield
         return
     over = False
@@ -83,7 +83,7 @@ def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
-            with unreplaced():
+            with foreign_code():
                 yield
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)

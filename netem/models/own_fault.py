@@ -20,9 +20,9 @@ import msgspec
 
 from netem.draws import Stream
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import Plugin, class_objection, made
 from wire.plugins.registry import Registry
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 from wire.schema.table_reading import parameter_values
 
@@ -152,7 +152,7 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
             return 0.0
         why = ""
         try:
-            with unreplaced():
+            with foreign_code():
                 added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
             if added is None:
                 return None

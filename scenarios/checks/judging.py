@@ -25,9 +25,9 @@ from scenarios.checks.check_verdict import (
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.schema.plugin_keys import checks_of, checks_off
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import Plugin, made
 from wire.plugins.registry import PluginError
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 PATIENCE = 10.0
@@ -126,7 +126,7 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
     violations: list[Violation] = []
     count, raised = 0, ""
     try:
-        with unreplaced(), _named_if_slow(name, plugin, case):
+        with foreign_code(), _named_if_slow(name, plugin, case):
             found = made(CHECKS, plugin)(case)
             if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
                 raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")

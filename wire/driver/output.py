@@ -12,7 +12,7 @@ rich alike. There are two reactions:
   quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
 
 Laws, metrics and checks of a user run in the process that writes: they cannot close its output, and what they put in
-its place is gone when they return (`wire.plugins.unreplaced_output`).
+its place is gone when they return (`wire.plugins.foreign_code`).
 """
 
 from __future__ import annotations

@@ -10,8 +10,8 @@ from typing import Any
 import msgspec
 
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.registry import PluginError, Registry
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 from wire.schema.table_reading import parameter_values, read_parameters
 from wire.schema.table_schema import Problem, fields_of
@@ -100,7 +100,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
     try:
         values = parameter_values(found, given)
         if any("__init__" in vars(base) for base in found.__mro__ if base is not object):
-            with unreplaced():
+            with foreign_code():
                 return found(**values)
         it = found()
         for name, value in values.items():

@@ -16,7 +16,7 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from wire.plugins.unreplaced_output import unreplaced
+from wire.plugins.foreign_code import foreign_code
 from wire.schema.suggestion import suggestion
 
 T = TypeVar("T")
@@ -182,7 +182,7 @@ class Registry(Generic[T]):
                 place = f" in {folder} or" if folder else ""
                 text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
                 raise PluginError(f"{reference}: {text}")
-            with unreplaced():
+            with foreign_code():
                 found = importlib.import_module(name)
             _check_place(found, name, folder, reference)
             return _as_it_is_now(found)

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.results.evaluation.quantities import Quantity
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import callable_objection, plugin_of
 from wire.plugins.registry import Registry
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 if TYPE_CHECKING:
@@ -91,7 +91,7 @@ class Benchmark:
     def lines(self, findings: Findings) -> list[str]:
         """Return the summary of a run; one that raises an exception is a line that says why."""
         try:
-            with unreplaced():
+            with foreign_code():
                 return [printable(str(line), 1000) for line in self.summary(findings)]
         except ANYTHING as error:  # a benchmark is a user's code
             return [f"The benchmark's summary failed: {named(error)}"]

@@ -26,9 +26,9 @@ from scenarios.results.evaluation.benchmark_registry import CLAIMS
 from scenarios.results.evaluation.quantities import Measure
 from scenarios.results.findings import Findings
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import Plugin, made
 from wire.plugins.registry import PluginError
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
@@ -78,7 +78,7 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     verdicts = []
     for claim in claims:
         try:
-            with unreplaced():
+            with foreign_code():
                 verdicts.append(_verdict(claim, findings))
         except ANYTHING as error:  # a claim is a user's code
             verdicts.append(

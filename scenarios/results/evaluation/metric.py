@@ -18,9 +18,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from wire.plugins.anybody import ANYTHING, named
+from wire.plugins.foreign_code import foreign_code
 from wire.plugins.plugin import KEYS, Plugin, callable_objection, made
 from wire.plugins.registry import PluginError, Registry
-from wire.plugins.unreplaced_output import unreplaced
 from wire.printable import printable
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     reasons: dict[str, str] = {}
     for name, metric in metrics:
         try:
-            with unreplaced():
+            with foreign_code():
                 result = metric(data)
                 several = dict(result) if isinstance(result, Mapping) else {"": result}
                 numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}

@@ -14,7 +14,7 @@ class ForeignError(Exception):
 
 
 @contextmanager
-def unreplaced() -> Iterator[None]:
+def foreign_code() -> Iterator[None]:
     """Put standard output and error back afterwards.
 
     Raises
@@ -24,7 +24,7 @@ def unreplaced() -> Iterator[None]:
 
     Examples
     --------
-    >>> with unreplaced():
+    >>> with foreign_code():
     ...     sys.stdout = 3
     >>> print("still here")
     still here
