@@ -1,4 +1,4 @@
-"""Standard output and error, which foreign code in this process may replace, and its exceptions. Pure."""
+"""A guard around foreign code in this process: its exceptions, and what it does to standard output. Pure."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from wire.plugins.anybody import ANYTHING, named
 
 
 class ForeignError(Exception):
-    """What foreign code raised is no `Exception`: a panic of Rust (polars, zenoh), `CancelledError`, ..."""
+    """Foreign code raised a `BaseException`, such as a panic of Rust (polars, zenoh) or `CancelledError`."""
 
 
 @contextmanager
 def foreign_code() -> Iterator[None]:
-    """Put standard output and error back afterwards.
+    """Guard a call of foreign code: put standard output and error back afterwards.
 
     Raises
     ------
     ForeignError
-        For whatever else was raised, so that `except ANYTHING` has it too; only Ctrl+C passes as it is.
+        For what else was raised, so that `except ANYTHING` has it too; only Ctrl+C passes as it is.
 
     Examples
     --------
