@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from plant.equipment.equipment import PHASES, Bus, Feeder, Switch
 from plant.equipment.imported_equipment import LinearElement, LoadPart
@@ -79,9 +79,12 @@ def neutrals_by_bus(
     Parameters
     ----------
     buses, load_parts, elements, switches
-        The feeder's. A neutral goes on along the elements that have it in the same place at both ends.
+        The feeder's. A neutral goes on along the elements that have it in the same place at both ends. Node A, B or C
+        is none where loads return to earth: there a load between two phases has a voltage that is wrong.
     """
+    load_parts = tuple(load_parts)
     V_nom = {bus.name: bus.V_nom for bus in buses}
+    to_earth = {part.bus for part in load_parts if not part.ends[1]}
     weight: dict[Node, float] = {}
     for part in load_parts:
         if part.ends[1] and part.V_nom < BETWEEN_PHASES * V_nom[part.bus]:
@@ -91,18 +94,29 @@ def neutrals_by_bus(
     for one, other in (*_conductors(elements), *_poles(switches)):
         along.setdefault(one, []).append(other)
         along.setdefault(other, []).append(one)
-    waiting = list(weight)
-    while waiting:
-        at = waiting.pop()
-        for node in along.get(at, ()):
-            if node not in weight and 0.9 < V_nom[node[0]] / V_nom[at[0]] < 1.1:  # not through a transformer
-                weight[node] = 0.0
-                waiting.append(node)
+    for seed in [node for node in weight if node[1] in PHASES]:
+        if any(bus in to_earth for bus, _ in _connected([seed], along, V_nom)):
+            del weight[seed]
+    for node in _connected(weight, along, V_nom):
+        weight.setdefault(node, 0.0)
     found: dict[str, str] = {}
     for (bus, letter), load in weight.items():
         if bus not in found or load > weight[bus, found[bus]]:
             found[bus] = letter
     return found
+
+
+def _connected(nodes: Iterable[Node], along: Mapping[Node, list[Node]], V_nom: Mapping[str, float]) -> list[Node]:
+    """Return these nodes and those that conductors connect with them, not through a transformer."""
+    found = dict.fromkeys(nodes)
+    waiting = list(found)
+    while waiting:
+        at = waiting.pop()
+        for node in along.get(at, ()):
+            if node not in found and 0.9 < V_nom[node[0]] / V_nom[at[0]] < 1.1:
+                found[node] = None
+                waiting.append(node)
+    return list(found)
 
 
 def _conductors(elements: Iterable[LinearElement]) -> Iterator[tuple[Node, Node]]:

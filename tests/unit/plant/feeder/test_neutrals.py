@@ -339,3 +339,16 @@ def test_the_next_grid_forming_inverter_earths_the_neutral_when_the_first_leaves
         "bat earths its neutral",
         "other earths its neutral",
     ]
+
+
+def test_a_load_between_phases_whose_kv_is_wrong_makes_no_phase_a_neutral(tmp_path: Path) -> None:
+    """Where other loads return to earth, voltages count from earth, as the engine's."""
+    (tmp_path / "Master.dss").write_text(
+        "New Circuit.t basekv=12.47 bus1=s\nNew Line.l1 bus1=s bus2=b r1=0.2 x1=0.4 r0=0.5 x0=1.2 length=1\n"
+        "New Load.a bus1=b.1 phases=1 kv=7.2 kw=100\nNew Load.x bus1=b.1.3 phases=1 kv=7.2 kw=50 model=2\n"
+        "Set VoltageBases=[12.47]\nCalcVoltageBases\nSolve\n"
+    )
+    table = gp.Feeder.from_opendss(tmp_path / "Master.dss").solve()
+
+    assert set(table["to"]) == {""}
+    assert table["V_pu"].between(0.95, 1.05).all()
