@@ -24,6 +24,9 @@ NAMED = re.compile(r"""(?:^|[{;\s])name\s+(?:"([^"]+)"|'([^']+)'|([^";\s]+))\s*;
 UNNAMED = re.compile(r"(\w+)_auto_(\d+)")
 """The name that GridLAB-D gives an object without one: its class and its number among all objects."""
 
+PLAIN = re.compile(r"[\w ,.:/\\-]+", re.ASCII)
+"""A path from which GridLAB-D includes a model: "+" or "(" in it are a syntax error at its first line."""
+
 DEEPEST = 40
 """Models within models; more is one that includes itself."""
 
@@ -61,8 +64,11 @@ class GlmText:
         return there[1] if there[0] == kind else ""
 
     def readable(self, folder: Path) -> Path:
-        """Return a model that GridLAB-D can read, as it knows UTF-8 alone: this one, or a copy in a folder."""
-        if not self._recoded:
+        """Return a model that GridLAB-D can read: this one, or a copy in a folder.
+
+        It knows UTF-8 alone, and includes nothing from a path that is not plain.
+        """
+        if not self._recoded and (len(self._texts) == 1 or all(PLAIN.fullmatch(str(path)) for path in self._texts)):
             return self._path
         copies = {path: folder / str(k) / path.name for k, path in enumerate(self._texts)}
 

@@ -205,6 +205,19 @@ def test_a_model_in_another_encoding_is_imported(tmp_path: Path, encoding: str, 
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted(models)
 
 
+@pytest.mark.parametrize("folder", ["models (1)", "a+b", "Käte's"])
+def test_a_model_includes_another_from_any_folder(tmp_path: Path, folder: str) -> None:
+    """GridLAB-D says "@ syntax error" of an include whose path has other characters than plain ones."""
+    (tmp_path / folder).mkdir()
+    (tmp_path / folder / "load.glm").write_text(LOAD)
+    path = tmp_path / folder / "feeder.glm"
+    path.write_text(HEAD + '#include "load.glm"\n')
+
+    feeder = read_glm(path)
+
+    assert [part.name for part in feeder.load_parts] == ["load.l1"]
+
+
 def test_a_missing_wheel_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Without GridLAB-D one line says what to install."""
     monkeypatch.setitem(sys.modules, "gridlabd", None)
