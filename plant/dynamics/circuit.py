@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -46,6 +46,8 @@ class Circuit:
     """Nominal phasor of each branch (V): where the first solution starts."""
     reference: NDArray[np.int64] | None = None
     """Node from which each node's voltage counts, -1: earth; None: all from earth. It counts from earth itself."""
+    neutrals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Nodes of neutral conductors; their voltages count from earth."""
 
     def __deepcopy__(self, memo: object) -> Circuit:
         """Return itself: it is never written, so copies of a plant share it, and its factorisation."""

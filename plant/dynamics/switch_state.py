@@ -23,6 +23,10 @@ UNEARTHED = 0.03 / 50.0
 """Admittance (S) between a neutral and earth below which it is not earthed: an electrode that is larger than 50 V over
 30 mA protects nobody (IEC 60364-4-41)."""
 
+INSULATION = 1e-6
+"""Admittance to earth (S) of all neutrals that nothing earths: loads alone, which are currents in the inner loop, would
+leave their voltages undetermined."""
+
 
 class SwitchState:
     """The island structure of a circuit, and its admittances with the inverters' filters.
@@ -108,6 +112,7 @@ class SwitchState:
         np.add.at(no_earth, G[following], np.tile(y_f, 3)[following])
         formers = np.flatnonzero(forming & self.online & (circuit.returns >= 0))
         self.earthing = tuple(self._earthing(formers, sp.csr_array(sp.diags_array(no_earth))))
+        self._insulate()
         self.C = C[:, self.branches]
         self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)
         """Rows of `terminals` at which an inverter injects."""
@@ -138,6 +143,22 @@ class SwitchState:
                 self.to_ground[neutral] += EARTHING
                 self.Y = self.Y + earth
                 yield i
+
+    def _insulate(self) -> None:
+        """Give the neutrals that nothing earths the admittance of their insulation."""
+        neutrals = self.circuit.neutrals[self.place[self.circuit.neutrals] >= 0]
+        if not neutrals.size:
+            return
+        leak = np.zeros(self.place.size)
+        leak[neutrals] = INSULATION / neutrals.size
+        insulated = (self.Y + sp.diags_array(leak)).tocsr()
+        # with these currents a neutral that nothing earths rises to 1 V, an earthed one hardly
+        rise = splu(sp.csc_array(insulated[self.unknown][:, self.unknown])).solve(leak[self.unknown].astype(complex))
+        floats = neutrals[np.abs(rise[self.place[neutrals]]) > 0.9]
+        if floats.size:
+            leak[np.setdiff1d(neutrals, floats)] = 0.0
+            self.to_ground += leak
+            self.Y = (self.Y + sp.diags_array(leak)).tocsr()
 
     def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:
         """Return the inner loop's arrays but those of the network: the loads' tangent, the islands' frames.

@@ -48,7 +48,7 @@ def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
     possible = [letter for letter in bus.phases if letter not in phases and (letter not in PHASES or letter == neutral)]
     if text not in possible:
         raise ValueError(
-            f'neutral "{text}": bus "{bus.name}" has no such neutral; {", ".join([*possible, EARTH])} can be'
+            f'neutral "{text}": bus "{bus.name}" has no such neutral; possible: {", ".join([*possible, EARTH])}'
         )
     return text
 

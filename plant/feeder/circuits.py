@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 from plant.dynamics import Circuit, PlantError
 from plant.dynamics.foreseen_cache import ForeseenCache
+from plant.equipment.equipment import PHASES
+from plant.equipment.neutrals import neutrals_of
 from plant.network import Network
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge
@@ -88,7 +90,16 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
         loads=on.law,
         V_branch=on.V_nom * np.exp(1j * on.phi0),
         reference=reference,
+        neutrals=_neutral_nodes(network, merge, reference),
     )
+
+
+def _neutral_nodes(network: Network, merge: Merge, reference: NDArray[np.int64] | None) -> NDArray[np.int64]:
+    """Return the nodes of neutral conductors whose voltages count from earth, each once."""
+    neutrals = set(neutrals_of(network.feeder).items())
+    raw = [k for k, node in enumerate(network.nodes) if node[1] not in PHASES or node in neutrals]
+    nodes = np.unique(merge.representative[np.array(raw, np.int64)])
+    return nodes if reference is None else nodes[reference[nodes] < 0]
 
 
 def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDArray[np.int64]) -> NDArray[np.int64]:

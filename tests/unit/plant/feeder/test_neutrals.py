@@ -17,6 +17,7 @@ from plant.feeder import Plant
 from plant.feeder.circuits import circuit_of
 from plant.feeder.installed_inverters import installed_inverters
 from plant.network import Network
+from plant.network.powerflow import solve_power_flow
 from plant.plant_config import PlantSettings, SwitchEvent
 from tests.unit.plant.imports.opendss.opendss_solutions import LETTERS, TOLERANCE
 
@@ -93,6 +94,14 @@ def started(feeder: gp.Feeder, closed: frozenset[str], P: float) -> tuple[Networ
     dynamics = Dynamics(circuit_of(network, closed, network.loads()), installed_inverters(network, settings), 1e-3)
     n = len(feeder.inverters)
     dynamics.start(np.full(n, P), V_set=np.full(n, 1.0))
+    return network, dynamics
+
+
+def cut_off(feeder: gp.Feeder, steps: int) -> tuple[Network, Dynamics]:
+    """The feeder's inverters, which begin without power, these steps of 1 ms after switch a1 has opened."""
+    network, dynamics = started(feeder, frozenset({Network(feeder).switch_name("a1")}), 0.0)
+    dynamics.connect(circuit_of(network, frozenset(), network.loads()))
+    dynamics.run(steps)
     return network, dynamics
 
 
@@ -228,6 +237,39 @@ def test_a_neutral_that_floats_beside_an_earthed_star_point_is_told(tmp_path: Pa
     assert "V to earth, more than the 50 V that may last" in told[0]
 
 
+@pytest.mark.parametrize("most_dense", [0, 30], ids=["sparse", "dense"])
+def test_a_neutral_that_nothing_earths_has_the_voltage_that_the_engine_gives(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, most_dense: int
+) -> None:
+    """Where loads alone hold a neutral, it has the voltage to earth of one that is insulated with 1 megohm."""
+    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    feeder, script = imported(tmp_path, KINDS["earthed at the transformer"])
+    network, dynamics = cut_off(feeder.add_inverter("bat", "b1", "GFM", 6e4, neutral="earth"), 100)
+
+    commands = in_engine(network, dynamics, behind_filter=True)
+    theirs = engine(script, *commands, EARTH.format("k", "b1.4", "b1", 1e6).strip(), "open line.a1 1")
+
+    assert abs(theirs["b2.4"]) > 50.0
+    assert largest_difference(network, dynamics, frozenset(), theirs, "mv b0") < TOLERANCE
+
+
+def test_a_neutral_that_breaks_has_the_voltage_of_the_power_flow(tmp_path: Path) -> None:
+    """With the grid, a neutral that a switch cuts off takes the voltage that the loads leave it."""
+    street = """New Line.p phases=3 bus1=b0.1.2.3 bus2=b1.1.2.3 r1=0.05 x1=0.04 r0=0.05 x0=0.04 c1=0 c0=0
+New Line.a1 phases=1 bus1=b0.4 bus2=b1.4 r1=0.06 x1=0.04 r0=0.06 x0=0.04 c1=0 c0=0
+New Load.p1 phases=1 bus1=b1.2.4 kv=0.23 kw=7 pf=0.95
+New Load.p2 phases=1 bus1=b1.1.4 kv=0.23 kw=9 pf=0.95
+New Load.m1 phases=3 bus1=b1.1.2.3.4 kv=0.4 kw=6 pf=0.85
+"""
+    feeder, _ = imported(tmp_path, street + AT_TRANSFORMER)
+    idle = {"volt_var": False, "frequency_watt": False}
+    network, dynamics = cut_off(feeder.add_inverter("pv", "b1", "GFL", 1e4, neutral="earth", params=idle), 1000)
+    ours = network.merge(frozenset()).expand(dynamics.voltages())
+
+    assert abs(ours[network.index("b1", "4")]) > 50.0
+    np.testing.assert_allclose(ours, solve_power_flow(network, frozenset()).V, atol=1e-3)  # V
+
+
 def test_an_inverter_returns_to_the_neutral_of_its_bus_unless_told(tmp_path: Path) -> None:
     """The default is the neutral to which loads return, here or along its conductor; node and earth replace it."""
     feeder, _ = imported(tmp_path, KINDS["two neutrals at a bus"])
@@ -248,7 +290,7 @@ def test_an_inverter_returns_to_the_neutral_of_its_bus_unless_told(tmp_path: Pat
     }
     for of in added.values():
         assert gp.Feeder.read(of.save(tmp_path / "saved")).inverters == of.inverters
-    with pytest.raises(ValueError, match='neutral "B": bus "b2" has no such neutral; 4, 5, earth can be'):
+    with pytest.raises(ValueError, match='neutral "B": bus "b2" has no such neutral; possible: 4, 5, earth'):
         feeder.add_inverter("x", "b2", "GFL", 5e3, phases="A", neutral="B")
 
 
