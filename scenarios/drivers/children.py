@@ -28,6 +28,9 @@ LAST_LINES = 12
 GRACE = 2.0
 """Time (s) that processes have to leave after SIGTERM."""
 
+CRASHES = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
+"""Exit statuses of processes that faults of their own code ended."""
+
 HEAD_START = 2.0
 """Longest time (s) for which a plant that is asked to leave is waited for before the agents are asked, too."""
 
@@ -106,6 +109,11 @@ class Child:
     def status(self) -> int | None:
         """Exit status, negative for a signal; None while it runs."""
         return self._process.poll()
+
+    @property
+    def crashed(self) -> bool:
+        """Whether its own code ended it, as C code of a law with a segmentation fault does."""
+        return self.status in CRASHES
 
     def signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""

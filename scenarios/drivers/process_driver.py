@@ -236,7 +236,7 @@ class _ProcessDriver:
         begun = self.client.latest is not None
         if child.name == PLANT and child.status == 0 and begun:
             self._plant_left = monotonic()
-        elif child.name == PLANT or (supervisor.failed(child) and not begun and not self._wall):
+        elif child.name == PLANT or (supervisor.failed(child) and not self._wall and (child.crashed or not begun)):
             self._end(child.report(self._when))
         elif supervisor.failed(child):
             self._notes[child.name] = child.report(self._when)

@@ -67,6 +67,15 @@ def test_an_agent_killed_in_mid_run_is_reported_and_the_run_goes_on(tmp_path: Pa
     assert outcome.notes[0].endswith(f"Whole log: {tmp_path / 'inv3.log'}")
 
 
+def test_an_agent_that_crashes_breaks_the_run(tmp_path: Path) -> None:
+    """A segmentation fault, as in C code of a law, is no kill from outside: the run is no success, and names it."""
+    run = ProcessRun(*toy_configs(4, end=LONG), tmp_path)
+    run.at(0.4, lambda: run.child("inv3").signal(signal.SIGSEGV))
+    outcome = run()
+
+    assert outcome.broke.startswith("inv3 was killed by SIGSEGV after t = "), outcome.broke
+
+
 def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tmp_path: Path) -> None:
     """Bytes and deaths do not depend on whether the plant relays, as in all other tests, or all have links to all."""
     star, mesh = (ProcessRun(*toy_configs(4, end=2.0), tmp_path / name) for name in ("star", "mesh"))
