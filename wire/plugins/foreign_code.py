@@ -6,8 +6,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from wire.plugins.anybody import ANYTHING, named
-
 
 class ForeignError(Exception):
     """Foreign code raised a `BaseException`, such as a panic of Rust (polars, zenoh) or `CancelledError`."""
@@ -32,9 +30,11 @@ def foreign_code() -> Iterator[None]:
     before = sys.stdout, sys.stderr
     try:
         yield
-    except (*ANYTHING, KeyboardInterrupt):
-        raise
     except BaseException as error:
+        from wire.plugins.anybody import ANYTHING, named  # brings msgspec, for which a list of scenarios need not wait
+
+        if isinstance(error, (*ANYTHING, KeyboardInterrupt)):
+            raise
         raise ForeignError(named(error)).with_traceback(error.__traceback__) from error
     finally:
         sys.stdout, sys.stderr = before
