@@ -14,10 +14,12 @@ from plant.plant_process import run_plant
 from scenarios.drivers.free_endpoint import free_endpoint
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.codec import decode
+from wire.codec import decode, encode
 from wire.driver.session import Session
 from wire.keys import Keys
-from wire.messages import Stop
+from wire.messages import Command, Stop
+
+HAS_ALL = Command(sender="visitor", epoch=1, seq=1, t=0.0, verb="telemetry", argument="99", reply_to="visitor")
 
 
 class Broken(ToyPlant):
@@ -53,6 +55,8 @@ def test_agents_are_told_to_close_whatever_broke_the_plant(clock: Literal["wall"
                 messages = [decode(payload) for kind, _, payload, _ in heard if kind == "message"]
                 reasons += [message.reason for message in messages if isinstance(message, Stop)]
             for visitor in visitors:
+                if clock == "simulated":  # there the plant waits until its recorder says that it has everything
+                    visitor.publish(keys.request, encode(HAS_ALL))
                 visitor.close()  # a recorder that stayed would have the plant wait for it
     finally:
         for visitor in visitors:
