@@ -1,0 +1,43 @@
+"""The bytes of every message are pinned: agents written by others, and records of before, hold to them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.golden.messages.message_values import LEAST, WHOLE, with_defaults
+from wire.codec import decode, encode
+from wire.messages import MESSAGES, Message
+
+FILE = Path(__file__).parent / "messages.txt"
+PINNED = {
+    name: bytes.fromhex(text.replace("\n", ""))
+    for name, _, text in (block.partition("\n") for block in FILE.read_text(encoding="ascii").split("\n\n"))
+}
+"""Bytes by type of message, and whether every field or the fewest are given."""
+VALUES = {f"{type(of).__name__} {how}": of for how, messages in (("whole", WHOLE), ("least", LEAST)) for of in messages}
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_message_has_the_pinned_bytes(name: str) -> None:
+    """The same values give the same bytes as ever."""
+    assert encode(VALUES[name]).hex() == PINNED[name].hex()
+
+
+@pytest.mark.parametrize("name", PINNED)
+def test_pinned_bytes_give_the_message(name: str) -> None:
+    """What older programs send is understood; repr, because NaN differs from itself."""
+    assert repr(decode(PINNED[name])) == repr(VALUES[name])
+
+
+def test_every_type_and_every_field_is_pinned() -> None:
+    """A new type or field is pinned with its first commit: the whole messages leave nothing at its default."""
+    assert tuple(map(type, WHOLE)) == MESSAGES
+    assert [(type(message).__name__, with_defaults(message)) for message in WHOLE if with_defaults(message)] == []
+    assert set(map(type, LEAST)) == {kind for kind in MESSAGES if _has_defaults(kind)}
+    assert PINNED.keys() == VALUES.keys()
+
+
+def _has_defaults(kind: type[Message]) -> bool:
+    return len(kind.__struct_defaults__) > 0
