@@ -17,7 +17,11 @@ MOST_DENSE = 30
 
 
 def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
-    """Return a switch state as it is solved; arguments as for `plant.dynamics.switch_state.SwitchState`."""
-    if circuit.loads.S.size > MOST_DENSE and circuit.two_ended:
+    """Return a switch state as it is solved; arguments as for `plant.dynamics.switch_state.SwitchState`.
+
+    Never dense with a neutral: where nothing earths it, the impedance of its insulation is in each entry, and what
+    matters is in differences too small for their rounding.
+    """
+    if circuit.two_ended and (circuit.loads.S.size > MOST_DENSE or circuit.neutrals.size):
         return SparseReduction(circuit, y_f, forming, online)
     return DenseReduction(circuit, y_f, forming, online)

@@ -12,7 +12,6 @@ import pytest
 
 import gridpeers as gp
 from plant.dynamics import Dynamics
-from plant.dynamics.reduction import reduce_network
 from plant.feeder import Plant
 from plant.feeder.circuits import circuit_of
 from plant.feeder.installed_inverters import installed_inverters
@@ -142,22 +141,16 @@ def largest_difference(
     return max(compared)
 
 
-def with_roofs(feeder: gp.Feeder) -> gp.Feeder:
-    """The feeder with inverters of one phase and of three at its houses."""
-    return (
-        feeder.add_inverter("street", "b1", "GFM", 3e4)
-        .add_inverter("roof", "b3", "GFL", 5e3, phases="A", params={"P_min_pu": 0.0})
-        .add_inverter("hall", "b2", "GFL", 2e4, params={"P_min_pu": 0.0})
+def with_followers(feeder: gp.Feeder) -> gp.Feeder:
+    """The feeder with followers of one phase and of three at its houses."""
+    return feeder.add_inverter("roof", "b3", "GFL", 5e3, phases="A", params={"P_min_pu": 0.0}).add_inverter(
+        "hall", "b2", "GFL", 2e4, params={"P_min_pu": 0.0}
     )
 
 
-@pytest.mark.parametrize("most_dense", [0, 30], ids=["sparse", "dense"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_with_the_grid_voltages_are_the_engines(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, most_dense: int
-) -> None:
+def test_with_the_grid_voltages_are_the_engines(tmp_path: Path, kind: str) -> None:
     """Inverters of one and three phases return to the neutral of their bus: every node has the engine's voltage."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
     feeder, script = imported(tmp_path, KINDS[kind])
     network, dynamics = started(with_roofs(feeder), Network(feeder).closed0, 0.4)
 
@@ -166,13 +159,9 @@ def test_with_the_grid_voltages_are_the_engines(
     assert largest_difference(network, dynamics, network.closed0, theirs) < TOLERANCE
 
 
-@pytest.mark.parametrize("most_dense", [0, 30], ids=["sparse", "dense"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_island_has_the_voltages_that_the_engine_gives_behind_the_same_filters(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, kind: str, most_dense: int
-) -> None:
+def test_an_island_has_the_voltages_that_the_engine_gives_behind_the_same_filters(tmp_path: Path, kind: str) -> None:
     """An island's star point is on its neutral; where nothing else earths that, the grid-forming inverter does."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
     feeder, script = imported(tmp_path, KINDS[kind])
     network, dynamics = started(with_roofs(feeder), frozenset(), 0.4)
 
@@ -180,6 +169,11 @@ def test_an_island_has_the_voltages_that_the_engine_gives_behind_the_same_filter
     theirs = engine(script, *in_engine(network, dynamics, behind_filter=True), *earth, "open line.a1 1")
 
     assert largest_difference(network, dynamics, frozenset(), theirs, "mv b0") < TOLERANCE
+
+
+def with_roofs(feeder: gp.Feeder) -> gp.Feeder:
+    """The feeder with a leader at its first house, and followers."""
+    return with_followers(feeder.add_inverter("street", "b1", "GFM", 3e4))
 
 
 def events_of(feeder: gp.Feeder, until: float, P: float = 0.4) -> tuple[Plant, list[str]]:
@@ -237,14 +231,17 @@ def test_a_neutral_that_floats_beside_an_earthed_star_point_is_told(tmp_path: Pa
     assert "V to earth, more than the 50 V that may last" in told[0]
 
 
-@pytest.mark.parametrize("most_dense", [0, 30], ids=["sparse", "dense"])
+@pytest.mark.parametrize("begins", ["cut off", "an island", "with followers"])
+@pytest.mark.parametrize("kind", ["earthed at the transformer", "loads to ground beside", "two neutrals at a bus"])
 def test_a_neutral_that_nothing_earths_has_the_voltage_that_the_engine_gives(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, most_dense: int
+    tmp_path: Path, kind: str, begins: str
 ) -> None:
     """Where loads alone hold a neutral, it has the voltage to earth of one that is insulated with 1 megohm."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
-    feeder, script = imported(tmp_path, KINDS["earthed at the transformer"])
-    network, dynamics = cut_off(feeder.add_inverter("bat", "b1", "GFM", 6e4, neutral="earth"), 100)
+    feeder, script = imported(tmp_path, KINDS[kind])
+    feeder = feeder.add_inverter("bat", "b1", "GFM", 6e4, neutral="earth")
+    if begins == "with followers":
+        feeder = with_followers(feeder)
+    network, dynamics = cut_off(feeder, 100) if begins == "cut off" else started(feeder, frozenset(), 0.2)
 
     commands = in_engine(network, dynamics, behind_filter=True)
     theirs = engine(script, *commands, EARTH.format("k", "b1.4", "b1", 1e6).strip(), "open line.a1 1")

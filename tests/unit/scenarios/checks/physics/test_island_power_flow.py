@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from plant.equipment import Bus, Feeder, InverterRow
 from plant.equipment.imported_equipment import LinearElement, LoadPart
 from plant.feeder import Plant
 from plant.network import Network
 from plant.plant_config import PlantSettings
-from scenarios.checks.physics.island_power_flow import IslandPowerFlow, NetworkState
+from scenarios.checks.physics.island_power_flow import IslandBalance, IslandPowerFlow, NetworkState
 from tests.unit.scenarios.proposal.test_feeder_proposal import series
 
 V_NOM = 2400.0
@@ -43,19 +46,31 @@ def island(follower: float) -> Feeder:
     )
 
 
+def balance_at_start(feeder: Feeder, settings: PlantSettings) -> IslandBalance:
+    """The balance of a plant's first row."""
+    readings = Plant(Network(feeder), settings, 0.02, 0.02).measure()
+    P, Q, V = np.array([(reading.P, reading.Q, reading.V) for reading in readings.values()]).T
+    present = np.ones(len(readings), bool)
+    [balance] = IslandPowerFlow(feeder, tuple(readings), settings).balances(NetworkState(frozenset()), P, Q, V, present)
+    return balance
+
+
 @pytest.mark.parametrize("follower", [1e6, 3e6])
 def test_the_power_flow_of_a_row_has_the_powers_of_the_row(follower: float) -> None:
     """A small leader among followers of constant power, too: there the voltage makes many times a step of the EMF."""
-    feeder = island(follower)
-    settings = PlantSettings(P_set0=360e3 / (200e3 + follower))
-    readings = Plant(Network(feeder), settings, 0.02, 0.02).measure().values()
+    balance = balance_at_start(island(follower), PlantSettings(P_set0=360e3 / (200e3 + follower)))
 
-    [balance] = IslandPowerFlow(feeder, ("inv1", "inv2"), settings).balances(
-        NetworkState(frozenset()),
-        np.array([reading.P for reading in readings]),
-        np.array([reading.Q for reading in readings]),
-        np.array([reading.V for reading in readings]),
-        np.ones(2, bool),
-    )
+    assert balance.taken == pytest.approx(balance.generated, rel=1e-5)
+
+
+def test_the_power_flow_of_a_row_has_its_powers_beside_a_neutral_that_floats(tmp_path: Path) -> None:
+    """Loads alone hold the neutral, at 100 V to earth: their powers are those at voltages between phase and neutral."""
+    from tests.unit.plant.feeder.test_neutrals import KINDS, imported, with_followers
+
+    feeder, _ = imported(tmp_path, KINDS["earthed at the transformer"])
+    feeder = with_followers(feeder.add_inverter("bat", "b1", "GFM", 6e4, neutral="earth"))
+    switches = tuple(replace(switch, closed=False) for switch in feeder.switches)
+
+    balance = balance_at_start(replace(feeder, switches=switches), PlantSettings(P_set0=0.2))
 
     assert balance.taken == pytest.approx(balance.generated, rel=1e-5)
