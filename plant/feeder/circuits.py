@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from plant.dynamics import Circuit, PlantError
 from plant.dynamics.foreseen_cache import ForeseenCache
 from plant.equipment.equipment import PHASES
-from plant.equipment.neutrals import neutrals_of
 from plant.network import Network
 from plant.network.loads import LoadBranches
 from plant.network.merging import Merge
@@ -96,8 +95,7 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
 
 def _neutral_nodes(network: Network, merge: Merge, reference: NDArray[np.int64] | None) -> NDArray[np.int64]:
     """Return the nodes of neutral conductors whose voltages count from earth, each once."""
-    neutrals = set(neutrals_of(network.feeder).items())
-    raw = [k for k, node in enumerate(network.nodes) if node[1] not in PHASES or node in neutrals]
+    raw = [k for k, (bus, at) in enumerate(network.nodes) if at not in PHASES or at == network.neutrals.get(bus)]
     nodes = np.unique(merge.representative[np.array(raw, np.int64)])
     return nodes if reference is None else nodes[reference[nodes] < 0]
 

@@ -8,7 +8,6 @@ from scipy.sparse.csgraph import connected_components
 
 from plant.dynamics import Dynamics
 from plant.equipment.imported_equipment import is_behind
-from plant.equipment.neutrals import neutrals_of
 from plant.network import Network
 from wire.counted import counted
 from wire.messages import PlantEvent
@@ -28,9 +27,8 @@ class NeutralEvents:
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        all_neutrals = neutrals_of(network.feeder).items()
-        self._all = np.array([network.index(*node) for node in all_neutrals], np.int64)
-        self._neutrals = [node for node in all_neutrals if not is_behind(node[0])]
+        self._all = np.array([network.index(*node) for node in network.neutrals.items()], np.int64)
+        self._neutrals = [node for node in network.neutrals.items() if not is_behind(node[0])]
         self._nodes = np.array([network.index(*node) for node in self._neutrals], np.int64)
         self._earthing: set[int] = set()
         self._tied: set[int] = set()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import cmath
 from collections.abc import Iterable, Mapping
 from copy import copy
+from functools import cached_property
 from itertools import compress
 from math import pi, sqrt
 
@@ -18,6 +19,7 @@ from plant.equipment import PHASES, Feeder, InverterRow, Switch
 from plant.equipment.bus_islands import bus_islands, switch_name
 from plant.equipment.imported_equipment import LoadPart
 from plant.equipment.named_loads import named_loads
+from plant.equipment.neutrals import neutrals_of
 from plant.network.loads import LoadBranches, law_row
 from plant.network.merging import Merge, merge_nodes
 from plant.network.primitives import line_admittance, transformer_admittance
@@ -100,6 +102,11 @@ class Network:
         self._wanted = [int(node) for node in self.source_nodes] + [
             self.index(inverter.bus, phase) for inverter in self.inverters for phase in inverter.phases
         ]
+
+    @cached_property
+    def neutrals(self) -> dict[str, str]:
+        """Neutral of each bus that has one, by the first tables: loads of other powers move none."""
+        return neutrals_of(self._first)
 
     def index(self, bus: str, phase: str) -> int:
         """Return the position of a node in all vectors; raise KeyError if there is no such node."""
