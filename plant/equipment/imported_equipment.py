@@ -16,7 +16,7 @@ HIGH = 1.1
 
 
 def cut_off(usual: float) -> float:
-    """Return the `LoadPart.V_off` of generation that usually has this voltage (pu).
+    """Return the `LoadPart.V_off_above` of generation that usually has this voltage (pu).
 
     Other programs have no such limit: beyond their own limits it is a negative impedance, and an island in which it
     prevails has no voltage at which to rest.
@@ -90,8 +90,9 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
     edge: float = 0.0
     """Exponent that sets its current at the limits: 0 as of constant power, 1 as of current, 2 as of impedance."""
     V_off: float = 0.0
-    """Voltage (pu) at which it switches off, half of it off at that voltage, all of it 0.01 pu below, or above if it is
-    1.2 pu or more; 0: nowhere."""
+    """Voltage (pu) below which it switches off: half of it is off there, all of it 0.01 pu below; 0: nowhere."""
+    V_off_above: float = 0.0
+    """The same for voltages above; 0: nowhere."""
 
     @property
     def is_impedance(self) -> bool:
@@ -102,4 +103,4 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
         >>> LoadPart(name="l", bus="1", ends=("A", ""), S=1e3, V_nom=240.0, exponents=(2.0, 2.0)).is_impedance
         True
         """
-        return self.exponents == (2.0, 2.0) and self.V_off == 0.0
+        return self.exponents == (2.0, 2.0) and self.V_off == self.V_off_above == 0.0

@@ -16,7 +16,8 @@ from plant.network.merging import Merge
 def law_row(part: LoadPart) -> tuple[float, ...]:
     """Return a part of a load as a row of `plant.dynamics.kernel.limited_load.COLUMNS`."""
     limits = (V * part.V_nom for V in (part.V_low, part.V_min, part.V_max))
-    return (part.S.real, part.S.imag, part.V_nom, *part.exponents, *limits, part.edge, part.V_off * part.V_nom)
+    off = part.V_off * part.V_nom, part.V_off_above * part.V_nom
+    return (part.S.real, part.S.imag, part.V_nom, *part.exponents, *limits, part.edge, *off)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -274,7 +274,9 @@ class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
     edge: Exponent = 0.0
     """Exponent by which its current meets these limits."""
     V_off_pu: LimitOfV = 0.0
-    """Voltage around which it drops out; 0: nowhere."""
+    """Voltage around which it drops out below; 0: nowhere."""
+    V_off_above_pu: LimitOfV = 0.0
+    """Voltage around which it drops out above; 0: nowhere."""
 
 
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):

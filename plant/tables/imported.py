@@ -60,6 +60,7 @@ def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str
                 V_max=it.V_max_pu,
                 edge=it.edge,
                 V_off=it.V_off_pu,
+                V_off_above=it.V_off_above_pu,
             )
         )
     return tuple(parts)

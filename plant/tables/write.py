@@ -135,6 +135,7 @@ def _imported(feeder: Feeder) -> Iterator[Table]:
                 part.V_max,
                 part.edge,
                 part.V_off,
+                part.V_off_above,
             )
             for part in feeder.load_parts
         ],

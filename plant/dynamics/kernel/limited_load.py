@@ -7,16 +7,13 @@ from numpy.typing import NDArray
 
 from plant.dynamics.kernel.compiled import compiled
 
-COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off")
+COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
 """Columns of `law`: P (W), Q (var), voltages (V), and the exponents n_p, n_q and edge; see `LoadPart`."""
 
 
 STEEPNESS = 500.0
-"""How fast a load drops out around V_off: the hyperbolic tangent of this times the distance (pu), as in OpenDSS.
-Generation drops out above it: its V_off is `ABOVE` or more."""
-
-ABOVE = 1.2
-"""V_off (pu) from which on a load drops out above it, not below."""
+"""How fast a load drops out around V_off or V_off_above: the hyperbolic tangent of this times the distance (pu), as in
+OpenDSS."""
 
 
 @compiled
@@ -42,7 +39,7 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
     V
         Magnitude of the voltage across the load (V).
     """
-    P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off = row
+    P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off, V_off_above = row
     per_square = 1.0 / (V_nom * V_nom)
     if (V_low >= V and V_low != V_min) or V <= 0.0:
         return complex(P * per_square, -Q * per_square), 0.0j
@@ -61,11 +58,11 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
         p, q = per_square * power(V / V_nom, n_p - 2.0), per_square * power(V / V_nom, n_q - 2.0)
         p_slope, q_slope = (n_p - 2.0) * p / V, (n_q - 2.0) * q / V
     g, slope = complex(P * p, -Q * q), complex(P * p_slope, -Q * q_slope)
-    if V_off > 0.0:
-        steepness = STEEPNESS if V_off < ABOVE * V_nom else -STEEPNESS
-        t = np.tanh(steepness * (V - V_off) / V_nom)
-        on = 0.5 * (1.0 + t)
-        return g * on, slope * on + g * (0.5 * steepness / V_nom * (1.0 - t * t))
+    for limit, steepness in ((V_off, STEEPNESS), (V_off_above, -STEEPNESS)):
+        if limit > 0.0:
+            t = np.tanh(steepness * (V - limit) / V_nom)
+            on = 0.5 * (1.0 + t)
+            g, slope = g * on, slope * on + g * (0.5 * steepness / V_nom * (1.0 - t * t))
     return g, slope
 
 

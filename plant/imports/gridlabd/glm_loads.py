@@ -77,7 +77,7 @@ class BusLoads:
                         V_low=low,
                         V_min=least,
                         edge=EDGE[kind],
-                        V_off=cut_off(across) if S.real < 0.0 else 0.0,
+                        V_off_above=cut_off(across) if S.real < 0.0 else 0.0,
                     )
                 )
         return found

@@ -73,8 +73,8 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
     kW, kvar = (round(power / 1e3, 3) + 0.0 for power in (total.real, total.imag))
     words = "as an impedance" if kind == IMPEDANCE else "constant"
     notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {words}")
-    V_off = cut_off(float(m.max())) if total.real > 0.0 else 0.0
-    return [replace(share, ends=ends, V_off=V_off) for ends in branches.ends() for share in shares]
+    off = cut_off(float(m.max())) if total.real > 0.0 else 0.0
+    return [replace(share, ends=ends, V_off_above=off) for ends in branches.ends() for share in shares]
 
 
 def _kind(element: Any, name: str) -> int:

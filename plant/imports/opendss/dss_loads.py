@@ -68,10 +68,10 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
 def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, problems: list[str]) -> list[LoadPart]:
     branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
     shares = _shares(element, name, load, int(element.NumPhases), scale, impedances, problems)
-    V_off = 0.0
+    V_off_above = 0.0
     if load.kW < 0.0:
         V = complex_of(element.Voltages)
-        V_off = cut_off(max(abs(V[start] - V[end]) for start, end in branches.conductors) / branches.V_nom)
+        V_off_above = cut_off(max(abs(V[start] - V[end]) for start, end in branches.conductors) / branches.V_nom)
     found = []
     for ends in branches.ends():
         for share in shares:
@@ -88,7 +88,8 @@ def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, p
                     V_min=float(load.Vminpu) if limited and float(load.Vminpu) > share.V_low else 0.0,
                     V_max=float(load.Vmaxpu) if limited else 0.0,
                     edge=share.edge,
-                    V_off=share.V_off or V_off,
+                    V_off=share.V_off,
+                    V_off_above=V_off_above,
                 )
             )
     return found

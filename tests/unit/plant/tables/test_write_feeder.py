@@ -34,7 +34,7 @@ def test_limits_of_imported_loads_and_the_substations_angle_survive_writing(tmp_
     """Every field of a load's part is read as it was written, and the angle in radians."""
     feeder = Feeder.read("ieee34")
     first, *others = feeder.load_parts
-    limits = {"V_low": 0.5, "V_min": 0.8, "V_max": 1.1, "edge": 1.0, "V_off": 0.7}
+    limits = {"V_low": 0.5, "V_min": 0.8, "V_max": 1.1, "edge": 1.0, "V_off": 0.7, "V_off_above": 1.3}
     part = msgspec.structs.replace(first, S=3e3 + 1e3j, exponents=(0.8, 3.0), **limits)
     assert feeder.source is not None
     source = msgspec.structs.replace(feeder.source, angle=0.5)
