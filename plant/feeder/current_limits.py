@@ -7,6 +7,9 @@ from numpy.typing import NDArray
 
 from wire.messages import PlantEvent
 
+LIMITS = "limits its phase currents"
+"""Words of these events alone; their kind, `limit`, is that of set-points, available power and loads, too."""
+
 PAUSE = 0.1
 """Time (s) without limiting after which the next limiting is a spell of its own."""
 
@@ -41,6 +44,6 @@ class CurrentLimits:
             name, since = self._names[i], t - self._last[i]
             self._last[i] = t
             if since > PAUSE:
-                text = f"{name} limits its phase currents to {self._I_max[i]:g} pu"
+                text = f"{name} {LIMITS} to {self._I_max[i]:g} pu"
                 events.append(PlantEvent(t=t, kind="limit", subject=name, text=text))
         return events

@@ -9,6 +9,7 @@ import numpy as np
 
 from plant.build import build_plant
 from plant.equipment import Feeder
+from plant.feeder.current_limits import LIMITS
 from plant.plant_config import PlantSettings
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import configs
@@ -64,7 +65,7 @@ def unsteady(scenario: ScenarioModel, feeder: Feeder, case: str) -> Unrest | Non
         readings = plant.measure()
         found.append([readings[name].f if readings[name].island != OFF else np.nan for name in forming])
     happened = plant.take_events()
-    limits = [event.text for event in happened if event.kind == "limit" and event.subject in forming][:1]
+    limits = [event.text for event in happened if LIMITS in event.text][:1]
     trip = next((event.text for event in happened if event.kind == "trip"), "")
     if trip:
         return Unrest(", and ".join([*limits, trip]), bool(limits))

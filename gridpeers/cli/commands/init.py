@@ -195,18 +195,20 @@ def _remedy(feeder: Tables, proposal: Proposal) -> str:
     )
 
 
-def _shared(file: Path, case: str, settings: str, rewritten: Callable[[str], Project]) -> None:
-    """Run the agents' case of a project: choose what passes its checks, and say which fail.
+def _tried_with_agents(file: Path, case: str, settings: str, rewritten: Callable[[str], Project]) -> None:
+    """Run the agents' case of a project: choose settings that pass its checks, and say which checks fail.
 
     Where more than var sharing fails and a leader was at its current limit, leaders get more current; where vars stay
     unequal, var sharing weighs more.
     """
     import gridpeers as gp
+    from plant.feeder.current_limits import LIMITS
 
     def failed() -> tuple[dict[str, str], bool]:
         result = gp.load(file).run(case)
-        told = {row.check: row.violations[0].sentence for row in result.check_verdicts if row.status == "failed"}
-        return told, "limit" in set(result.events["kind"])
+        verdicts = [row for row in result.check_verdicts if row.status == "failed"]
+        told = {row.check: row.violations[0].sentence if row.violations else row.reason for row in verdicts}
+        return told, any(LIMITS in text for text in result.events["text"])
 
     first, limited = failed()
     if set(first) - {"var_sharing"} and limited and MORE_CURRENT not in settings:
@@ -278,7 +280,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
                 settings = _calmed(project, rewritten, proposal)
                 if settings is not None:
                     try:
-                        _shared(file, graph, settings, rewritten)
+                        _tried_with_agents(file, graph, settings, rewritten)
                     except BrokenRunError as error:
                         rewritten(settings)
                         typer.echo(f"NOTE  case {graph} was not checked, as a run of it broke: {error}")

@@ -6,6 +6,7 @@ import re
 import sys
 from pathlib import Path
 from tempfile import gettempdir
+from types import SimpleNamespace
 
 import pandas as pd
 import pytest
@@ -13,6 +14,7 @@ import pytest
 from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.cli.commands import init
 from plant.tables import read_feeder
+from scenarios.checks.check_verdict import CheckVerdict
 from scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
 from tests.unit.plant.imports.gridlabd.glm_models import HEAD, LOADS
@@ -156,6 +158,28 @@ def test_a_case_of_the_agents_that_stays_at_a_limit_gets_more_current(
     assert "NOTE  case ring fails its check frequency: no grid-forming inverter is on the network" in made
     assert "so [plant.gfm] allows more current, I_max_pu = 3" in made
     assert end == 0, ran
+
+
+def test_a_check_that_raises_is_a_note_and_another_limit_gives_leaders_no_more_current(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The note says what the check raised; available power is no limit of a current, so nothing else is tried."""
+    verdict = CheckVerdict(check="mine", status="failed", reason="division by zero")
+    events = pd.DataFrame({"kind": ["limit"], "subject": ["inv1"], "text": ["inv1 has 3 kW available"]})
+    tried: list[str] = []
+
+    def run(self: Scenario, case: str) -> object:
+        tried.append(Path("mine/islanding.toml").read_text())
+        return SimpleNamespace(check_verdicts=(verdict,), events=events)
+
+    monkeypatch.setattr(Scenario, "run", run)
+    Path("uneven.dss").write_text(UNEVEN)
+
+    code, made = invoke("init", "mine", "--feeder", "uneven.dss", "--switch", "Line.sw")
+
+    assert code == 0, made
+    assert "NOTE  case ring fails its check mine: division by zero" in made
+    assert len(tried) == 1
 
 
 def string_of_loads(buses: int, km: float, kvar: float) -> str:
