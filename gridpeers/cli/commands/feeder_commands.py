@@ -133,7 +133,7 @@ def solve(
     except (ValueError, ArithmeticError) as error:
         fail([f"{feeder}: {error}"], BAD_INPUT)
     phases = table[table["phase"].isin(list("ABC"))]
-    live = phases[phases["V"] > 0.0].sort_values("V_pu")
+    live = phases[phases["V"] > 0.0]
     text = f"{counted(len(live), 'node')} with voltage"
     if dead := len(phases) - len(live):
         text += f", {dead} without, as the substation does not reach {'it' if dead == 1 else 'them'}"
@@ -141,7 +141,8 @@ def solve(
         text += f"; {counted(others, 'node')} beside phases A, B and C (neutrals) not counted"
     typer.echo(text)
     live = live[~live["bus"].map(is_behind).astype(bool)]  # an import's own buses stand beside one that the script has
-    for what, row in (("lowest", live.iloc[0]), ("highest", live.iloc[-1])):
+    V_pu = live["V_pu"].round(9)  # nodes with the same voltage: the first, whatever the last digits
+    for what, row in (("lowest", live.loc[V_pu.idxmin()]), ("highest", live.loc[V_pu.idxmax()])):
         between = f"{row['phase']} to {row['to']}, its neutral" if row["to"] else row["phase"]
         typer.echo(f"{what:7}  {row['V_pu']:.4f} pu  bus {row['bus']}, phase {between}")
     neutrals = table.merge(live[["bus", "to"]].drop_duplicates(), left_on=["bus", "phase"], right_on=["bus", "to"])
