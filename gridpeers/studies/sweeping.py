@@ -105,7 +105,7 @@ def sweep(
             kept[row.number] = None if history is None else history.frame()
             if progress is not None:
                 progress(len(done), len(plan.runs))
-    failed = {f"run {number}": row.why for number, row in sorted(done.items()) if row.status == "law failed"}
+    failed = {f"run {number}": row.why for number, row in sorted(done.items()) if row.why and row.status != "broke"}
     warn_of_laws(failed, depth=1)
     frame = results_frame(plan, done).drop(columns="sample")
     if chosen is not None:

@@ -20,6 +20,7 @@ from plant.build import build_plant
 from plant.feeder import Plant
 from plant.plant_config import PlantConfig
 from plant.tables import read_feeder
+from scenarios.checks.check_registry import LAW_FAILED
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.event_windows import CaseRecord
 from scenarios.results.findings import Findings, find
@@ -30,6 +31,7 @@ from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from scenarios.results.record import Recorder
 from scenarios.schema import ScenarioModel
 from scenarios.schema.configs import as_in, configs
+from scenarios.schema.plugin_keys import checks_off
 from wire.printable import utf8
 
 KEPT_PLANTS = 4
@@ -54,7 +56,8 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     number: int
     """Its place in the plan, from 0."""
     status: Literal["ran", "broke", "law failed"]
-    """Whether it reached its end under its laws. Where one failed there are no measures: they would be droop's."""
+    """Whether it reached its end under its laws. Where one failed there are no measures, which would be droop's; a
+    scenario that switches the check "law_failed" off wants them, and the status is "ran"."""
     why: str = ""
     """Why it broke, or which law failed, where and why."""
     history_sha256: str = ""
@@ -102,6 +105,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
         return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke), None
     failed_laws = first_of(law_failures(outcome.events))
+    failed_check = bool(failed_laws) and LAW_FAILED not in checks_off(scenario)
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
     record = CaseRecord.of(scenario, feeder, case, recorded)
@@ -113,12 +117,12 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     own = found.own.get(case, {})
     for label, metrics in own.items():
         measures |= flat(label, dict(metrics.values))
-    if failed_laws:
+    if failed_check:
         measures = dict.fromkeys(measures)
     failed = [f"{label}: {name} {text}" for label, metrics in own.items() for name, text in metrics.reasons.items()]
     done = SweepRow(
         number=number,
-        status="law failed" if failed_laws else "ran",
+        status="law failed" if failed_check else "ran",
         why=failed_laws,
         metric_warnings="; ".join(failed),
         history_sha256=recorded.sha256,

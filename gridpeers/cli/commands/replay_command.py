@@ -147,10 +147,12 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.studies.replaying import counterfactual_in
+    from scenarios.checks.check_registry import LAW_FAILED
     from scenarios.replay.changes import changed_rule
     from scenarios.results.broken_folder import broken_if_ended
     from scenarios.results.plots.style import save
     from scenarios.results.run_files import new_folder, shown, write_whole
+    from scenarios.schema.plugin_keys import checks_off
 
     rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
 
@@ -166,7 +168,8 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
     if done.difference is not None:
         typer.echo(f"It is not to be trusted: before the change, {done.difference}")
-    return done.difference is not None or len(done.would_be.failures) > 0
+    failed = len(done.would_be.failures) > 0 and LAW_FAILED not in checks_off(rule.scenario)
+    return done.difference is not None or failed
 
 
 def _about(record: RunRecord) -> str:

@@ -259,7 +259,7 @@ class Mine(gp.Law):
 def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
     top: str, exit_code: int, line: str, elsewhere: Path
 ) -> None:
-    """Whoever switches its check off has it said all the same; `compare` says it of a run, too."""
+    """Whoever switches its check off has it said all the same; `compare`, `sweep` and `replay` follow one rule."""
     (elsewhere / "mine.py").write_text(FAILING)
     case = '[case.IV]\nsecondary = "all"\ngraph = "full"\n'
     text = SHORT.partition("[case.I]")[0].replace('paper = "islanding"', 'law = "mine:Mine"')
@@ -274,6 +274,11 @@ def test_a_law_that_fails_is_exit_code_1_and_the_first_line(
         assert (elsewhere / "here" / "report.txt").read_text().startswith(line)
         compared = invoke("compare", "here", "here", "--out", "c.png")[1]
         assert compared.startswith("FAILED  first, case IV: inv1: law mine:Mine (mine.py:5): step"), compared
+        code, text = invoke("replay", "here", "--without", "inv1 -> inv2", "--out", "without")
+        assert code == exit_code, text
+    (elsewhere / "seeds.toml").write_text('scenario = "short.toml"\n[grid]\nseed = [1, 2]\n')
+    code, text = invoke("sweep", "seeds.toml", "--jobs", "1", "--out", "seeds")
+    assert code == exit_code, text
 
 
 def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
