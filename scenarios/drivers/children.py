@@ -19,7 +19,7 @@ from typing import IO
 import msgspec
 
 from scenarios.drivers.forking import ForkedProcess, ForkServer, ForkServerError
-from wire.driver.process import LEASH
+from wire.driver.process import BAD_CONFIG, BROKE, IN_ORDER, LEASH, OK
 from wire.messages import PLANT
 
 LAST_LINES = 12
@@ -28,8 +28,11 @@ LAST_LINES = 12
 GRACE = 2.0
 """Time (s) that processes have to leave after SIGTERM."""
 
-CRASHES = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
-"""Exit statuses of processes that faults of their own code ended."""
+_FAULTS = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
+"""Exit statuses of processes that faults of their own code ended; other signals come from outside."""
+
+_IN_ORDER = {IN_ORDER + status: status for status in (OK, BAD_CONFIG, BROKE)}
+"""By exit status of a process that ended in order, what it means."""
 
 HEAD_START = 2.0
 """Longest time (s) for which a plant that is asked to leave is waited for before the agents are asked, too."""
@@ -108,12 +111,14 @@ class Child:
     @property
     def status(self) -> int | None:
         """Exit status, negative for a signal; None while it runs."""
-        return self._process.poll()
+        status = self._process.poll()
+        return status if status is None else _IN_ORDER.get(status, status)
 
     @property
     def crashed(self) -> bool:
-        """Whether its own code ended it, as C code of a law with a segmentation fault does."""
-        return self.status in CRASHES
+        """Whether its own code ended it, as a law whose C code has a segmentation fault, or calls exit()."""
+        status = self._process.poll()
+        return status is not None and status not in _IN_ORDER and (status >= 0 or status in _FAULTS)
 
     def signal(self, number: int) -> None:
         """Send a signal, unless it has ended."""
@@ -131,18 +136,19 @@ class Child:
                 with contextlib.suppress(BrokenPipeError):
                     pipe.close()
 
-    def report(self, when: str) -> str:
-        """Return a sentence on how it ended, its last lines, and the path of the whole log."""
+    @property
+    def end(self) -> str:
+        """How it ended, in words."""
         status = self.status
         if status is None:
-            how = "still runs"
-        elif status < 0:
-            how = f"was killed by {signal.Signals(-status).name}"
-        else:
-            how = f"exited with status {status}"
+            return "still runs"
+        return f"was killed by {signal.Signals(-status).name}" if status < 0 else f"exited with status {status}"
+
+    def report(self, when: str) -> str:
+        """Return a sentence on how it ended, its last lines, and the path of the whole log."""
         lines = self.log.read_text(errors="replace").splitlines()[-LAST_LINES:]
         last = "".join(f"\n    {line}" for line in lines) or " none."
-        return f"{self.name} {how} {when}. Its last lines:{last}\nWhole log: {self.log}"
+        return f"{self.name} {self.end} {when}. Its last lines:{last}\nWhole log: {self.log}"
 
 
 class Children:

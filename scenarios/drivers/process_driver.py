@@ -240,6 +240,8 @@ class _ProcessDriver:
             self._end(child.report(self._when))
         elif supervisor.failed(child):
             self._notes[child.name] = child.report(self._when)
+            if child.crashed:
+                self.client.note_crash(child.name, child.end)
         # else it was asked to leave, perhaps by a Stop that is faster than its telemetry, or the scenario killed it
 
     def _end(self, reason: str) -> None:
@@ -251,10 +253,17 @@ class _ProcessDriver:
         return "before t = 0" if self.client.latest is None else f"after t = {self.client.t:g} s"
 
     def note_failures(self, supervisor: Supervisor) -> None:
-        """Note every agent that failed, or has not ended though the run has."""
+        """Note every agent that failed, or has not ended though the run has; one that crashed before its end breaks it.
+
+        In simulated time a run may reach its end before the exit of a process is noticed.
+        """
+        unscripted = self.client.latest is not None and not self.client.latest.reproducible and not self._wall
+        died = {event.subject: event.t for event in self._events if event.kind == "roster" and unscripted}
         for child in supervisor.children:
             known = child.name in self._notes or child.name == PLANT or (self.broke and child.status is None)
-            if supervisor.failed(child) and not known:
+            if child.crashed and child.name in died and not self.broke:
+                self.broke = child.report(f"at t = {died[child.name]:g} s")
+            elif supervisor.failed(child) and not known:
                 self._notes[child.name] = child.report(self._when)
 
     def outcome(self) -> Outcome:

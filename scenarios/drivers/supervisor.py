@@ -148,7 +148,7 @@ class Supervisor:
 
     def failed(self, child: Child) -> bool:
         """Whether a process has ended, or still runs, though neither the scenario nor a request explains it."""
-        return child.status != 0 and child.name not in self._faults.killed
+        return (child.status != 0 or child.crashed) and child.name not in self._faults.killed
 
 
 def share(names: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:

@@ -13,7 +13,7 @@ from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
 from wire.driver.inbox import Inbox
 from wire.driver.session import Session
 from wire.driver.zenoh_settings import Clock
-from wire.messages import Pacing, Telemetry
+from wire.messages import Pacing, PlantEvent, Telemetry
 from wire.trust.credentials import Credentials
 
 RECORDER = "history"
@@ -139,6 +139,12 @@ class TelemetryClient:
             if message.rows and not message.final:
                 self.progress = message.t, self.message_at
         self._on_message(message)
+
+    def note_crash(self, agent: str, end: str) -> None:
+        """Pass on that the process of an agent crashed, as an event of its law, with how it ended in words."""
+        if self.latest is not None and not self.ended:
+            event = PlantEvent(t=self.t, kind="law", subject=agent, text=f"{agent}: its process {end}")
+            self._on_message(replace(self.latest, rows=(), events=(event,), awaited=(), quiet=(), others=0))
 
     def close(self) -> None:
         """Close the session, and with it the token: the plant knows then that the last telemetry is here."""

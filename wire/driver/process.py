@@ -1,7 +1,8 @@
 """Start, log and end of every process of a run.
 
 Exit statuses: 0, the run ended, or the process was asked to leave; 1, an error of our own, with a traceback in the log;
-2, a configuration that cannot work; 3, the run broke, or this process could not continue.
+2, a configuration that cannot work; 3, the run broke, or this process could not continue. With `--leash` a process that
+ends in order has 96 more: so its parent tells this from an `exit()` in code that it runs, such as a library of a law.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ from wire.foreign_bytes import decode_foreign
 from wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
+
+IN_ORDER = 96
+"""Added to the exit status of a process on a leash that ends in order."""
 
 _GRACE = 5.0
 """Time (s) for a proper end once the parent is gone."""
@@ -93,7 +97,7 @@ def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable
     int
         Exit status.
     """
-    status = _main(module, what, config_type, run)
+    status = _main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0)
     leave(status, logging.getLogger(module).warning)
     return status
 

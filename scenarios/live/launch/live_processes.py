@@ -178,6 +178,8 @@ def all_here(
             over.set()
         elif supervisor.failed(child) and not over.is_set():
             say(child.report(f"after t = {recorder.client.t:.2f} s"))
+            if child.crashed:
+                recorder.note_crash(child.name, child.end)
 
     limit = RateLimit()
 

@@ -20,7 +20,7 @@ from wire.messages import LinkRequest, PlantEvent, Telemetry
 from wire.rate_limit import RateLimit
 from wire.trust.credentials import Credentials
 
-_STOP = "stop"
+_STOP, _CRASH = "stop", "crash/"
 
 _ON = "; the run goes on without it"
 
@@ -99,6 +99,10 @@ class LiveRecorder:
         if self._recorder is not None:
             self._finish(self._recorder)
 
+    def note_crash(self, agent: str, end: str) -> None:
+        """Note that the process of an agent crashed, with how it ended in words; from any thread."""
+        self.client.say(f"{_CRASH}{agent}/{end}")
+
     def _say_all(self, *lines: str) -> None:
         for line in lines:
             self._say(line)
@@ -135,8 +139,10 @@ class LiveRecorder:
     def _follow(self) -> None:
         free_lists = FreeLists(monotonic())
         while not self.client.ended:
-            if self.client.take(None):
-                return
+            for word in self.client.take(None):
+                if word == _STOP:
+                    return
+                self.client.note_crash(*word.removeprefix(_CRASH).split("/", 1))
             free_lists.tend(monotonic())
         self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
 

@@ -16,6 +16,7 @@ from scenarios.drivers.children import Child
 from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
 from scenarios.drivers.warm_servers import agent_server, plant_server, release
 from tests.toy.toy_configs import agent_config
+from wire.driver.process import BAD_CONFIG, IN_ORDER
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
 
@@ -137,7 +138,7 @@ def test_a_forked_plant_has_loaded_its_step_and_no_thread(tmp_path: Path) -> Non
             plant = server.fork(["plant", "--leash", "plant"], log, speaks=True)
         libraries = Path(f"/proc/{plant.pid}/maps").read_text()
         plant.stdin.close()
-        assert plant.wait() == 2  # no configuration
+        assert plant.wait() == IN_ORDER + BAD_CONFIG  # no configuration
         assert plant.stdout is not None
         plant.stdout.close()
     finally:

@@ -18,11 +18,13 @@ from typing import Any
 import msgspec
 import pytest
 
+from agents.agent_config import Control, LawChoice
 from scenarios.drivers import process_driver
 from scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
 from scenarios.drivers.telemetry_client import TelemetryClient
+from scenarios.results.law_failures import law_failures
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -74,6 +76,57 @@ def test_an_agent_that_crashes_breaks_the_run(tmp_path: Path) -> None:
     outcome = run()
 
     assert outcome.broke.startswith("inv3 was killed by SIGSEGV after t = "), outcome.broke
+
+
+QUITS = """import os, sys
+import gridpeers as gp
+
+class Mine(gp.Law):
+    def step(self, own, neighbours, T):
+        if own.name == "inv3" and own.t > 0.3:
+            print("no licence", file=sys.stderr, flush=True)
+            os._exit({status})
+        return gp.SetPoints(own.P_set, own.V_set)
+"""
+
+
+def quitting(folder: Path, status: int) -> Control:
+    """Return a rule whose law ends the process of inv3 at 0.3 s, as a library does that calls exit()."""
+    (folder / "quits.py").write_text(QUITS.format(status=status))
+    return Control(secondary="all", graph="full", law=LawChoice(use="quits:Mine", folder=str(folder)))
+
+
+@pytest.mark.parametrize(("status", "end"), [(0, 20.0), (3, 20.0), (0, 0.36)])
+def test_an_agent_that_ends_its_process_breaks_the_run(status: int, end: float, tmp_path: Path) -> None:
+    """Whatever its exit status says, and also if the others reach the end first. Its last words are told."""
+    outcome = ProcessRun(*toy_configs(4, quitting(tmp_path, status), end=end), tmp_path / "log")()
+
+    assert re.match(rf"inv3 exited with status {status} (after|at) t = ", outcome.broke), outcome.broke
+    assert "\n    no licence\n" in outcome.broke
+
+
+def test_an_agent_that_ends_its_process_fails_a_run_in_real_time(tmp_path: Path) -> None:
+    """The run goes on, as the others would, and its record has the event that a failed law has."""
+    plant, agents = toy_configs(4, quitting(tmp_path, 0), end=1.0)
+    plant = msgspec.structs.replace(plant, clock="wall")
+    run = ProcessRun(plant, [msgspec.structs.replace(agent, clock="wall") for agent in agents], tmp_path / "log")
+    outcome = run()
+    (failed,) = law_failures(run.events)
+
+    assert (outcome.broke, run.rows[-1][0]) == ("", 1.0)
+    assert (failed.agent, failed.why) == ("inv3", "its process exited with status 0")
+    assert "\n    no licence\n" in outcome.notes[0]
+
+
+@pytest.mark.parametrize("by", [signal.SIGTERM, signal.SIGINT])
+def test_an_agent_that_a_person_ends_is_an_event(by: int, tmp_path: Path) -> None:
+    """Its process ends in order, with status 0: that is no crash, and the run goes on."""
+    run = ProcessRun(*toy_configs(4, end=20.0), tmp_path)
+    run.at(0.4, lambda: run.child("inv3").signal(by))
+    outcome = run()
+
+    assert (outcome.broke, outcome.notes) == ("", ())
+    assert [event.subject for event in outcome.events if event.kind == "roster"] == ["inv3"]
 
 
 def test_agents_that_link_to_each_other_give_the_same_rows_and_notice_a_death(tmp_path: Path) -> None:

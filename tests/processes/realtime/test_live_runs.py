@@ -284,6 +284,21 @@ def test_a_plant_and_an_agent_go_on_when_nobody_reads_their_log(desk: Desk) -> N
             process.communicate()
 
 
+def test_an_agent_that_ends_its_own_process_fails_a_live_run(desk: Desk) -> None:
+    """Its exit status 0 does not hide it: `up` says so at once and at its end, and ends with exit code 1."""
+    law = "import os\nimport gridpeers as gp\n\nclass Mine(gp.Law):\n    def step(self, own, neighbours, T):\n"
+    law += "        return gp.SetPoints(own.P_set, own.V_set) if own.name != 'inv2' else os._exit(0)\n"
+    (desk.folder / "mine.py").write_text(law)
+    (desk.folder / "events.toml").write_text(f'law = "mine:Mine"\n{EVENTS}')
+    up = desk.open_bare("up", "events.toml", "--run", "lab", "--listen", desk.options[-1])
+    up.shows("inv2 exited with status 0 after t = ")
+    up.shows("inv2: its process exited with status 0")
+
+    assert desk.type("down")[0] == 0
+    assert up.end() == 1
+    up.expect("FAILED  inv2 at t = .* s: its process exited with status 0")
+
+
 @pytest.mark.parametrize("out", ["--out", ""])
 def test_a_law_that_fails_in_a_live_run_is_exit_code_1_and_named_by_file_and_line(desk: Desk, out: str) -> None:
     """Two of nine laws fail as the island forms. The report says it first; without one the last line does."""
