@@ -276,9 +276,10 @@ def _in_simulated_time(record: RunRecord, make_plant: MakePlant | None) -> Itera
 def _physics(record: RunRecord, make_plant: MakePlant) -> ReplayedPart:
     """Make the run again in this process; only the scenario decides what happens in it."""
     info, rows, plant = record.info, ComparedRows(record), start_plant_of(record.info, make_plant)
+    recorded = (int(record.t_end / info.plant.T_c) + 1) * info.plant.T_c  # a killed run may have been meant to go on
     try:
         outcome = run_inprocess(
-            replace(info.plant, record="physics"),
+            replace(info.plant, record="physics", end=min(info.plant.end or inf, recorded)),
             [replace(agent, record="physics") for agent in info.agents],
             rows.take,
             plant=plant,
