@@ -44,12 +44,16 @@ def _within(file: str, folders: tuple[str, ...]) -> bool:
 
 
 def compile_once() -> None:
-    """Compile the plant's inner loop in a fresh clone, before several processes do it side by side."""
+    """Compile the plant's inner loops in a fresh clone, before several processes do it side by side."""
+    from msgspec.structs import replace
+
     from plant.build import build_plant
     from scenarios.schema import load_scenario
     from scenarios.schema.configs import configs
 
-    build_plant(configs(*load_scenario("islanding"), "I")[0])
+    config, _ = configs(*load_scenario("islanding"), "I")
+    build_plant(config)
+    build_plant(replace(config, settings=replace(config.settings, method="second-order")))
 
 
 def give_way() -> None:
