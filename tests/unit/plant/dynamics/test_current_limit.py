@@ -49,7 +49,7 @@ def test_the_controller_goes_on_unlimited_once_the_overload_ends() -> None:
 def unequal(*P: float) -> Circuit:
     """One terminal and, behind lines, constant power (pu) on each phase, which gives way below 0.7 pu."""
     y, one = 20.0 / Z_B, np.eye(3)
-    rows = [(part * S_B / 3.0, 0.45 * part * S_B / 3.0, V_B, 0, 0, 0.5 * V_B, 0.7 * V_B, 0, 0, 0) for part in P]
+    rows = [(part * S_B / 3.0, 0.45 * part * S_B / 3.0, V_B, 0, 0, 0.5 * V_B, 0.7 * V_B, 0, 0, 0, 0) for part in P]
     loads = LoadLaw(S=np.zeros(3, complex), I0=np.zeros(3, complex), limited_at=np.arange(3), law=np.array(rows, float))
     behind = sp.csc_array(np.vstack([0.0 * one, one]))
     lines = circuit(np.kron([[y, -y], [-y, y]], one).astype(complex), [[0, 1, 2]])
