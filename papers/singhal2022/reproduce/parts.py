@@ -136,8 +136,8 @@ PARTS: tuple[Part, ...] = (
                 key="communication",
                 file="overview.png",
                 title="All links, a third of them, and one missing (the paper's figure of reduced communication)",
-                note="alpha and beta were re-tuned on a grid of 30 points by bench/tables/retune.py: the least MQSI "
-                "among those whose V_error prints as Table IV has it.",
+                note="alpha and beta were re-tuned on the points of `gridpeers sweep retuning`: the least MQSI among "
+                "those whose V_error prints as Table IV has it.",
             ),
         ),
     ),

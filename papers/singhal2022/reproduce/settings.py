@@ -71,7 +71,7 @@ def settings(scenarios: dict[str, ScenarioModel]) -> list[tuple[str, str, str]]:
             (
                 "re-tuned alpha, beta",
                 f"{own.alpha:g}, {own.beta_GFM:g}",
-                "the best of a grid of 30 points by a rule fixed before (bench/tables/retune.py)",
+                "the best of a grid of 30 points by a rule fixed before (docs/reproduction.md)",
             )
         )
     return rows
