@@ -1,1 +1,0 @@
-"""How many sessions find each other, and how soon."""
