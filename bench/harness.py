@@ -1,38 +1,41 @@
-"""Shared by all benches: options, the machine and its load, measurements beside a rival in the same run, and tables."""
+"""Shared by all benches: the machine, its load and what others take of it, commands, failures in a line, tables."""
 
 from __future__ import annotations
 
-import argparse
-import math
 import os
 import platform
+import resource
+import shlex
+import subprocess
 import sys
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Iterable, Iterator, Sequence
 from importlib import metadata
 from pathlib import Path
-from statistics import median
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
 GRIDPEERS = (sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()")
 """The command `gridpeers` of this interpreter."""
 
+REPOSITORY = Path(__file__).parents[1]
 
-def options(text: str | None, **defaults: float | str) -> argparse.Namespace:
-    """Return the options of the command line, each of its default's type; `text` is the docstring of the bench."""
-    parser = argparse.ArgumentParser(description=text, formatter_class=argparse.RawDescriptionHelpFormatter)
-    for name, default in defaults.items():
-        parser.add_argument(f"--{name}", type=type(default), default=default, help=f"default: {default}")
-    return parser.parse_args()
+PACKAGES = ("eclipse-zenoh", "helics", "gridlabd", "pyzmq", "joblib", "numpy", "scipy", "numba", "msgspec")
+"""Distributions whose versions stand beside measurements."""
+
+LONGEST = 300
+"""Most characters of the reason of a failure."""
+
+DEADLINE = 600.0
+"""Longest time (s) for a command."""
 
 
-def run_parts(**parts: Callable[[], None]) -> None:
-    """Run the parts that the command line names, or all."""
-    names = sys.argv[1:] or list(parts)
-    if unknown := set(names) - set(parts):
-        sys.exit(f"no part {', '.join(sorted(unknown))}; there are {', '.join(parts)}")
-    for name in names:
-        parts[name]()
+def say(text: str) -> None:
+    """Show progress."""
+    print(f"{text} ...", file=sys.stderr, flush=True)
+
+
+# ---------------------------------------------------------------- the machine
 
 
 def machine() -> str:
@@ -52,45 +55,150 @@ def load() -> str:
     return ", ".join(f"{value:.1f}" for value in os.getloadavg())
 
 
-def say(text: str) -> None:
-    """Show progress."""
-    print(f"{text} ...", file=sys.stderr, flush=True)
+def commit() -> str:
+    """Return the commit of this repository; "+" behind it marks changes that are not committed."""
+
+    def git(*words: str) -> str:
+        found = subprocess.run(["git", *words], cwd=REPOSITORY, capture_output=True, text=True, check=True)
+        return found.stdout.strip()
+
+    try:
+        changed = git("status", "--porcelain", "--", ".", ":!docs")  # benches write into docs
+        return git("rev-parse", "--short=10", "HEAD") + ("+" if changed else "")
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
-def ratios(rivals: Mapping[str, Callable[[], float]], rounds: int) -> dict[str, float]:
-    """Measure rivals round by round, print their times (s) and ratios, and return the median ratios.
+def version(distribution: str) -> str:
+    """Return the version of a distribution; "" where it is not installed."""
+    try:
+        return metadata.version(distribution)
+    except metadata.PackageNotFoundError:
+        return ""
 
-    The first rival is the reference: it runs before and after the others, whose order changes from round to round. A
-    ratio is that of a time to the reference's in the same round, so that it holds whatever else the machine does.
+
+class MachineUse:
+    """The use of the machine from now on."""
+
+    def __init__(self) -> None:
+        self._began, self._busy, self._own = time.monotonic(), _machine_time(), own_time()
+
+    @property
+    def seconds(self) -> float:
+        """Duration so far (s)."""
+        return time.monotonic() - self._began
+
+    @property
+    def others(self) -> float:
+        """Part of the machine's processor time that other programs took; 0 where /proc is not."""
+        whole = self.seconds * (os.cpu_count() or 1)
+        taken = (_machine_time() - self._busy) - (own_time() - self._own)
+        return min(1.0, max(0.0, taken) / whole) if whole else 0.0
+
+
+def _machine_time() -> float:
+    """Return the processor time (s) that all programs of the machine have taken so far; 0 where /proc is not."""
+    try:
+        fields = Path("/proc/stat").read_text().splitlines()[0].split()[1:]
+    except OSError:
+        return 0.0
+    user, nice, system, _idle, _iowait, irq, softirq, steal, *_ = map(int, fields)
+    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+
+
+def own_time() -> float:
+    """Return the processor time (s) of this process, its ended children, and its living descendants so far."""
+    uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    living = sum(processor_time(pid, children=True) for pid in _descendants(os.getpid()))
+    return sum(use.ru_utime + use.ru_stime for use in uses) + living
+
+
+def processor_time(pid: int, *, children: bool = False) -> float:
+    """Return the processor time (s) of a process, perhaps with that of its ended children; 0 once it has ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11 : 15 if children else 13])) / os.sysconf("SC_CLK_TCK")
+
+
+def _descendants(pid: int) -> Iterator[int]:
+    for file in Path(f"/proc/{pid}/task").glob("*/children"):
+        try:
+            children = [int(child) for child in file.read_text().split()]
+        except OSError:  # the thread, or the process, has just ended
+            continue
+        for child in children:
+            yield child
+            yield from _descendants(child)
+
+
+# ---------------------------------------------------------------- commands, and failures
+
+
+def checked(command: Sequence[str], timeout: float = DEADLINE) -> str:
+    """Run a command and return what it prints.
+
+    Raises
+    ------
+    subprocess.CalledProcessError, subprocess.TimeoutExpired
+        If it fails; `reason` makes a line of it.
     """
-    (first, reference), *others = rivals.items()
-    times: dict[str, list[float]] = {name: [] for name in rivals}
-    ratios_by_rival: dict[str, list[float]] = {name: [] for name, _ in others}
-    for i in range(rounds):
-        before = reference()
-        k = i % max(len(others), 1)
-        took = {name: run() for name, run in others[k:] + others[:k]}
-        after = reference()
-        times[first] += [before, after]
-        for name, seconds in took.items():
-            times[name].append(seconds)
-            ratios_by_rival[name].append(2.0 * seconds / (before + after))
-    print(f"{'':48}{'median (s)':>11}{'fastest (s)':>13}   ratio (lowest to highest)")
-    for name, values in times.items():
-        line = f"{name:48}{median(values):11.3f}{min(values):13.3f}"
-        if of := ratios_by_rival.get(name):
-            line += f"   {median(of):.3f} ({min(of):.3f} to {max(of):.3f})"
-        print(line)
-    return {name: median(values) for name, values in ratios_by_rival.items()}
+    done = subprocess.run(
+        command, check=True, capture_output=True, text=True, errors="replace", timeout=timeout, cwd=REPOSITORY
+    )
+    return done.stdout
 
 
-def cells(row: Mapping[str, float | None], *names: str) -> str:
-    """Return values of a row of a sweep, with 3 digits; "never" for a time that does not exist.
+def reason(error: Exception) -> str:
+    r"""Return what went wrong as one line: the command and its last line, or the first and the last line of the error.
 
     Examples
     --------
-    >>> cells({"f": 0.7512, "P": None}, "f", "P")
-    '0.751 / never'
+    >>> reason(subprocess.CalledProcessError(3, ["ls", "x y"], stderr="a\nno such file\n"))
+    "`ls 'x y'` ended with 3: no such file"
+    >>> reason(RuntimeError("inv1 died\nits log\nOSError: no room"))
+    'inv1 died ... OSError: no room'
     """
-    values = (row[name] for name in names)
-    return " / ".join("never" if x is None or math.isnan(x) else f"{x:.3g}" for x in values)
+    if isinstance(error, subprocess.CalledProcessError):
+        last = _lines(error.stderr)[-1:] or ["it printed no error"]
+        return f"`{_words(error.cmd)}` ended with {error.returncode}: {last[0]}"[:LONGEST]
+    if isinstance(error, subprocess.TimeoutExpired):
+        return f"`{_words(error.cmd)}` had not ended after {error.timeout:g} s"[:LONGEST]
+    lines = _lines(str(error))
+    if not lines:
+        return type(error).__name__
+    first = lines[0] if isinstance(error, RuntimeError) else f"{type(error).__name__}: {lines[0]}"
+    return (first if len(lines) == 1 else f"{first} ... {lines[-1]}")[:LONGEST]
+
+
+def _words(command: Sequence[str] | str) -> str:
+    """Return a command as a person types it."""
+    if isinstance(command, str):
+        return command
+    words = list(command)
+    if tuple(words[: len(GRIDPEERS)]) == GRIDPEERS:
+        words[: len(GRIDPEERS)] = ["gridpeers"]
+    elif words[0] == sys.executable:
+        words[0] = "python"
+    return shlex.join(words)
+
+
+def _lines(text: str | bytes | None) -> list[str]:
+    if isinstance(text, bytes):
+        text = text.decode(errors="replace")
+    return [line.strip() for line in (text or "").splitlines() if line.strip()]
+
+
+def markdown(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    r"""Return a table for a page; numbers have three digits.
+
+    Examples
+    --------
+    >>> print(markdown(("what", "s"), [("a | b", 0.12345)]))
+    | what | s |
+    | --- | --- |
+    | a \| b | 0.123 |
+    """
+    cells = [[f"{x:.3g}" if isinstance(x, float) else str(x).replace("|", "\\|") for x in row] for row in rows]
+    return "\n".join("| " + " | ".join(row) + " |" for row in [list(head), ["---"] * len(head), *cells])

@@ -1,1 +1,1 @@
-"""Ours beside its peers, all in one run: GridLAB-D, HELICS, ZeroMQ and bare Zenoh; table, figures and JSON."""
+"""Ours beside its peers, all in one run: GridLAB-D, HELICS, ZeroMQ and bare Zenoh."""

@@ -23,6 +23,9 @@ DEADLINE = 120.0
 LEAVING = 5.0
 """Time (s) that hosts have to end by themselves after the hub."""
 
+WARM_UP = 20
+"""Rounds that are not counted."""
+
 HUB = "hub"
 
 
@@ -71,21 +74,6 @@ class MeshMember(msgspec.Struct, frozen=True, kw_only=True):
 def full_graph(agents: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return the neighbours of each agent where all hear all."""
     return {agent: tuple(other for other in agents if other != agent) for agent in agents}
-
-
-def ring_graph(agents: Sequence[str]) -> dict[str, tuple[str, ...]]:
-    """Return the neighbours of each agent of a ring: the one before and the one behind.
-
-    Examples
-    --------
-    >>> ring_graph(["a", "b", "c", "d"])["a"]
-    ('d', 'b')
-    """
-    n = len(agents)
-    return {
-        agent: tuple(dict.fromkeys(agents[j % n] for j in (i - 1, i + 1) if j % n != i))
-        for i, agent in enumerate(agents)
-    }
 
 
 def shared_out(agents: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:

@@ -9,14 +9,12 @@ from time import monotonic, perf_counter
 from typing import Protocol
 
 import msgspec
+from bench.peers.mesh_transports import ZenohTransport, ZeromqTransport, run_federate
 
-from bench.peers.mesh import DEADLINE, HUB, MeshMember
+from bench.peers.mesh import DEADLINE, HUB, WARM_UP, MeshMember
 
 GREETING = 0.05
 """Time (s) between two greetings, by which all make sure to hear each other before anything is measured."""
-
-WARM_UP = 20
-"""Rounds that are not counted."""
 
 
 class Transport(Protocol):
@@ -108,27 +106,15 @@ def main() -> None:
     """Be one process of a mesh."""
     member = msgspec.json.decode(sys.stdin.buffer.read(), type=MeshMember)
     if member.transport.startswith("helics"):
-        from bench.peers.mesh_helics import run_federate
-
         seconds = run_federate(member)
     else:
-        transport = _transport_of(member)
+        transport = (ZenohTransport if member.transport.startswith("zenoh") else ZeromqTransport)(member)
         node = MeshNode(member, transport)
         node.greet()
         seconds = node.run()
         transport.close()
     if member.name == HUB:
         print(seconds)
-
-
-def _transport_of(member: MeshMember) -> Transport:
-    if member.transport.startswith("zenoh"):
-        from bench.peers.mesh_zenoh import ZenohTransport
-
-        return ZenohTransport(member)
-    from bench.peers.mesh_zeromq import ZeromqTransport
-
-    return ZeromqTransport(member)
 
 
 if __name__ == "__main__":

@@ -3,38 +3,33 @@
 from __future__ import annotations
 
 import os
-import sys
+import subprocess
 import tempfile
-from collections import defaultdict
 from collections.abc import Callable
 from contextlib import ExitStack
 from functools import cached_property
 from pathlib import Path
-from time import perf_counter, process_time
+from time import perf_counter, process_time, sleep
 from typing import Any
 from unittest.mock import patch
 
 import gridpeers as gp
-import wire.codec
-from agents.agent import Agent
-from agents.agent_config import AgentConfig
 from agents.lockstep_agent import LockstepAgent
+from bench.harness import DEADLINE, GRIDPEERS, checked, processor_time
 from plant.build import build_plant
-from plant.feeder import Plant
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
 from plant.gridlabd.process import delta_mode_process
 from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.drivers.process_driver import run_processes
-from scenarios.results.record import Recorder
+from scenarios.results.record import PARTIAL, Recorder
 from scenarios.schema.configs import configs
 from wire.actions import Publish
 
 CASE = "IV"
 
-STEPS, REST_OF_CASE, TICKS = "plant: dynamics and network", "lock-step, bus, meeting", "all ticks"
-"""Keys of `shares`."""
+LOOK = 0.002
+"""Time (s) between two looks at the history that is being written."""
 
 
 class OurCase:
@@ -76,10 +71,10 @@ class OurCase:
             patch.object(delta_mode_process, "KEPT_MEMORY", {}),
             GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end) as plant,
         ):
-            started = _processor_time(plant.process.pid)
+            started = processor_time(plant.process.pid)
             for _ in range(self.ticks):
                 plant.advance()
-            steps = _processor_time(plant.process.pid) - started
+            steps = processor_time(plant.process.pid) - started
         return {"gridlabd.plant.steps": steps}
 
     def in_process(self) -> dict[str, float]:
@@ -96,7 +91,7 @@ class OurCase:
     def with_processes(self, shared: int = 0) -> dict[str, float]:
         """Measure one case with processes (s): the whole, until its first row, and each tick.
 
-        Plant and agents are forked from servers that a former case has started (`scenarios.drivers.warm_servers`).
+        Plant and agents are forked from what a former case has started.
         """
         kind = f"{shared or len(self.agents)}"
         with tempfile.TemporaryDirectory() as name:
@@ -111,6 +106,31 @@ class OurCase:
             f"ours.first_row.{kind}": outcome.start_s,
             f"ours.case.{kind}": whole,
         }
+
+    def by_command(self) -> dict[str, float]:
+        """Measure `gridpeers run` with processes (s) from its start: to its first row, to its last, and to its end.
+
+        The last row is there once the history has its name; tables and figures follow.
+        """
+        with tempfile.TemporaryDirectory(prefix="gp-command-") as name:
+            folder = Path(name)
+            file, out, log = folder / "islanding.toml", folder / "out", folder / "log"
+            file.write_text(self.scenario.to_toml(), encoding="utf-8")
+            command = [*GRIDPEERS, "run", str(file), "--case", CASE, "--driver", "processes", "--out", str(out)]
+            with log.open("wb") as errors:
+                began = perf_counter()
+                run = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=errors, stderr=errors)
+                try:
+                    first = _until(run, out / CASE / PARTIAL, out / CASE / "history.csv") - began
+                    last = _until(run, out / CASE / "history.csv") - began
+                    run.wait(DEADLINE)
+                    end = perf_counter() - began
+                finally:
+                    run.kill()
+                    run.wait()
+            if run.returncode:
+                raise subprocess.CalledProcessError(run.returncode, command, stderr=log.read_text(errors="replace"))
+        return {"ours.command.first_row": first, "ours.command.last_row": last, "ours.command.end": end}
 
     def sweep(self, runs: int) -> dict[str, float]:
         """Measure a sweep over all cores: runs per second once its workers run, and time (s) until they do."""
@@ -152,52 +172,26 @@ class OurCase:
         measurement, state = (sorted(found)[len(found) // 2] for found in sizes.values())
         return measurement, state
 
-    def shares(self) -> dict[str, float]:
-        """Measure the parts (s) of a case in this process at their borders; the timing itself is in the rest."""
-        return shares(self.plant, self.agents)
+
+def help_time() -> dict[str, float]:
+    """Measure `gridpeers --help` (s)."""
+    began = perf_counter()
+    checked([*GRIDPEERS, "--help"])
+    return {"ours.help": perf_counter() - began}
 
 
-def shares(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> dict[str, float]:
-    """Return the processor time (s) by part of a run in this process, and that of all ticks under `TICKS`."""
-    spent: defaultdict[str, float] = defaultdict(float)
-
-    def timed(part: str, function: Callable[..., Any]) -> Callable[..., Any]:
-        def call(*arguments: Any, **named: Any) -> Any:
-            began = process_time()
+def _until(run: subprocess.Popen[bytes], *files: Path) -> float:
+    """Return the time at which one of some files has something in it, or the command has ended."""
+    until = perf_counter() + DEADLINE
+    while run.poll() is None and perf_counter() < until:
+        for file in files:
             try:
-                return function(*arguments, **named)
-            finally:
-                spent[part] += process_time() - began
-
-        return call
-
-    borders: list[tuple[str, Any, str]] = [
-        (STEPS, Plant, "advance"),
-        *(("plant: readings, set-points, rows", Plant, name) for name in ("measure", "hold", "take_rows")),
-        ("agents: the law", Agent, "tick"),
-    ]
-    for function in (wire.codec.encode, wire.codec.decode):
-        name = function.__name__
-        owners = [module for module in list(sys.modules.values()) if getattr(module, name, None) is function]
-        borders += [("codec", module, name) for module in owners]
-    with ExitStack() as stack:
-        for part, owner, name in borders:
-            stack.enter_context(patch.object(owner, name, timed(part, getattr(owner, name))))
-        began = process_time()
-        built = timed("plant: tables and initial state", build_plant)(plant)
-        started: list[float] = []
-        outcome = run_inprocess(plant, agents, lambda telemetry: started.append(process_time()), plant=built)
-        ended = process_time()
-        spent["all"], spent[TICKS] = ended - began, ended - started[0]
-        _check(outcome.broke)
-    whole, ticks = spent.pop("all"), spent.pop(TICKS)
-    return dict(spent) | {REST_OF_CASE: whole - sum(spent.values()), TICKS: ticks}
-
-
-def _processor_time(pid: int) -> float:
-    """Return the processor time (s) of a running process so far; Linux."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+                if file.stat().st_size:
+                    return perf_counter()
+            except FileNotFoundError:
+                continue
+        sleep(LOOK)
+    return perf_counter()
 
 
 def _check(broke: str) -> None:

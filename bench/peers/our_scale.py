@@ -1,105 +1,140 @@
-"""Our side at other sizes: agents on feeders grown of copies of ours, as processes and in one process."""
+"""Cost of agents in one process against their number: joined copies of a feeder, islanded as one, on a ring.
+
+    python -m bench.peers.our_scale AGENTS T_C END
+
+One run, in a process of its own, so that its memory is its own; it prints one line of JSON. Times are of the processor,
+as seconds a simulated second, split at the plant's interface; of real time by the clock too, as the plant may use all
+cores. A message is one from an agent to a neighbour, or from or to the plant.
+"""
 
 from __future__ import annotations
 
+import json
+import resource
+import sys
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
+from time import perf_counter, process_time
+from typing import Any
+from unittest.mock import patch
 
-from msgspec.structs import replace
-
-import gridpeers as gp
-from agents.agent_config import AgentConfig
-from bench.harness import GRIDPEERS
-from bench.peers.failure import checked
-from bench.scale import timed_run
+import bench.harness  # noqa: F401  # one thread, before numpy is imported
+from gridpeers.feeder import Feeder
 from plant.build import build_plant
+from plant.equipment.joined_copies import copy_name, joined_copies
+from plant.feeder import Plant
 from plant.plant_config import PlantConfig
-from scenarios.drivers.process_driver import run_processes
+from scenarios.drivers.inprocess import run_inprocess
 from scenarios.results.record import Recorder
+from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 
-INVERTERS = 9
-"""Of one copy."""
+ISLAND, JOINT = 9, "450"
+"""Inverters of the feeder `microgrid123`, and its bus at which copies are joined."""
 
-ISLANDING = 0.2
-"""Time (s) of the islanding, from which on the law acts."""
+FEW = 99
+"""Agents up to which the first run of a process is seen to be slower, and is not counted."""
 
-T_C = 0.02
-"""Control period (s)."""
-
-
-def links(graph: str, agents: int) -> int:
-    """Return the messages of a tick between agents, and from and to the plant.
-
-    Examples
-    --------
-    >>> links("full", 9), links("ring", 9)
-    (90, 36)
-    """
-    return (agents * (agents - 1) if graph == "full" else 2 * agents) + 2 * agents
-
-
-@cache
-def grown(agents: int, graph: str, ticks: int, T_c: float = T_C) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Return the configurations of a run of so many ticks with so many agents, on as many copies as they need.
-
-    Inverters beyond the number of agents stay on droop.
-    """
-    copies = -(-agents // INVERTERS)
-    with _folder() as folder:
-        words = ["microgrid123", "--copies", str(copies), "--joint", "450", "--switch", "13-152", "--T-c", str(T_c)]
-        out = folder / f"{agents}-{graph}"
-        checked([*GRIDPEERS, "feeder", "grow", *words, "--out", str(out)])
-        scenario = gp.load(out / "islanding.toml")
-        (event,) = scenario.tables["event"]
-        scenario = scenario.replace(
-            {
-                "event": [event | {"t_s": ISLANDING}],
-                "time.end_s": round(ISLANDING + ticks * T_c, 9),
-                "case.ring.graph": graph,
-            }
-        )
-        plant, configured = configs(scenario.spec, scenario.feeder, "ring")
-    chosen = configured[:agents]
-    return replace(plant, agents=tuple(agent.name for agent in chosen)), chosen
+SCENARIO = """\
+name = "scale"
+[plant]
+feeder = "grown"
+[time]
+T_c_s = {T_c}
+end_s = {end}
+[[event]]
+label = "islanding"
+t_s = 1.0
+open = {switches}
+[case.ring]
+secondary = "all"
+graph = "ring"
+"""
 
 
-def with_processes(agents: int, graph: str, ticks: int) -> dict[str, float]:
-    """Measure a tick (s) with a process for each agent."""
-    plant, configured = grown(agents, graph, ticks)
-    assert plant.end is not None
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        with Recorder(folder / "case") as recorder:
-            outcome = run_processes(plant, configured, folder / "log", recorder)
-            if outcome.broke:
-                raise RuntimeError(outcome.broke)
-            recorder.finish(plant.end, plant.record_step)
-    return {f"ours.{graph}.{agents}": outcome.run_s / outcome.ticks, f"ours.start.{graph}.{agents}": outcome.start_s}
+def write_scenario(folder: Path, agents: int, T_c: float, end: float) -> Path:
+    """Write a feeder of joined copies and its scenario; return the scenario's path."""
+    copies = agents // ISLAND
+    joined_copies(Feeder.read("microgrid123"), copies, JOINT).save(folder / "grown")
+    switches = [f"{copy_name('13', k)}-{copy_name('152', k)}" for k in range(1, copies + 1)]
+    path = folder / "scale.toml"
+    path.write_text(SCENARIO.format(T_c=T_c, end=end, switches=json.dumps(switches)), encoding="utf-8")
+    return path
 
 
-def in_process(agents: int, graph: str, ticks: int) -> dict[str, float]:
-    """Measure a tick in one process, processor time (s): the whole, and per message without the plant."""
-    plant, configured = grown(agents, graph, ticks)
-    assert plant.end is not None
-    built = build_plant(plant)
-    with tempfile.TemporaryDirectory(prefix="gp-links-") as name:
-        times = timed_run(plant, configured, built, Path(name) / "case")
-    count = round(plant.end / plant.T_c)
+def measure(agents: int, T_c: float, end: float) -> dict[str, float]:
+    """Return the costs; the plant's code is compiled, or loaded, before anything is timed."""
+    with tempfile.TemporaryDirectory() as text:
+        folder = Path(text)
+        path = write_scenario(folder, agents, T_c, end)
+        began = process_time()
+        scenario, feeder = load_scenario(str(path))
+        read = process_time() - began
+        plant, configured = configs(scenario, feeder, "ring")
+        built = build_plant(plant)
+        if agents <= FEW:
+            timed_run(plant, configured, built, folder / "first")
+        began = process_time()
+        built = build_plant(plant)
+        build = process_time() - began
+        plant_s, agents_s, clock_s = timed_run(plant, configured, built, folder / "run")
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1e6 if sys.platform == "darwin" else 1e3)
     return {
-        f"inprocess.tick.{graph}.{agents}": (times["plant_s"] + times["agents_s"]) / count,
-        f"inprocess.link.{graph}.{agents}": times["agents_s"] / count / links(graph, agents),
+        "read_s": read,
+        "build_s": build,
+        "plant_per_s": plant_s / end,
+        "agents_per_s": agents_s / end,
+        "of_real_time": (agents_s + plant_s) / end,
+        "by_the_clock": clock_s / end,
+        "us_per_message": 1e6 * agents_s / (4 * agents) / (end / T_c),
+        "memory_MB": memory,
     }
 
 
-@contextmanager
-def _folder() -> Iterator[Path]:
-    """Give a folder that lasts as long as the bench: the plant reads its tables when it is built."""
-    _kept.append(tempfile.TemporaryDirectory(prefix="gp-scale-"))
-    yield Path(_kept[-1].name)
+def timed_run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> tuple[float, float, float]:
+    """Run and record one case in this process; return times (s) from its first row on.
+
+    Returns
+    -------
+    tuple
+        Processor time of the plant at its interface and of all else, and the time by the clock.
+    """
+    assert plant.end is not None
+    spent = 0.0
+    first: list[tuple[float, float, float]] = []
+
+    def timed(function: Callable[..., Any]) -> Callable[..., Any]:
+        def call(*arguments: Any, **named: Any) -> Any:
+            nonlocal spent
+            began = process_time()
+            try:
+                return function(*arguments, **named)
+            finally:
+                spent += process_time() - began
+
+        return call
+
+    with ExitStack() as stack:
+        for name in ("advance", "measure", "hold", "take_rows"):
+            stack.enter_context(patch.object(Plant, name, timed(getattr(Plant, name))))
+        recorder = stack.enter_context(Recorder(folder))
+
+        def take(telemetry: Any) -> None:
+            if not first:
+                first.append((process_time(), spent, perf_counter()))
+            recorder(telemetry)
+
+        outcome = run_inprocess(plant, agents, take, plant=built)
+        ended, all_spent, then = process_time(), spent, perf_counter()
+        recorder.finish(plant.end, plant.record_step)
+    if outcome.broke:
+        raise RuntimeError(outcome.broke)
+    at, before, since = first[0]
+    plant_s = all_spent - before
+    return plant_s, ended - at - plant_s, then - since
 
 
-_kept: list[tempfile.TemporaryDirectory[str]] = []
+if __name__ == "__main__":
+    print(json.dumps(measure(int(sys.argv[1]), float(sys.argv[2]), float(sys.argv[3]))))

@@ -2,54 +2,38 @@
 
     python -m bench.soak                                          an hour
     python -m bench.soak --hours 0.05 --seed 2                    three minutes
-    python -m bench.soak --hours 1 --write docs/reliability.md    its table goes into the page
 
 Agents leave, join, are killed and frozen; links are cut, healed and impaired; loads and a switch change: by the
 commands of a user, drawn from the seed. Two agents stay all the time. Measured are memory (anonymous, resident) and
 open files of every process, late steps of the plant with what explains them, and how long all takes.
 
-SIGTERM or Ctrl-C ends the run after the disturbance that goes on; what there is is judged, and no page is written. A
-second one ends all at once. Exit code: 0 all limits are kept, 1 one is not, 2 bad usage, 3 the run broke, 130 and 143
-ended by Ctrl-C and SIGTERM.
+SIGTERM or Ctrl-C ends the run after the disturbance that goes on, and what there is is judged. A second one ends all at
+once. Exit code: 0 all limits are kept, 1 one is not, 2 bad usage, 3 the run broke, 130 and 143 ended by Ctrl-C and
+SIGTERM.
 """
 
 from __future__ import annotations
 
-import argparse
+import signal
 import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 from time import monotonic
+from types import FrameType
+from typing import Annotated
 
-from bench.harness import load, machine, say
-from bench.peers.machine_use import commit
-from bench.soak.judging import (
-    HEAL,
-    Finding,
-    files_of,
-    growths,
-    judge_checks,
-    judge_growth,
-    judge_late,
-    judge_times,
-    memory_of,
-    table,
-)
-from bench.soak.process_sizes import ProcessSize
+import pandas as pd
+import typer
+
+from bench.harness import commit, load, machine, markdown, say
+from bench.soak.judging import HEAL, Finding, Verdict, growths, judge_checks, judge_growth, judge_late, judge_times
+from bench.soak.process_looks import ProcessSize
 from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
-from bench.soak.stop_request import StopRequest, stop_request
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
 from scenarios.live.client.run_client import NobodyError
 from scenarios.schema import load_scenario
 from wire.messages import PLANT
-
-BEGIN, END = "<!-- python -m bench.soak -->", "<!-- end -->"
-"""Lines around the result in the page."""
-
-SHORTEST, LONGEST = 10.0 / 3600.0, 48.0
-"""Hours that a soak may last."""
 
 STAY = 2
 """Agents that are never replaced: the first leader and the first follower of the paper."""
@@ -61,41 +45,55 @@ SMALL = 100_000
 """Size (bytes) up to which a file is not worth a word."""
 
 
-def main(words: Sequence[str] | None = None) -> int:
-    """Run, print the table, and write it; return the exit code."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--hours", type=float, default=1.0, help="length by the clock (default 1)")
-    parser.add_argument("--seed", type=int, default=1, help="of the actions (default 1)")
-    parser.add_argument("--write", type=Path, metavar="PAGE", help=f"put the result between {BEGIN} and {END}")
-    parser.add_argument(
-        "--keep", type=Path, metavar="DIR", help="keep record, logs and sizes.csv in this folder, which is new"
-    )
-    given = parser.parse_args(words)
-    if not SHORTEST <= given.hours <= LONGEST:
-        parser.error(f"--hours: must be {SHORTEST:.3g} to {LONGEST:g}, got {given.hours:g}")
-    if given.write is not None and (wrong := _objection(given.write)):
-        parser.error(f"--write: {wrong}")
-    if given.keep is not None:
+class StopRequest:
+    """Handler of signals: it raises KeyboardInterrupt unless the soak can end well."""
+
+    def __init__(self) -> None:
+        self.disturbing = False
+        """Whether the run is disturbed now: then the first signal ends it well, after the disturbance."""
+        self.asked: signal.Signals | None = None
+        """The signal that asked for it."""
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Note the first request while the run is disturbed; raise at any other."""
+        first, self.asked = self.asked is None, self.asked or signal.Signals(number)
+        if not (first and self.disturbing):
+            raise KeyboardInterrupt
+
+    @property
+    def exit_code(self) -> int:
+        """Exit code of a soak that it ended: 128 and the number of the signal; 0 of one that it did not."""
+        return 0 if self.asked is None else 128 + self.asked
+
+
+def main(
+    hours: Annotated[float, typer.Option(min=10.0 / 3600.0, max=48.0, help="Length by the clock.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Of the actions.")] = 1,
+    keep: Annotated[
+        Path | None, typer.Option(help="Keep record, logs and sizes.csv in this folder, which is new.")
+    ] = None,
+) -> None:
+    """Run the paper's feeder by the clock, disturb it every few seconds, and print the table of what was found."""
+    if keep is not None:
         try:
-            given.keep.mkdir(parents=True)
+            keep.mkdir(parents=True)
         except OSError as error:
-            parser.error(f"--keep: {given.keep}: {error.strerror}; name a folder that does not exist yet")
+            raise typer.BadParameter(f"{keep}: {error.strerror}; name a folder that does not exist yet") from None
     print(machine(), flush=True)
-    with stop_request() as stop, tempfile.TemporaryDirectory(prefix="gridpeers-soak-") as name:
+    stop = StopRequest()
+    for number in (signal.SIGINT, signal.SIGTERM):  # even if the shell lets them be ignored, as in the background
+        signal.signal(number, stop)
+    with tempfile.TemporaryDirectory(prefix="gridpeers-soak-") as name:
         try:
-            text, kept = soak(given.keep or Path(name), 3600.0 * given.hours, given.seed, stop)
+            text, kept = soak(keep or Path(name), 3600.0 * hours, seed, stop)
         except (SoakError, NobodyError) as error:
             print(f"the run broke: {error}", file=sys.stderr)
-            return 3
+            raise typer.Exit(3) from None
         except KeyboardInterrupt:
             print("interrupted; nothing is judged", file=sys.stderr)
-            return stop.exit_code
+            raise typer.Exit(stop.exit_code) from None
     print(text, flush=True)
-    if stop.asked is not None:
-        return stop.exit_code
-    if given.write is not None:
-        write(given.write, text)
-    return 0 if kept else 1
+    raise typer.Exit(stop.exit_code or (0 if kept else 1))
 
 
 def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[str, bool]:
@@ -122,9 +120,10 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
         lasted, stop.disturbing = monotonic() - calm, False
         say("the run ends, and makes its report")
         end = run.finish()
-    rows = [",".join(ProcessSize._fields), *(",".join(map(str, one)) for one in run.sizes)]
-    (folder / "sizes.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
-    findings = judged(run, end, lasted, (PLANT, "command", *stays))
+    pd.DataFrame(run.sizes, columns=ProcessSize._fields).to_csv(folder / "sizes.csv", index=False)
+    stayed = (PLANT, "command", *stays)
+    sizes = {"memory (MB)": growths(run.sizes, "memory", stayed), "open files": growths(run.sizes, "files", stayed)}
+    findings = [judge_growth(what, rows, lasted) for what, rows in sizes.items()] + judged(run, end)
     for late in run.late:
         causes = "; ".join(late.causes) or "UNEXPLAINED"
         print(f"t = {late.t:.1f} s: {late.steps} late, the plant waited {1e3 * late.waited:.0f} ms: {causes}")
@@ -133,10 +132,8 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
             print(f"t = {timed.t:.1f} s: {timed.what} took {timed.seconds:.2f} s: {timed.of}{' (deaf)' * timed.deaf}")
     for problem in run.problems:
         print(problem)
-    for what, of in (("memory (MB)", memory_of), ("open files", files_of)):
-        print(f"{what:24}{'warm':>9}{'last':>9}{'growth':>9}")
-        for growth in growths(run.sizes, of, (PLANT, "command", *stays)):
-            print(f"{growth.name:24}{growth.before:9.1f}{growth.after:9.1f}{100.0 * growth.part:8.1f} %")
+    for what, rows in sizes.items():
+        print(f"\n{what}\n{pd.DataFrame(rows, columns=['', 'warm', 'last']).to_string(index=False)}")
     length = f"{lasted / 60.0:.0f} min"
     if stop.asked is not None:
         length = f"ended after {length} of {seconds / 60.0:.0f} by {stop.asked.name}"
@@ -145,15 +142,14 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
         f"load (1, 5, 15 min) {before} before and {load()} after"
     )
     print(f"{monotonic() - began:.0f} s in all")
-    return f"{about}.\n\n{table(findings)}", all(one.verdict != "FAIL" for one in findings)
+    return f"{about}.\n\n{markdown(('what', 'limit', 'found', ''), findings)}", all(
+        one.verdict != "FAIL" for one in findings
+    )
 
 
-def judged(run: SoakRun, end: SoakEnd, lasted: float, stays: Sequence[str]) -> list[Finding]:
-    """Return the rows of the result."""
-    found = []
-    for what, unit, of in (("memory", " MB", memory_of), ("open files", "", files_of)):
-        found.append(judge_growth(what, unit, growths(run.sizes, of, stays), lasted))
-    found.append(judge_late(run.late, run.steps))
+def judged(run: SoakRun, end: SoakEnd) -> list[Finding]:
+    """Return the rows of the result but those of growth."""
+    found = [judge_late(run.late, run.steps)]
     for what, name, limit in (
         ("heal", "end of a cut or freeze until both sides use each other", HEAL),
         ("told", "kill -9 until the plant tells it and nobody uses the agent", None),
@@ -166,9 +162,8 @@ def judged(run: SoakRun, end: SoakEnd, lasted: float, stays: Sequence[str]) -> l
     heals = [timed.t for timed in run.times if timed.what == "heal"]
     found.append(judge_checks(end.checks, end.silences, run.kills, heals))
     wrong = [*run.problems, *([] if end.status == 0 else [f"gridpeers up ended with {end.status}"])]
-    found.append(Finding("commands and processes", "none fails", "; ".join(wrong[:3]) or "all as asked", "PASS"))
-    if wrong:
-        found[-1] = found[-1]._replace(verdict="FAIL")
+    verdict: Verdict = "FAIL" if wrong else "PASS"
+    found.append(Finding("commands and processes", "none fails", "; ".join(wrong[:3]) or "all as asked", verdict))
     files = ", ".join(f"{name} {size / 1e6:.1f} MB" for name, size in end.files.items() if size > SMALL)
     found.append(Finding("files of the run", "", files, "-"))
     report = f"{end.report_s:.0f} s, up to {end.peak_MB:.0f} MB"
@@ -176,22 +171,8 @@ def judged(run: SoakRun, end: SoakEnd, lasted: float, stays: Sequence[str]) -> l
     return found
 
 
-def _objection(page: Path) -> str:
-    """Return why a page cannot take the result; "" if it can."""
-    try:
-        text = page.read_text(encoding="utf-8")
-    except OSError as error:
-        return f"{page}: {error.strerror}"
-    if END not in text.partition(BEGIN)[2]:
-        return f"{page}: has no lines {BEGIN} and {END}; put them where the result belongs"
-    return ""
-
-
-def write(page: Path, text: str) -> None:
-    """Put the result between the lines of a page that are for it."""
-    before, _, rest = page.read_text(encoding="utf-8").partition(BEGIN)
-    page.write_text(f"{before}{BEGIN}\n{text}\n{END}{rest.partition(END)[2]}", encoding="utf-8")
-
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
+app.command()(main)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    app()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+import pandas as pd
 
-from bench.soak.late_steps import LateSteps
-from bench.soak.process_sizes import ProcessSize
+from bench.soak.process_looks import LateSteps, ProcessSize
 from scenarios.checks.check_verdict import CheckVerdict, Violation, summary
 
 FLAT = 0.05
@@ -78,67 +77,49 @@ class Growth(NamedTuple):
         return round(self.after / self.before - 1.0, 6)
 
 
-def memory_of(size: ProcessSize) -> float:
-    """Return the memory of a process (MB)."""
-    return size.memory
-
-
-def files_of(size: ProcessSize) -> float:
-    """Return how many files a process has open."""
-    return float(size.files)
-
-
-def growths(sizes: Sequence[ProcessSize], of: Callable[[ProcessSize], float], stays: Iterable[str]) -> list[Growth]:
+def growths(sizes: Sequence[ProcessSize], of: Literal["memory", "files"], stays: Iterable[str]) -> list[Growth]:
     """Return the growth of each process that stays, of young agents, and of all processes together.
 
     Parameters
     ----------
     sizes : Sequence[ProcessSize]
         All looks, in the order of time; one look at all processes has one time.
-    of : Callable
+    of : str
         The size that is compared.
     stays : Iterable[str]
         Processes that run all the time.
     """
     if not sizes:
         return []
-    begin, end = sizes[0].at, sizes[-1].at
-    length = end - begin
-    spans = (begin + WARM * length, begin + (WARM + SPAN) * length), (end - SPAN * length, end)
+    all_of = pd.DataFrame(sizes, columns=ProcessSize._fields)
+    begin, length = all_of["at"].iloc[0], all_of["at"].iloc[-1] - all_of["at"].iloc[0]
+    age = all_of["at"] - all_of["born"]
 
-    def between(chosen: Iterable[tuple[float, float]]) -> tuple[float, float]:
-        points = list(chosen)
-        before, after = ([x for at, x in points if low <= at <= high] for low, high in spans)
-        return (float(np.median(before)), float(np.median(after))) if before and after else (np.nan, np.nan)
+    def between(part: pd.Series[float]) -> tuple[float, float]:
+        """Return the medians after the warm-up and at the end of a size by time."""
+        share = (part.index.to_numpy() - begin) / length
+        warm, last = part[(share >= WARM) & (share <= WARM + SPAN)], part[share >= 1.0 - SPAN]
+        return float(warm.median()), float(last.median())
 
-    found = [Growth(name, *between((one.at, of(one)) for one in sizes if one.name == name)) for name in stays]
-    young: dict[tuple[int, float], ProcessSize] = {}
-    for one in sizes:
-        if YOUNG[0] <= one.age <= YOUNG[1] and one.born > begin:
-            young.setdefault((one.pid, one.born), one)
-    ordered = sorted(young.values(), key=lambda one: one.born)
-    if len(ordered) >= STARTS:
-        middle = len(ordered) // 2
-        early, late = ([of(one) for one in half] for half in (ordered[:middle], ordered[middle:]))
-        found.append(Growth("agents of the same age", float(np.median(early)), float(np.median(late))))
-    looks: dict[float, list[ProcessSize]] = {}
-    for one in sizes:
-        looks.setdefault(one.at, []).append(one)
-    usual = Counter(map(len, looks.values())).most_common(1)[0][0]
-    whole = [(at, sum(map(of, look))) for at, look in looks.items() if len(look) == usual]
-    return [*found, Growth("all together", *between(whole))]
+    found = [Growth(name, *between(all_of[all_of["name"] == name].set_index("at")[of])) for name in stays]
+    young = all_of[age.between(*YOUNG) & (all_of["born"] > begin)].groupby(["born", "pid"])[of].first()
+    if len(young) >= STARTS:
+        middle = len(young) // 2
+        found.append(Growth("agents of the same age", young.iloc[:middle].median(), young.iloc[middle:].median()))
+    looks = all_of.groupby("at")[of].agg(["sum", "size"])
+    return [*found, Growth("all together", *between(looks["sum"][looks["size"] == looks["size"].mode()[0]]))]
 
 
-def judge_growth(what: str, unit: str, found: Sequence[Growth], seconds: float) -> Finding:
+def judge_growth(what: str, found: Sequence[Growth], seconds: float) -> Finding:
     """Return whether something stayed flat over a run of some length (s)."""
     known = [one for one in found if one.part == one.part]
     if not known:
         return Finding(what, f"flat within {100 * FLAT:g} %", "too short a run", "-")
     worst = max(known, key=lambda one: one.part)
     whole = next((one for one in known if one.name == "all together"), worst)
-    text = f"at most {100 * worst.part:+.1f} % ({worst.name}: {worst.before:.1f} to {worst.after:.1f}{unit})"
+    text = f"at most {100 * worst.part:+.1f} % ({worst.name}: {worst.before:.1f} to {worst.after:.1f})"
     if worst is not whole:
-        text += f"; all together {100 * whole.part:+.1f} % ({whole.before:.1f} to {whole.after:.1f}{unit})"
+        text += f"; all together {100 * whole.part:+.1f} % ({whole.before:.1f} to {whole.after:.1f})"
     verdict: Verdict = "-" if seconds < LEAST else "PASS" if worst.part <= FLAT else "FAIL"
     return Finding(what, f"flat within {100 * FLAT:g} %", text, verdict)
 
@@ -226,9 +207,3 @@ def _were_killed(silences: Sequence[Violation], kills: Sequence[tuple[str, float
         name == killed and abs(t - when) <= NOTICED
         for (name, t), (killed, when) in zip(silent, sorted(kills), strict=True)
     )
-
-
-def table(findings: Iterable[Finding]) -> str:
-    """Return the rows as a table of Markdown."""
-    rows = [("what", "limit", "found", ""), ("---",) * 4, *findings]
-    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows)

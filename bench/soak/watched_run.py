@@ -6,6 +6,7 @@ They are `gridpeers up` with a record, and `gridpeers agent` for every agent tha
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -18,21 +19,97 @@ from typing import NamedTuple, Self
 import numpy as np
 
 import gridpeers as gp
-from bench.harness import GRIDPEERS
-from bench.live_processes import BUILD, LiveProcesses
-from bench.long_runs import processes, processor_time, size
+from bench.harness import GRIDPEERS, processor_time
 from bench.soak.judging import LAST_WORDS
-from bench.soak.late_steps import LateSteps, Start, late_steps
-from bench.soak.process_sizes import MachineTime, ProcessSize, machine_time, size_of, waiting_times
+from bench.soak.process_looks import (
+    LateSteps,
+    MachineTime,
+    ProcessSize,
+    Start,
+    late_steps,
+    machine_time,
+    processes,
+    size,
+    size_of,
+    waiting_times,
+)
 from bench.soak.soak_monitor import HOLD, SoakMonitor
 from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.checks.checks_file import FILE as CHECKS
 from scenarios.checks.checks_file import read_verdicts
 from scenarios.checks.communication.last_words_check import LastWords
+from scenarios.drivers.free_endpoint import free_endpoint
+from scenarios.live.client.run_address import RunAddress
 from scenarios.live.client.run_client import RunClient
 from scenarios.live.show.watching import RunSubscriber
 from scenarios.record.record_info import FILE as RECORD
 from wire.messages import PLANT
+
+BUILD = 300.0
+"""Longest wait (s) for a run to begin: the plant may be compiled first."""
+
+END = 20.0
+"""Longest wait (s) for a process that was asked to end."""
+
+
+class LiveProcesses:
+    """The processes of one run. Use it as a context: none is left.
+
+    Each is in a session of its own: the Ctrl-C of a terminal reaches the bench alone, which ends them.
+
+    Parameters
+    ----------
+    folder : Path
+        For the logs; the processes work there.
+    run : str
+        Name of the run.
+    """
+
+    def __init__(self, folder: Path, run: str) -> None:
+        endpoint = free_endpoint()
+        self.folder = folder
+        self.address = RunAddress(run=run, connect=(endpoint,))
+        """Where clients find the run."""
+        self.listen = ["--run", run, "--listen", endpoint]
+        """Options of the command that has the plant."""
+        self.connect = ["--run", run, "--connect", endpoint]
+        """Options of all other commands."""
+        self._children: list[subprocess.Popen[bytes]] = []
+
+    def start(self, name: str, *words: str) -> subprocess.Popen[bytes]:
+        """Start a command by its words; what it prints is in `printed(name)`."""
+        with self._log(name).open("wb") as log:
+            child = subprocess.Popen(
+                [*GRIDPEERS, *words], stdout=log, stderr=log, cwd=self.folder, start_new_session=True
+            )
+        self._children.append(child)
+        return child
+
+    def printed(self, name: str) -> str:
+        """Return what the command of this name has printed so far."""
+        return self._log(name).read_text(errors="replace")
+
+    def _log(self, name: str) -> Path:
+        return self.folder / f"{name}.log"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End all processes that still run."""
+        running = [child for child in self._children if child.poll() is None]
+        for child in running:
+            child.send_signal(signal.SIGCONT)  # a frozen one would not end
+            child.send_signal(signal.SIGTERM)
+        for child in running:
+            try:
+                child.wait(END)
+            except subprocess.TimeoutExpired:
+                child.kill()
+                child.wait()
+
 
 CALM = 6.0
 """Run time (s) at which both events of the scenario are over."""

@@ -5,8 +5,16 @@ import sys
 
 import pytest
 
-from bench.peers.failure import GRIDPEERS, checked, reason
+from bench.harness import GRIDPEERS, checked, own_time, reason
 from bench.peers.measured import Measure, measure_in_turns
+
+BURN = """
+import time
+while time.process_time() < 0.4:
+    pass
+print("done", flush=True)
+input()
+"""
 
 
 def fails() -> dict[str, float]:
@@ -15,21 +23,18 @@ def fails() -> dict[str, float]:
 
 
 def test_a_rival_without_its_package_or_that_fails_is_left_out_and_named() -> None:
-    """The others are measured all the same, in every round; the values that are missing have the reason."""
+    """The others are measured all the same, in every round."""
     measures = [
         Measure("ours", lambda: {"ours": 2.0}),
-        Measure("theirs", lambda: {"theirs": 1.0}, "no-such-rival", values=("theirs.tick",)),
-        Measure("broken", fails, values=("broken.tick",)),
-        Measure("seldom", lambda: {"seldom": 3.0}, rounds=1),
+        Measure("theirs", lambda: {"theirs": 1.0}, "no-such-rival"),
+        Measure("broken", fails),
     ]
 
     part = measure_in_turns(lambda: measures, rounds=3)
 
-    assert part.values == {"ours": [2.0] * 3, "seldom": [3.0]}
+    assert part.values == {"ours": [2.0] * 3}
     assert part.left_out["theirs"] == "no-such-rival is not installed: pip install 'gridpeers[bench]'"
     assert part.left_out["broken"] == "ValueError: no broker ... broker.log: no room"
-    assert part.missing["broken.tick"] == "broken: ValueError: no broker ... broker.log: no room"
-    assert set(part.missing) == {"broken.tick", "theirs.tick"}
     assert part.failed
     assert len(part.loads) == 4
 
@@ -72,3 +77,17 @@ def test_a_command_that_fails_is_named_as_a_person_types_it_with_its_last_line()
 
     assert line.startswith("`gridpeers run no-such-scenario` ended with 2: ")
     assert "\n" not in line
+
+
+def test_the_processor_time_of_a_child_is_ours_while_it_lives_and_when_it_has_ended() -> None:
+    """Servers of plant and agents live on between cases: as other programs they would spoil the verdict on the load."""
+    before = own_time()
+    with subprocess.Popen([sys.executable, "-c", BURN], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as child:
+        assert child.stdout is not None
+        assert child.stdout.readline() == b"done\n"
+
+        assert own_time() - before > 0.35
+
+        child.communicate(b"\n")
+
+    assert 0.35 < own_time() - before < 5.0
