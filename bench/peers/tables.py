@@ -48,7 +48,7 @@ def tables_text(parts: Mapping[str, PartRun]) -> str:
     """Return the tables; a ratio whose value is missing has no row, and what was left out stands at the end."""
     values = pd.DataFrame(
         [
-            (name, value, "runs/s" if name == "sweep" else _unit(value), *_spread(pd.Series(rounds)))
+            (name, value, _unit(value), *_spread(pd.Series(rounds)))
             for name, part in parts.items()
             for value, rounds in part.values.items()
         ],
@@ -70,7 +70,9 @@ def _spread(rounds: pd.Series[float]) -> tuple[float, float, float, int]:
 
 
 def _unit(value: str) -> str:
-    return {"us_per_message": "us", "memory_MB": "MB"}.get(value.rpartition(".")[2], "s")
+    return {"us_per_message": "us", "memory_MB": "MB", "sweep": "runs/s", "whole": "runs/s"}.get(
+        value.rpartition(".")[2], "s"
+    )
 
 
 def _ratio(ratio: Ratio, parts: Mapping[str, PartRun]) -> tuple[float, ...] | None:

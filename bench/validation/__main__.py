@@ -1,53 +1,69 @@
-"""Runs the cross-validation and writes docs/validation.md: python -m bench.validation [PART ...]."""
+"""The plant beside other simulators, and beside itself at smaller steps: python -m bench.validation [PART ...].
+
+It prints the tables of docs/validation.md. Exit code: 0 all limits are kept, 1 one is broken, 2 a part cannot run.
+"""
 
 from __future__ import annotations
 
-import argparse
-import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
+from typing import Annotated
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
+import typer
 
-from bench.harness import say
-from bench.validation.validation_page import DOCS, write_page
+from bench.harness import markdown, say
+from bench.validation.autotests_part import AUTOTESTS
+from bench.validation.convergence_part import CONVERGENCE
+from bench.validation.grid_forming_part import GRID_FORMING
+from bench.validation.gridlabd_part import GRIDLABD
+from bench.validation.power_flow_part import POWER_FLOW
+from bench.validation.random_feeders_part import RANDOM_FEEDERS
 from bench.validation.validation_part import CaseResult, ValidationPart
-from bench.validation.validation_parts import PARTS
+
+PARTS = {part.name: part for part in (POWER_FLOW, GRIDLABD, AUTOTESTS, GRID_FORMING, CONVERGENCE, RANDOM_FEEDERS)}
+"""In the order of the page."""
 
 
 def main(
-    arguments: Sequence[str] | None = None, all_parts: Sequence[ValidationPart] = PARTS, folder: Path = DOCS
-) -> int:
-    """Run parts and write the page: 0 all limits are kept, 1 one is broken, 2 a part cannot run."""
-    parser = argparse.ArgumentParser(prog="python -m bench.validation", description="Write docs/validation.md.")
-    names = ", ".join(part.name for part in all_parts)
-    parser.add_argument("parts", nargs="*", metavar="part", help=f"{names}; all of them by default")
-    given = parser.parse_args(arguments).parts
-    if unknown := [name for name in given if name not in names.split(", ")]:
-        parser.error(f'part "{unknown[0]}": there is no such part; choose from {names}')
-    chosen = [part for part in all_parts if not given or part.name in given]
+    parts: Annotated[
+        list[str] | None, typer.Argument(help=f"{', '.join(PARTS)}; all of them by default.", show_default=False)
+    ] = None,
+) -> None:
+    """Run parts of the cross-validation, and print a table of each."""
+    if unknown := [name for name in parts or () if name not in PARTS]:
+        raise typer.BadParameter(f'part "{unknown[0]}": there is no such part; choose from {", ".join(PARTS)}')
+    chosen = [PARTS[name] for name in parts or PARTS]
     if missing := [part.missing() for part in chosen if part.missing()]:
         print("\n".join(missing), file=sys.stderr)
-        return 2
-    results: dict[str, list[CaseResult]] = {}
+        raise typer.Exit(2)
     broken = []
     for part in chosen:
+        results = []
         for case in part.cases:
             say(f"{part.name}: {case}")
-            result = part.run(case)
-            results.setdefault(part.name, []).append(result)
-            broken += [f"{part.name}: {problem}" for problem in result.broken()]
-            numbers = ", ".join(
-                f"{check.quantity} {check.text()} ({'at least' if check.at_least else 'at most'} {check.limit:g})"
-                for check in result.checks
-            )
-            print(f"  {'holds' if not result.broken() else 'BROKEN'}: {numbers}")
-    print(write_page(all_parts, results, folder))
-    if broken:
-        print("\n".join(broken), file=sys.stderr)
-    return 1 if broken else 0
+            results.append(part.run(case))
+        print(f"\n{part.name}, compared with {part.references()}\n\n{table(part, results)}", flush=True)
+        broken += [f"{part.name}: {problem}" for result in results for problem in result.broken()]
+    print("\n".join(broken), end="\n" if broken else "", file=sys.stderr)
+    raise typer.Exit(1 if broken else 0)
 
+
+def table(part: ValidationPart, results: Sequence[CaseResult]) -> str:
+    """Return the results of a part as Markdown: a row for each case, a column for each quantity and fact."""
+    quantities = list(dict.fromkeys(each.quantity for result in results for each in result.checks))
+    facts = list(dict.fromkeys(fact for result in results for fact in result.facts))
+    rows = []
+    for result in results:
+        values = {each.quantity: each.text() for each in result.checks}
+        limits = dict.fromkeys(f"{'>= ' if each.at_least else ''}{each.limit:g}" for each in result.checks)
+        numbers = [values.get(quantity, "") for quantity in quantities]
+        case = f"`{result.case}`: {part.cases[result.case]}"
+        rows.append([case, *numbers, ", ".join(limits), *(result.facts.get(fact, "") for fact in facts)])
+    return markdown(["case", *quantities, "limit", *facts], rows)
+
+
+app = typer.Typer(add_completion=False, rich_markup_mode=None)
+app.command()(main)
 
 if __name__ == "__main__":
-    sys.exit(main())
+    app()

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from functools import cache
 from math import sqrt
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from bench.validation.opendss.grid_forming_island import (
@@ -42,26 +40,6 @@ LIMIT = 1e-6
 
 M_Q = 0.05
 """Q-V droop of our GFM (pu)."""
-
-TEXT = f"""
-The microgrid feeder, islanded at {ISLANDING} with 3.4 MW of load, behind one grid-forming storage of 4 MVA
-(`ControlMode=GFM`) in both OpenDSS engines, and behind one GFM in ours. Every node's phasor and the storage's power are
-within {LIMIT:g} pu.
-
-- `snapshot`: OpenDSS holds 1 pu behind the impedance that it derives from the rating; so does our power flow.
-- `settled`: in its dynamics mode OpenDSS starts from zero voltage and has settled after 1 s. Our GFM, with that
-  impedance as its filter, starts from its equilibrium at OpenDSS's terminal voltage, and rests there for 1 s.
-- `shed`: {SHEDDING} opens and sheds 1.2 MW. The internal voltage does not jump: OpenDSS's is looked at 2 us later,
-  ours in the first network solution.
-- `regulated`: 1 s later in OpenDSS; ours after 5 s, with the V_set whose droop leads to OpenDSS's terminal voltage.
-  Ours turns at its own frequency, so its phasors are turned back to OpenDSS's at the terminal.
-
-OpenDSS's model goes no further. Its source stays at nominal frequency and angle zero: it has no P-f droop, so it cannot
-share power with a second one. It has no Q-V droop; phase A alone sets the magnitude, up to the limit of the rating. Its
-impedance follows from the rating, near 0.001 pu; it has no filter of its own. Before the controls settle, its voltage
-follows a law that has no counterpart here. With `conn=wye` the impedance of its source is wrong in both engines, and of
-zero sequence the engines have different ones: so the storage has `conn=delta`, behind a delta-wye transformer.
-"""
 
 CASES = {
     "snapshot": "power flow, 1 pu behind the source's impedance",
@@ -156,7 +134,7 @@ class GridFormingIsland:
 
 def _run(case: str) -> CaseResult:
     feeder = read_feeder("microgrid123", "main")
-    checks, curves, facts = [], {}, {}
+    checks, facts = [], {}
     for engine in ENGINES:
         island = GridFormingIsland(feeder, _solved(engine))
         V, f = (island.snapshot(), 60.0) if case == "snapshot" else island.dynamics(case)
@@ -168,14 +146,12 @@ def _run(case: str) -> CaseResult:
             ToleranceCheck(f"S, pu, {engine}", abs(S - S_theirs) / S_RATED, LIMIT),
         ]
         live = np.abs(V) > 0.0  # the zone that is shed has no voltage, here or there
-        curves[engine] = gap[live]
-        curves[f"V {engine}"] = (np.abs(theirs) / island.network.V_nom[island.nodes])[live]
         facts = {
             "nodes with voltage": f"{live.sum()} of {gap.size}",
             "P + jQ": f"{S.real / 1e3:.1f} kW + {S.imag / 1e3:.1f} kvar",
             "f, ours": f"{f:.4f} Hz",
         }
-    return CaseResult(case, tuple(checks), facts, curves)
+    return CaseResult(case, tuple(checks), facts)
 
 
 @cache
@@ -187,24 +163,4 @@ def _solved(engine: str) -> SolvedStates:
         return solve_scripts(engine, [(script, STATES)])[0]
 
 
-def _draw(results: Sequence[CaseResult]) -> Figure:
-    """Draw the voltages of the nodes, and the differences there, nodes in the order of their voltage."""
-    figure = Figure(figsize=(8.0, 2.8), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    engine = ENGINES[0]
-    for result in results:
-        order = np.argsort(result.curves[f"V {engine}"])
-        left.plot(result.curves[f"V {engine}"][order], linewidth=1.0, label=result.case)
-        right.semilogy(np.maximum(result.curves[engine][order], 1e-12), ".", markersize=2.0)
-    right.axhline(LIMIT, color="black", linestyle=":", linewidth=1.0)
-    left.set_ylabel("|V| (pu)")
-    right.set_ylabel(f"difference from {engine} (pu)")
-    for axes in (left, right):
-        axes.set_xlabel("node, by voltage")
-    figure.legend(*left.get_legend_handles_labels(), loc="outside right upper")
-    return figure
-
-
-GRID_FORMING = ValidationPart(
-    "grid-forming", "A grid-forming source, beside OpenDSS", TEXT, ENGINES, CASES, _run, _draw
-)
+GRID_FORMING = ValidationPart("grid-forming", ENGINES, CASES, _run)

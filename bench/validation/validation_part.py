@@ -1,14 +1,11 @@
-"""A part of the cross-validation: cases, each a row of its table, and one figure."""
+"""A part of the cross-validation: cases, each a row of its table."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from math import floor, log10
 from typing import NamedTuple
-
-from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 
 class ToleranceCheck(NamedTuple):
@@ -42,8 +39,6 @@ class CaseResult(NamedTuple):
     checks: tuple[ToleranceCheck, ...]
     facts: Mapping[str, str] = {}
     """Further columns: how many states, where the largest difference is. Nothing that changes from run to run."""
-    curves: Mapping[str, NDArray] = {}  # type: ignore[type-arg]
-    """Arrays for the part's figure, by name."""
 
     def broken(self) -> list[str]:
         """Return a sentence for each limit that is not kept."""
@@ -55,22 +50,16 @@ class CaseResult(NamedTuple):
 
 
 class ValidationPart(NamedTuple):
-    """A part of the cross-validation: its cases, how one is run, and how all are drawn."""
+    """A part of the cross-validation: its cases, and how one is run."""
 
     name: str
-    """On the command line, and of its figure's file."""
-    title: str
-    """Heading of its section of the page."""
-    text: str
-    """Markdown: what is compared with what, with which tolerance and why."""
+    """On the command line."""
     needs: tuple[str, ...]
     """Distributions of the reference programs: "gridlabd"."""
     cases: Mapping[str, str]
     """Each case's name, and what it is in a few words."""
     run: Callable[[str], CaseResult]
     """Run a case, by its name."""
-    draw: Callable[[Sequence[CaseResult]], Figure]
-    """Draw the part's figure from the results of all cases."""
     run_short: Callable[[str], CaseResult] | None = None
     """The same case in less time, with the same limits, for the tests; `run` if left out."""
 

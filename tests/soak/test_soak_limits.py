@@ -212,7 +212,7 @@ def test_a_frequency_is_restored_once_it_holds() -> None:
 def test_an_impossible_length_or_a_folder_that_exists_is_refused_before_anything_starts(tmp_path: Path) -> None:
     """One line each, with exit code 2."""
     for words, told in (
-        (["--hours", "0"], "'--hours': 0"),
+        (["--hours", "0"], "Invalid value for '--hours'"),
         (["--keep", str(tmp_path)], "name a folder that does not exist yet"),
     ):
         done = CliRunner().invoke(command.app, words, terminal_width=200)
