@@ -12,12 +12,12 @@ from typing import Annotated
 import typer
 
 from bench.harness import markdown, say
-from bench.validation.autotests_part import AUTOTESTS
-from bench.validation.convergence_part import CONVERGENCE
-from bench.validation.grid_forming_part import GRID_FORMING
-from bench.validation.gridlabd_part import GRIDLABD
-from bench.validation.power_flow_part import POWER_FLOW
-from bench.validation.random_feeders_part import RANDOM_FEEDERS
+from bench.validation.autotests import AUTOTESTS
+from bench.validation.both_plants import GRIDLABD
+from bench.validation.convergence import CONVERGENCE
+from bench.validation.grid_forming import GRID_FORMING
+from bench.validation.power_flow import POWER_FLOW
+from bench.validation.random_feeders import RANDOM_FEEDERS
 from bench.validation.validation_part import CaseResult, ValidationPart
 
 PARTS = {part.name: part for part in (POWER_FLOW, GRIDLABD, AUTOTESTS, GRID_FORMING, CONVERGENCE, RANDOM_FEEDERS)}

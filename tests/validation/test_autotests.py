@@ -2,8 +2,8 @@
 
 import pytest
 
-from bench.validation.autotests.secondary.island_tables import MILE, line_configs
-from bench.validation.autotests_part import AUTOTESTS
+from bench.validation.autotests import AUTOTESTS
+from bench.validation.secondary_feeder import MILE, line_configs
 from plant.tables import read_feeder
 from tests.validation.limits_kept import assert_limits_kept
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from bench.validation.convergence.dae_dynamics import DaeDynamics
-from bench.validation.convergence_part import CONVERGENCE
+from bench.validation.convergence import CONVERGENCE
+from bench.validation.reference_dynamics import DaeDynamics
 from tests.unit.plant.dynamics.circuits import GFL_D, GFM_D, inverter
 from tests.unit.plant.dynamics.test_single_phase import pair_of, single
 from tests.validation.limits_kept import assert_limits_kept

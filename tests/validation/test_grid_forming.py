@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.validation.grid_forming_part import GRID_FORMING
+from bench.validation.grid_forming import GRID_FORMING
 from tests.validation.limits_kept import assert_limits_kept
 
 

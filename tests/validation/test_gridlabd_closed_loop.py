@@ -2,8 +2,8 @@
 
 import pytest
 
-from bench.validation.gridlabd.compared_runs import RUNS
-from bench.validation.gridlabd_part import GRIDLABD
+from bench.validation.both_plants import GRIDLABD
+from bench.validation.gridlabd_runs import RUNS
 from tests.validation.limits_kept import assert_limits_kept
 
 

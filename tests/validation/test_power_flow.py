@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.validation.power_flow_part import POWER_FLOW, SWITCH_STATES
+from bench.validation.power_flow import POWER_FLOW, SWITCH_STATES
 from tests.validation.limits_kept import assert_limits_kept
 
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bench.validation.random_feeders_part import RANDOM_FEEDERS
+from bench.validation.random_feeders import RANDOM_FEEDERS
 from tests.validation.limits_kept import assert_limits_kept
 
 

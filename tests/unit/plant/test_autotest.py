@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from bench.validation.autotests.gfm_gfl_case import GFL, Z_LOAD4, gfm_gfl_circuit, gfm_gfl_dynamics
+from bench.validation.gfm_gfl import GFL, Z_LOAD4, gfm_gfl_circuit, gfm_gfl_dynamics
 
 # t label (s): published P_A (W, loose initial convergence), tight P_A (W), tight f (Hz)
 TRAJECTORY = {

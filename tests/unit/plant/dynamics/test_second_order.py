@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from bench.validation.autotests.gfm_gfl_case import gfm_gfl_circuit
+from bench.validation.gfm_gfl import gfm_gfl_circuit
 from plant.dynamics import Dynamics
 from plant.dynamics.kernel import gfl, gfm
 from plant.feeder import Plant

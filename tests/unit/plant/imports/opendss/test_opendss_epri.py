@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from bench.validation.opendss.opendss_engines import solve_scripts
-from bench.validation.opendss.write_opendss import write_opendss
+from bench.validation.opendss_engines import solve_scripts
+from bench.validation.write_opendss import write_opendss
 from plant.tables import read_feeder
 from tests.unit.plant.imports.opendss.opendss_scripts import (
     CONNECTIONS,

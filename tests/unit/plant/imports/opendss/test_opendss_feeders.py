@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bench.validation.opendss.write_opendss import write_opendss
+from bench.validation.write_opendss import write_opendss
 from plant.imports.opendss import read_opendss
 from plant.network import Network, solve_power_flow
 from plant.tables import read_feeder

@@ -1,19 +1,23 @@
-"""A random feeder in our plant: its start, a load step and a switching, and the same states for OpenDSS."""
+"""Part "random-feeders": random feeders beside OpenDSS, at the start, after a load step, and after a switching."""
 
 from __future__ import annotations
 
+import tempfile
 from cmath import phase as angle_of
+from functools import partial
 from math import degrees
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
-from bench.validation.random_feeders.random_script import RandomFeeder
-from plant.dynamics import Dynamics
+from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
+from bench.validation.random_script import RandomFeeder, Shape, random_feeder
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
+from plant.dynamics import Dynamics, PlantError
 from plant.dynamics.reduction import reduce_network
 from plant.equipment import Feeder, InverterRow
 from plant.equipment.named_loads import with_powers
@@ -22,6 +26,7 @@ from plant.feeder.installed_inverters import installed_inverters
 from plant.imports.opendss import read_opendss
 from plant.network import Network, solve_power_flow
 from plant.plant_config import PlantSettings
+from plant.tables import FeederError
 
 STEPS = 10
 """Steps of 2 ms from an event to the state that is compared."""
@@ -195,3 +200,57 @@ class _Run:
         V = self._voltages()
         flow = solve_power_flow(network, network.closed0, injection=fed, tolerance=1e-12, start=V)
         return float(np.max(np.abs(V - flow.V) / network.V_nom))
+
+
+LIMIT = 1e-6
+"""Largest difference of a phasor (pu of nominal voltage), and largest current that is left at a node (A)."""
+
+ALL, IN_TESTS = 250, 12
+"""Feeders of a case."""
+
+CASES = {"radial": f"{ALL} radial feeders", "meshed": f"{ALL} feeders with meshes"}
+
+
+def _run(case: str, count: int = ALL) -> CaseResult:
+    shape = next(shape for shape in get_args(Shape) if shape == case)
+    with tempfile.TemporaryDirectory() as folder:
+        scripts, found, refused = list[Path](), list[FeederStates](), list[Path]()
+        for seed in range(count):
+            drawn, script = random_feeder(seed, shape), Path(folder) / f"{case}{seed}.dss"
+            script.write_text(drawn.script, encoding="utf-8")
+            try:
+                found.append(run_states(drawn, script, dense=seed % 4 == 3))
+                scripts.append(script)
+            except (FeederError, PlantError, ArithmeticError):
+                refused.append(script)
+        checks = list[ToleranceCheck]()
+        falsely = set[Path]()
+        for engine in ENGINES:
+            theirs = solve_scripts(engine, [(script, s.commands) for script, s in zip(scripts, found, strict=True)])
+            largest = float(np.max([_largest(*pair) for pair in zip(found, theirs, strict=True)]))
+            checks.append(ToleranceCheck(f"V, pu, {engine}", largest, LIMIT))
+            plain = solve_scripts(engine, [(script, [()]) for script in refused])
+            falsely |= {script for script, each in zip(refused, plain, strict=True) if np.isfinite(each.V).all()}
+    checks += [
+        ToleranceCheck("start, pu, `solve_power_flow`", max(states.start for states in found), LIMIT),
+        ToleranceCheck("current left, A", max(states.residual for states in found), LIMIT),
+        ToleranceCheck("refused, but solved by an engine", float(len(falsely)), 0.0),
+    ]
+    facts = {
+        "feeders": str(count),
+        "refused": str(len(refused)),
+        "asymmetric": str(sum(states.asymmetry > 1e-3 for states in found)),
+        "with an island": str(sum(states.islanded > 0 for states in found)),
+        "nodes": str(sum(len(states.names) for states in found)),
+    }
+    return CaseResult(case, tuple(checks), facts)
+
+
+def _largest(ours: FeederStates, theirs: SolvedStates) -> float:
+    """Return the largest difference (pu) at any node of the engine in any state; nan where it found none."""
+    at = [ours.names.index(name) for name in theirs.nodes]
+    gaps = [np.abs(V[at] - theirs.V[k]) / ours.V_nom[at] for k, V in enumerate(ours.V)]
+    return float(np.max(gaps))
+
+
+RANDOM_FEEDERS = ValidationPart("random-feeders", ENGINES, CASES, _run, partial(_run, count=IN_TESTS))

@@ -1,28 +1,46 @@
-"""The secondary-control autotest in GridLAB-D, with its own machines and its own controller."""
+"""GridLAB-D's secondary-control autotest: its parameters, and its run with its own machines and its own controller.
+
+An island of IEEE 123 with four machines and four inverters rests; then a load of 411 kW comes on at bus 251, and a
+controller at bus 150 restores the frequency through two machines and two inverters.
+"""
 
 from __future__ import annotations
 
 from math import sqrt
 
-from bench.validation.autotests.delta_header import delta_header
-from bench.validation.autotests.recorded_run import COMPLEX, REAL, RecordedRun, record
-from bench.validation.autotests.secondary.island_tables import INVERTERS, island_tables
-from bench.validation.autotests.secondary.machines import MACHINES, machine_blocks
-from bench.validation.autotests.secondary.secondary_case import (
-    CONTROL_BUS,
-    DEVICES,
-    GFL,
-    GFM,
-    LEAST_OF_GEN4,
-    SHARES,
-    START_POWER,
-    SWITCH,
-    H,
-)
-from bench.validation.autotests.secondary.secondary_law import AUTOTEST, SecondarySettings
+from bench.validation.delta_mode import COMPLEX, REAL, RecordedRun, delta_header, record
+from bench.validation.machines import MACHINES, machine_blocks
+from bench.validation.secondary_feeder import INVERTERS, island_tables
+from bench.validation.secondary_law import AUTOTEST, SecondarySettings
+from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.gridlabd.model.glm_block import block
 from plant.gridlabd.model.glm_inverters import inverter_blocks
 from plant.gridlabd.model.glm_network import network_blocks
+
+H = 1e-3
+"""Step (s)."""
+
+SWITCH = "250-251"
+"""It connects the load."""
+
+GFM = GfmParameters(R_f=0.0025, X_f=0.05, P_max=1.2, k_pp=20.0, k_ip=60.0)
+GFL = GflParameters(model="current_source", frequency_watt=False, volt_var=False, P_min=0.0, S_max=1.0, i_max=1.0)
+
+START_POWER = {"Inv1": 240e3 + 0j, "Inv2": 700e3 + 500e3j, "Inv3": 0j, "Inv4": 0j}
+"""Powers of the inverters at the start (VA)."""
+
+SHARES = {"Gen1": 0.3, "Gen4": 0.2, "Inv1": 0.2, "Inv3": 0.3}
+"""Of the controller's output."""
+
+LEAST_OF_GEN4 = 0.3
+"""Its least set-point (pu); that of the others is 0."""
+
+DEVICES = (*START_POWER, *MACHINES)
+"""All sources: our inverters, then the machines."""
+
+CONTROL_BUS = "150"
+"""Where the controller measures the frequency; the bus of Gen1."""
+
 
 NODE = {
     **{name: f"n{bus}" for name, (_, bus, _) in INVERTERS.items()},

@@ -11,31 +11,112 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from bench.validation.autotests.delta_header import START
-from bench.validation.autotests.recorded_run import RecordedRun
-from bench.validation.autotests.secondary.bus_frequency import BusFrequency
-from bench.validation.autotests.secondary.default_impedances import with_impedances
-from bench.validation.autotests.secondary.island_tables import INVERTERS, V_NOM, island_tables, write_tables
-from bench.validation.autotests.secondary.machines import MACHINES, PHASES
-from bench.validation.autotests.secondary.replayed_machines import ReplayedMachines
-from bench.validation.autotests.secondary.secondary_case import (
+from bench.validation.delta_mode import START, RecordedRun
+from bench.validation.machines import MACHINES, PHASES
+from bench.validation.secondary_feeder import INVERTERS, V_NOM, island_tables, with_impedances, write_tables
+from bench.validation.secondary_gridlabd import (
     DEVICES,
     GFL,
     GFM,
+    INJECTION,
     LEAST_OF_GEN4,
+    NODE,
     SHARES,
     START_POWER,
     SWITCH,
     H,
 )
-from bench.validation.autotests.secondary.secondary_gridlabd import INJECTION, NODE
-from bench.validation.autotests.secondary.secondary_law import Participant, SecondaryControl
-from plant.dynamics import Inverter
+from bench.validation.secondary_law import Participant, SecondaryControl
+from plant.dynamics import Circuit, Dynamics, Inverter
+from plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
+from plant.dynamics.kernel.current_limit import solve_within_limits
+from plant.dynamics.live_network import TOLERANCE
 from plant.equipment import InverterRow
 from plant.equipment.imported_equipment import LinearElement
 from plant.feeder.circuits import circuit_of
 from plant.network import Network
 from plant.tables import read_feeder
+
+F_NOM = 60.0
+K_P, K_I = 10.0, 100.0
+"""Gains (rad/s per rad, rad/s^2 per rad): the defaults of GridLAB-D's nodes."""
+
+
+class BusFrequency:
+    """Three phase-locked loops that start locked at nominal frequency.
+
+    Parameters
+    ----------
+    V
+        Phasors of the bus at the start, in the frame of nominal frequency (V).
+    h
+        Step (s).
+    """
+
+    def __init__(self, V: NDArray[np.complex128], h: float) -> None:
+        self._h, self._theta, self._w = h, np.angle(V), np.zeros(3)
+
+    def measure(self, V: NDArray[np.complex128]) -> float:
+        """Return the frequency (Hz) during a step, from the phasors (V) at the end of the step before."""
+        error = np.imag(V * np.exp(-1j * self._theta)) / np.abs(V)
+        w = K_P * error + self._w
+        self._w = self._w + K_I * error * self._h
+        self._theta = self._theta + w * self._h
+        return float(F_NOM + w.mean() / (2.0 * np.pi))
+
+
+class ReplayedMachines(Dynamics):
+    """Dynamics that a caller takes from one network solution to the next.
+
+    A machine is an inverter without a controller: whatever its injection is when the network is solved, it stays.
+
+    Parameters
+    ----------
+    circuit
+        The network; the machines' admittances are part of it.
+    inverters
+        The inverters, then the machines as grid-following current sources.
+    machines
+        How many machines there are.
+    h
+        Step (s).
+    """
+
+    def __init__(self, circuit: Circuit, inverters: tuple[Inverter, ...], machines: int, h: float) -> None:
+        super().__init__(circuit, inverters, h)
+        self._machines = machines
+
+    def release(self) -> None:
+        """Take out the machines' controllers, which only `start` needs."""
+        units = self.inverters
+        kept = units.gfl_at < len(units) - self._machines
+        units.gfl_at, units.gfl, units.gfl_state = units.gfl_at[kept], units.gfl[kept], units.gfl_state[kept]
+        self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
+
+    def solve(self, J: NDArray[np.complex128], *, second: bool) -> NDArray[np.float64]:
+        """Solve the network with the machines' injections J (A, machines x 3), and pass the inverters' controllers.
+
+        Returns
+        -------
+        float64[n, READING]
+            As `Dynamics.run`, of this solution; 0 for the machines.
+        """
+        units, network, net = self.inverters, self.network, self.network.net
+        arrays = self.arrays()
+        n, m = len(units), net.S.size
+        if not second:
+            keep_start(arrays)
+        units.J[n - self._machines :] = J
+        rotation = np.empty(net.leader.size, complex)
+        turn_frames(arrays, net, np.zeros(n), rotation)
+        scale, work = float(units.V_b.max()), np.empty(12 * n + 6 * m)
+        I_b = np.empty(m, complex)
+        if solve_within_limits(net, arrays, rotation, network.x, I_b, TOLERANCE * scale, work) < 0:
+            raise RuntimeError("the network has no solution with the replayed machines")
+        out = np.zeros((n, READING))
+        advance_inverters(arrays, self.h, second, out)
+        return out
+
 
 CONTROLLED = DEVICES.index("Gen1")
 """The device at the controller's bus."""

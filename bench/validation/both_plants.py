@@ -1,4 +1,4 @@
-"""Our plant and GridLAB-D through the same run, step by step.
+"""Part "gridlabd": our plant and GridLAB-D through the same run, step by step.
 
 GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.model.glm` writes from the feeder's
 tables without the code of `plant.network`. Both plants start from their own equilibrium; in closed loop each has its
@@ -18,7 +18,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
-from bench.validation.gridlabd.compared_runs import ComparedRun, Reclosing, SinglePhase, shortened
+from bench.validation.gridlabd_runs import RUNS, SHORT, ComparedRun, Reclosing, SinglePhase, shortened
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
@@ -201,3 +202,31 @@ def _arranged(
     P, V = (np.array([getattr(unit, name) for unit in units]) for name in ("P_rated", "V_nom"))
     bases = np.column_stack([np.ones(len(units)), P, P, V, P, V])
     return table[:, 0], table[:, 1:].reshape(len(table), len(units), len(QUANTITIES)) / bases
+
+
+ANGLE_LIMIT = 0.1
+"""How far (deg) from its angle a switch may close: a step shifts it by as much."""
+
+
+def _run(case: str, factor: float = 1.0) -> CaseResult:
+    run = RUNS[case]
+    compared = compare(run, factor)
+    checks = [
+        ToleranceCheck(f"{quantity}, {unit}", float(compared.differences[quantity].max()), run.tolerance)
+        for quantity, unit in QUANTITIES.items()
+    ]
+    facts = {"closed at": ""}
+    if run.reclosing and compared.angles:
+        off = max(abs(angle - run.reclosing.angle) for angle in compared.angles)
+        checks.append(ToleranceCheck("angle, deg", off, ANGLE_LIMIT))
+        facts["closed at"] = f"-{compared.angles[0]:.2f} deg, GridLAB-D -{compared.angles[1]:.2f} deg"
+    return CaseResult(case, tuple(checks), facts)
+
+
+GRIDLABD = ValidationPart(
+    "gridlabd",
+    ("gridlabd",),
+    {name: run.text for name, run in RUNS.items()},
+    _run,
+    run_short=lambda case: _run(case, SHORT),
+)

@@ -1,22 +1,105 @@
 """The feeder of GridLAB-D's secondary-control autotest as tables: IEEE 123, islanded, with four inverters.
 
 The tables are those of `standard123` with what the autotest changes: conductors and distances instead of published
-impedances, no line charging, other loads and switches, and 2401.7 V as nominal voltage.
+impedances, no line charging, other loads and switches, and 2401.7 V as nominal voltage. Series impedances are those of
+the modified Carson equations and Kron's reduction: 60 Hz, earth of 100 ohm m; ohm per mile, distances in feet (W. H.
+Kersting, Distribution System Modeling and Analysis, 3rd ed., equations (4.39), (4.40), (4.55), (4.89) to (4.93)).
 """
 
 from __future__ import annotations
 
 import csv
-from math import pi, sqrt
+from collections.abc import Sequence
+from math import log, pi, sqrt
 from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
 
 import plant
-from bench.validation.autotests.secondary.line_constants import (
-    Conductor,
-    Impedance,
-    cable_impedance,
-    overhead_impedance,
-)
+from plant.equipment import Bus, Feeder, Line, LineConfig
+
+F, EARTH = 60.0, 100.0
+
+Impedance = NDArray[np.complex128]
+
+
+class Conductor(NamedTuple):
+    """One wire."""
+
+    R: float
+    """Resistance (ohm per mile)."""
+    gmr: float
+    """Geometric mean radius (ft)."""
+
+
+def overhead_impedance(
+    between: Sequence[Sequence[float]], to_neutral: Sequence[float], phase: Conductor, neutral: Conductor
+) -> Impedance:
+    """Return the impedance of a line with one neutral wire.
+
+    Parameters
+    ----------
+    between
+        Distances between the phases (ft), n x n.
+    to_neutral
+        Distances from the phases to the neutral (ft).
+    phase, neutral
+        Their wires.
+    """
+    n = len(to_neutral)
+    Z = np.empty((n + 1, n + 1), complex)
+    for i in range(n):
+        Z[i, i], Z[i, n], Z[n, i] = _own(phase), _mutual(to_neutral[i]), _mutual(to_neutral[i])
+        for j in range(n):
+            if i != j:
+                Z[i, j] = _mutual(between[i][j])
+    Z[n, n] = _own(neutral)
+    return _reduced(Z, n)
+
+
+def cable_impedance(
+    positions: Sequence[float], phase: Conductor, strand: Conductor, strands: int, radius: float
+) -> Impedance:
+    """Return the impedance of parallel cables with concentric neutrals.
+
+    Parameters
+    ----------
+    positions
+        Places of the cables along a line (ft).
+    phase, strand
+        The core and one strand of the neutral.
+    strands, radius
+        How many strands there are, and on which circle (ft).
+    """
+    n = len(positions)
+    neutral = Conductor(strand.R / strands, (strand.gmr * strands * radius ** (strands - 1)) ** (1.0 / strands))
+    Z = np.empty((2 * n, 2 * n), complex)
+    for i in range(2 * n):
+        for j in range(2 * n):
+            a, b = i % n, j % n
+            if i == j:
+                Z[i, i] = _own(phase if i < n else neutral)
+            else:
+                Z[i, j] = _mutual(radius if a == b else abs(positions[a] - positions[b]))
+    return _reduced(Z, n)
+
+
+def _own(wire: Conductor) -> complex:
+    return wire.R + _mutual(wire.gmr)
+
+
+def _mutual(distance: float) -> complex:
+    return complex(0.00158836 * F, 0.00202237 * F * (log(1.0 / distance) + 7.6786 + log(EARTH / F) / 2.0))
+
+
+def _reduced(Z: Impedance, n: int) -> Impedance:
+    """Return the impedance of the first n wires, with the others at zero voltage."""
+    reduced: Impedance = Z[:n, :n] - Z[:n, n:] @ np.linalg.solve(Z[n:, n:], Z[n:, :n])
+    return reduced
+
 
 V_NOM = 2401.7
 """Nominal voltage (V, line-to-neutral)."""
@@ -172,3 +255,48 @@ def _impedances() -> dict[str, tuple[str, Impedance]]:
     radius = (1.06 - 0.0640837) / 24.0
     impedances["12"] = "ABC", cable_impedance((0.0, 0.5, 1.0), core, core, 6, radius)
     return impedances
+
+
+Z_SWITCH = 1e-4 - 1e-4j
+"""Of each phase of a closed switch (ohm); found by fitting, good to 1e-9 ohm."""
+
+Z_REGULATOR = 1e-4 + 0j
+"""Of each phase of a regulator, on its regulated side (ohm): GridLAB-D's `default_resistance`."""
+
+
+def with_impedances(feeder: Feeder) -> Feeder:
+    """Give the feeder with an impedance in series with every switch and every regulator."""
+    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    phases: dict[tuple[str, str], str] = {}
+    lines: list[Line] = []
+
+    def between(device: str, bus: str, phase: str, config: str) -> str:
+        """Put the impedance between a device and its bus; returns the new bus, where the device goes."""
+        new = f"{device}~{bus}"
+        phases[new, bus] = "".join(sorted(phases.get((new, bus), "") + phase))
+        lines.append(Line(name=f"{new} {phase}", from_bus=new, to_bus=bus, phases=phase, config=config, length=1.0))
+        return new
+
+    switches = tuple(
+        replace(switch, from_bus=between(switch.name, switch.from_bus, switch.phases, "switch"))
+        for switch in feeder.switches
+    )
+    regulators = tuple(
+        replace(unit, to_bus=between(unit.name, unit.to_bus, unit.phases, "regulator")) for unit in feeder.regulators
+    )
+    buses = tuple(Bus(name=new, phases=of, V_nom=V_nom[bus]) for (new, bus), of in phases.items())
+    configs = (_config("switch", Z_SWITCH), _config("regulator", Z_REGULATOR))
+    return replace(
+        feeder,
+        buses=(*feeder.buses, *buses),
+        lines=(*feeder.lines, *lines),
+        line_configs=(*feeder.line_configs, *configs),
+        switches=switches,
+        regulators=regulators,
+    )
+
+
+def _config(name: str, Z: complex) -> LineConfig:
+    """Give a kind of line with this impedance per km, without coupling between its phases."""
+    series = tuple(tuple(Z if i == j else 0j for j in range(3)) for i in range(3))
+    return LineConfig(name=name, phases="ABC", Z=series, B=((0.0,) * 3,) * 3)

@@ -1,1 +1,0 @@
-"""OpenDSS as the reference: its two engines, a feeder of our tables as its script."""
