@@ -1,4 +1,4 @@
-"""The plant beside other simulators, and beside itself at smaller steps: python -m bench.validation [PART ...].
+"""The plant beside other simulators: python -m bench.validation [PART ...].
 
 It prints the tables of docs/validation.md. Exit code: 0 all limits are kept, 1 one is broken, 2 a part cannot run.
 """
@@ -14,13 +14,12 @@ import typer
 from bench.harness import markdown, say
 from bench.validation.autotests import AUTOTESTS
 from bench.validation.both_plants import GRIDLABD
-from bench.validation.convergence import CONVERGENCE
 from bench.validation.grid_forming import GRID_FORMING
 from bench.validation.power_flow import POWER_FLOW
 from bench.validation.random_feeders import RANDOM_FEEDERS
 from bench.validation.validation_part import CaseResult, ValidationPart
 
-PARTS = {part.name: part for part in (POWER_FLOW, GRIDLABD, AUTOTESTS, GRID_FORMING, CONVERGENCE, RANDOM_FEEDERS)}
+PARTS = {part.name: part for part in (POWER_FLOW, GRIDLABD, AUTOTESTS, GRID_FORMING, RANDOM_FEEDERS)}
 """In the order of the page."""
 
 
