@@ -9,9 +9,9 @@ from time import monotonic, perf_counter
 from typing import Protocol
 
 import msgspec
-from bench.peers.mesh_transports import ZenohTransport, ZeromqTransport, run_federate
 
 from bench.peers.mesh import DEADLINE, HUB, WARM_UP, MeshMember
+from bench.peers.mesh_transports import ZenohTransport, ZeromqTransport, run_federate
 
 GREETING = 0.05
 """Time (s) between two greetings, by which all make sure to hear each other before anything is measured."""

@@ -62,7 +62,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
         If GridLAB-D is missing, or ended.
     """
     scenario, feeder = load_scenario(run.scenario)
-    feeder = _with_single_phase(feeder, run.single_phase)
+    feeder = _with_single_phase(feeder, ON_ONE_PHASE if run.single_phase else ())
     config, agents = configs(scenario, feeder, run.case)
     settings = replace(
         config.settings,

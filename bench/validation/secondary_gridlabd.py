@@ -6,16 +6,67 @@ controller at bus 150 restores the frequency through two machines and two invert
 
 from __future__ import annotations
 
+import tomllib
 from math import sqrt
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
 
 from bench.validation.delta_mode import COMPLEX, REAL, RecordedRun, delta_header, record
-from bench.validation.machines import MACHINES, machine_blocks
 from bench.validation.secondary_feeder import INVERTERS, island_tables
 from bench.validation.secondary_law import AUTOTEST, SecondarySettings
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.gridlabd.model.glm_block import block
 from plant.gridlabd.model.glm_inverters import inverter_blocks
 from plant.gridlabd.model.glm_network import network_blocks
+
+Z_0, Z_2 = 0.005 + 0.05j, 0.0072 + 0.254j
+"""Impedances of zero and negative sequence of a machine (pu), those of GridLAB-D's class."""
+
+PHASES = np.exp(-2j * np.pi / 3.0 * np.arange(3))
+
+
+class Machine(msgspec.Struct, frozen=True):
+    """A diesel machine.
+
+    The plant has no machines. GridLAB-D simulates them (`diesel_dg`); for the plant each is its Norton equivalent: the
+    admittance behind its subtransient reactances, and an injection that is replayed from GridLAB-D's run.
+    """
+
+    bus: str
+    S_rated: float
+    """Rating (VA)."""
+    S_start: tuple[float, float]
+    """Power of each phase at the start (W, var)."""
+    own: dict[str, str | float] = {}
+    """Its properties beside those of all machines, by GridLAB-D's names."""
+    left_out: tuple[str, ...] = ()
+    """Properties of all machines that it does not have."""
+
+    @property
+    def properties(self) -> dict[str, str | float]:
+        """All its properties."""
+        return {key: value for key, value in (_MACHINE | self.own).items() if key not in self.left_out}
+
+    def admittance(self) -> NDArray[np.complex128]:
+        """Return the admittance of its Norton equivalent (S, 3 x 3)."""
+        base = float(self.properties["Rated_V"]) ** 2 / self.S_rated
+        Z_1 = complex(float(self.properties["Ra"]), float(self.properties["Xdpp"]))
+        sequences = np.column_stack([np.ones(3), PHASES, PHASES.conj()])
+        Y: NDArray[np.complex128] = sequences @ np.diag(1.0 / (np.array([Z_0, Z_1, Z_2]) * base)) @ sequences.conj().T
+        return Y / 3.0
+
+    def power(self, V: NDArray[np.complex128], J: complex) -> complex:
+        """Return what it delivers (VA) at its terminal's voltages (V) with its injection of phase A (A)."""
+        return complex(np.vdot(J * PHASES - self.admittance() @ V, V))
+
+
+_TABLES = tomllib.loads(Path(__file__).with_name("machines.toml").read_text(encoding="utf-8"))
+_MACHINE: dict[str, str | float] = _TABLES.pop("machine")
+MACHINES = msgspec.convert(_TABLES, dict[str, Machine])
+
 
 H = 1e-3
 """Step (s)."""
@@ -94,6 +145,21 @@ def _model(seconds: int) -> str:
         _controller(AUTOTEST),
     )
     return "\n".join(blocks)
+
+
+def machine_blocks() -> list[str]:
+    """Return the machines as GridLAB-D objects."""
+    return [
+        block(
+            "diesel_dg",
+            name=name,
+            parent=f"n{machine.bus}",
+            Rated_VA=machine.S_rated,
+            **{f"power_out_{phase}": complex(*machine.S_start) for phase in "ABC"},
+            **machine.properties,
+        )
+        for name, machine in MACHINES.items()
+    ]
 
 
 def _controller(settings: SecondarySettings) -> str:

@@ -12,7 +12,6 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from bench.validation.delta_mode import START, RecordedRun
-from bench.validation.machines import MACHINES, PHASES
 from bench.validation.secondary_feeder import INVERTERS, V_NOM, island_tables, with_impedances, write_tables
 from bench.validation.secondary_gridlabd import (
     DEVICES,
@@ -20,7 +19,9 @@ from bench.validation.secondary_gridlabd import (
     GFM,
     INJECTION,
     LEAST_OF_GEN4,
+    MACHINES,
     NODE,
+    PHASES,
     SHARES,
     START_POWER,
     SWITCH,
