@@ -25,7 +25,7 @@ from typing import Annotated
 import pandas as pd
 import typer
 
-from bench.harness import commit, load, machine, markdown, say
+from bench.harness import MachineUse, commit, load, machine, markdown, say
 from bench.soak.judging import HEAL, Finding, Verdict, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.process_looks import ProcessSize
 from bench.soak.soak_actions import soak_actions
@@ -108,7 +108,7 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     before, began = load(), monotonic()
     say("the run starts")
     with SoakRun(folder, microgrids, spare) as run:
-        calm = monotonic()
+        calm, use = monotonic(), MachineUse()
         count, stop.disturbing = 0, True
         for one in soak_actions(seed, replaced, tuple(microgrids), spare, sorted({*microgrids.values()})):
             if monotonic() - calm >= seconds or stop.asked is not None:
@@ -123,10 +123,7 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     pd.DataFrame(run.sizes, columns=ProcessSize._fields).to_csv(folder / "sizes.csv", index=False)
     stayed = (PLANT, "command", *stays)
     sizes = {"memory (MB)": growths(run.sizes, "memory", stayed), "open files": growths(run.sizes, "files", stayed)}
-    findings = [judge_growth(what, rows, lasted) for what, rows in sizes.items()] + judged(run, end)
-    for late in run.late:
-        causes = "; ".join(late.causes) or "UNEXPLAINED"
-        print(f"t = {late.t:.1f} s: {late.steps} late, the plant waited {1e3 * late.waited:.0f} ms: {causes}")
+    findings = [judge_growth(what, rows, lasted) for what, rows in sizes.items()] + judged(run, end, use.others)
     for timed in run.times:
         if timed.seconds >= HEAL / 2.0:
             print(f"t = {timed.t:.1f} s: {timed.what} took {timed.seconds:.2f} s: {timed.of}{' (deaf)' * timed.deaf}")
@@ -147,9 +144,9 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     )
 
 
-def judged(run: SoakRun, end: SoakEnd) -> list[Finding]:
+def judged(run: SoakRun, end: SoakEnd, others: float) -> list[Finding]:
     """Return the rows of the result but those of growth."""
-    found = [judge_late(run.late, run.steps)]
+    found = [judge_late(run.late, run.steps, others)]
     for what, name, limit in (
         ("heal", "end of a cut or freeze until both sides use each other", HEAL),
         ("told", "kill -9 until the plant tells it and nobody uses the agent", None),

@@ -36,8 +36,6 @@ class SoakMonitor:
         """Run time (s) of the latest row."""
         self.pacing: Pacing | None = None
         """The plant's account of its steps."""
-        self.telemetries = 0
-        """How many came."""
         self.events: deque[tuple[float, PlantEvent]] = deque(maxlen=1000)
         """Events with the time of their arrival (s, monotonic)."""
         self.restorations: list[float] = []
@@ -56,7 +54,6 @@ class SoakMonitor:
     def telemetry(self, message: Telemetry, now: float) -> None:
         """Take the plant's telemetry."""
         self.inverters, self.pacing = message.inverters, message.pacing
-        self.telemetries += 1
         self.events += [(now, event) for event in message.events]
         judged = [i for i, name in enumerate(message.inverters) if name in self._GFM and name not in self.off]
         for row in message.rows:

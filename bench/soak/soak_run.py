@@ -142,10 +142,8 @@ class SoakRun(WatchedRun):
         self._logs += 1
         agent = self._processes.start(f"{name}-{self._logs}", "agent", name, *self._processes.connect)
         self._started[name], self._pids[name] = agent, (agent.pid, began)
-        self._starting[agent.pid] = f"agent {name}", began
         others = self._others(name)
         self._wait("joined", lambda: self.monitor.use_each_other((name,), others, began), began, one, deaf)
-        self._ready(agent.pid)
         self.monitor.off.discard(name)
 
     def _stop(self, name: str) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -19,19 +18,13 @@ from typing import NamedTuple, Self
 import numpy as np
 
 import gridpeers as gp
-from bench.harness import GRIDPEERS, processor_time
+from bench.harness import GRIDPEERS
 from bench.soak.judging import LAST_WORDS
 from bench.soak.process_looks import (
-    LateSteps,
-    MachineTime,
     ProcessSize,
-    Start,
-    late_steps,
-    machine_time,
     processes,
     size,
     size_of,
-    waiting_times,
 )
 from bench.soak.soak_monitor import HOLD, SoakMonitor
 from scenarios.checks.check_verdict import CheckVerdict, Violation
@@ -123,9 +116,6 @@ CONCLUDE = 1800.0
 LOOK = 5.0
 """Time (s) between two looks at the sizes of the processes."""
 
-SAMPLES = 3
-"""Samples of the machine's time, one with each telemetry, over which a late step is explained."""
-
 
 class SoakEnd(NamedTuple):
     """The end of the run."""
@@ -192,7 +182,6 @@ class WatchedRun:
         self.microgrids, self.agents = microgrids, tuple(microgrids)
         self.monitor = SoakMonitor()
         self.monitor.off.add(spare)
-        self.late: list[LateSteps] = []
         self.sizes: list[ProcessSize] = []
         self.problems: list[str] = []
         """What went wrong beside: a command that failed, a process that ended."""
@@ -202,17 +191,7 @@ class WatchedRun:
         """Process and its start (s, monotonic) of the plant, the command and each agent."""
         self._started: dict[str, subprocess.Popen[bytes]] = {}
         """Agents that were started alone."""
-        self._others_of_ours: dict[int, float] = {os.getpid(): 0.0}
-        """Further processes, by their starts (s, monotonic): this one, servers of `up`, and commands that run now."""
-        self._starting: dict[int, tuple[str, float]] = {}
-        """Processes that get ready now: text and start (s, monotonic)."""
-        self._spent: dict[tuple[int, float], float] = {}
-        """Processor time (s) of every process so far."""
-        self._waited: dict[int, float] = {}
-        """Time (s) in which each thread of the plant waited for a processor so far."""
-        self._starts: deque[Start] = deque(maxlen=40)
-        self._machine: deque[MachineTime] = deque(maxlen=SAMPLES)
-        self._seen = self._late = self._steps = self._logs = 0
+        self._late = self._steps = self._logs = 0
         self._look = 0.0
         self._stack = ExitStack()
 
@@ -225,6 +204,11 @@ class WatchedRun:
     def steps(self) -> int:
         """Steps of the plant since the run is calm."""
         return 0 if self.monitor.pacing is None else self.monitor.pacing.steps - self._steps
+
+    @property
+    def late(self) -> int:
+        """Those of them that were more than a control period late."""
+        return 0 if self.monitor.pacing is None else self.monitor.pacing.late - self._late
 
     def __enter__(self) -> Self:
         """Start all processes; return once the run is calm."""
@@ -241,8 +225,6 @@ class WatchedRun:
             for name, pid in processes(self._up.pid).items():
                 if name in (PLANT, "command", *self.agents):
                     self._pids[name] = pid, born
-                else:
-                    self._others_of_ours[pid] = born
             missing = {PLANT, *self.agents} - self._pids.keys()
             self._need(not missing, f"no process of {', '.join(sorted(missing))} is found")
             if self.monitor.pacing is not None:
@@ -267,27 +249,17 @@ class WatchedRun:
 
     def _command(self, *words: str) -> str:
         """Run a command to its end; return what it printed."""
-        began = monotonic()
         process = self._processes.start("command", *words, *self._processes.connect)
-        self._others_of_ours[process.pid] = began
-        self._starting[process.pid] = f"gridpeers {words[0]}", began
         if not self._until(lambda: process.poll() is not None, PATIENCE):
             process.kill()
             process.wait()
         text = self._processes.printed("command")
-        self._others_of_ours.pop(process.pid)
-        self._ready(process.pid)
         if process.returncode:
             last = text.strip().splitlines()[-1:] or ["it printed nothing"]
             self.problems.append(
                 f"t = {self.monitor.t:.1f} s: gridpeers {' '.join(words)} ended with {process.returncode}: {last[0]}"
             )
         return text
-
-    def _ready(self, pid: int) -> None:
-        """Note that a process that was started is ready, or has ended."""
-        text, began = self._starting.pop(pid)
-        self._starts.append(Start(text, began, monotonic()))
 
     def finish(self) -> SoakEnd:
         """End the run, and wait for its report."""
@@ -332,25 +304,10 @@ class WatchedRun:
                 return False
             self._subscriber.take(min(left, 0.05))
             self._need(self._up.poll() is None, f"gridpeers up ended with status {self._up.returncode}")
-            if self.monitor.telemetries > self._seen and self._pids:
-                self._seen = self.monitor.telemetries
-                self._look_at_machine()
             if monotonic() >= self._look and self._pids:
                 self._look = monotonic() + LOOK
                 self._look_at_sizes()
         return True
-
-    def _look_at_machine(self) -> None:
-        """Sample the machine's time, and explain the late steps since the last sample."""
-        for pid, born in (*self._pids.values(), *self._others_of_ours.items()):
-            self._spent[pid, born] = max(self._spent.get((pid, born), 0.0), processor_time(pid))
-        now, pacing = monotonic(), self.monitor.pacing
-        self._waited |= waiting_times(self._pids[PLANT][0])
-        self._machine.append(machine_time(now, sum(self._spent.values()), sum(self._waited.values())))
-        if pacing is not None and (count := pacing.late - self._late) > 0:
-            self._late = pacing.late
-            starts = [*self._starts, *(Start(text, born, now) for text, born in self._starting.values())]
-            self.late.append(late_steps(self.monitor.t, count, self._machine[0], self._machine[-1], starts))
 
     def _look_at_sizes(self) -> None:
         at = monotonic()

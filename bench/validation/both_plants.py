@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
-from bench.validation.gridlabd_runs import RUNS, SHORT, ComparedRun, Reclosing, SinglePhase, shortened
+from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, SinglePhase, shortened
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant

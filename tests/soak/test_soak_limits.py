@@ -14,7 +14,7 @@ from agents.agent_config import AgentConfig, Control
 from bench.soak import __main__ as command
 from bench.soak.__main__ import StopRequest
 from bench.soak.judging import growths, judge_checks, judge_growth, judge_late, judge_times
-from bench.soak.process_looks import LateSteps, MachineTime, ProcessSize, Start, late_steps
+from bench.soak.process_looks import ProcessSize
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
@@ -93,27 +93,12 @@ def test_restarted_agents_are_compared_at_one_age() -> None:
     assert young(larger) > 0.03
 
 
-def test_a_late_step_counts_as_explained_only_if_the_plant_waited_for_a_processor() -> None:
-    """A process that starts, or other programs, explain nothing while the plant has its processor."""
-    before = MachineTime(at=1.0, whole=0.0, busy=0.0, stolen=0.0, own=0.0, waited=0.0)
-    after = MachineTime(at=1.4, whole=0.8, busy=0.8, stolen=0.0, own=0.2, waited=0.0)
-    start = [Start("agent inv2", 0.9, 1.2)]
-
-    assert late_steps(3.0, 1, before, after, start).causes == ()
-    assert len(late_steps(3.0, 1, before, after._replace(waited=0.03), start).causes) == 2
-    assert late_steps(3.0, 1, before, after._replace(stolen=0.05), []).causes == ("the host took 50 ms",)
-    over = [Start("agent inv2", 0.1, 0.9)]
-    calm = after._replace(busy=0.2, waited=0.03)
-    assert late_steps(3.0, 1, before, calm, over).causes == ()
-
-
-def test_one_unexplained_late_step_fails() -> None:
-    """The row says how many there are, and when."""
-    explained, not_explained = LateSteps(1.0, 2, 0.03, ("start of agent inv2",)), LateSteps(9.0, 1, 0.0, ())
-
-    assert judge_late([explained], 100).verdict == "PASS"
-    found = judge_late([explained, not_explained], 100)
-    assert (found.verdict, found.found) == ("FAIL", "3 of 100 late, 1 unexplained: at 9.0 s")
+@pytest.mark.parametrize(("late", "others", "verdict"), [(1, 0.0, "PASS"), (2, 0.0, "FAIL"), (2, 0.3, "-")])
+def test_more_than_one_late_step_in_a_thousand_fails_unless_others_had_the_machine(
+    late: int, others: float, verdict: str
+) -> None:
+    """On a busy machine the row tells the number, and judges nothing."""
+    assert judge_late(late, 1000, others).verdict == verdict
 
 
 def test_a_heal_that_never_comes_or_is_slow_fails() -> None:
