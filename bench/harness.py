@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 import platform
-import resource
 import shlex
 import subprocess
 import sys
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from importlib import metadata
 from pathlib import Path
+
+import psutil
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command does, before numpy is imported
 
@@ -81,7 +82,7 @@ class MachineUse:
     """The use of the machine from now on."""
 
     def __init__(self) -> None:
-        self._began, self._busy, self._own = time.monotonic(), _machine_time(), own_time()
+        self._began, self._busy, self._own = time.monotonic(), _busy_time(), own_time()
 
     @property
     def seconds(self) -> float:
@@ -90,47 +91,29 @@ class MachineUse:
 
     @property
     def others(self) -> float:
-        """Part of the machine's processor time that other programs took; 0 where /proc is not."""
-        whole = self.seconds * (os.cpu_count() or 1)
-        taken = (_machine_time() - self._busy) - (own_time() - self._own)
-        return min(1.0, max(0.0, taken) / whole) if whole else 0.0
+        """Part of the machine's processor time that other programs took."""
+        taken = (_busy_time() - self._busy) - (own_time() - self._own)
+        return min(1.0, max(0.0, taken) / (self.seconds * (os.cpu_count() or 1)))
 
 
-def _machine_time() -> float:
-    """Return the processor time (s) that all programs of the machine have taken so far; 0 where /proc is not."""
-    try:
-        fields = Path("/proc/stat").read_text().splitlines()[0].split()[1:]
-    except OSError:
-        return 0.0
-    user, nice, system, _idle, _iowait, irq, softirq, steal, *_ = map(int, fields)
-    return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+def _busy_time() -> float:
+    """Return the processor time (s) that all programs of the machine have taken so far."""
+    times = psutil.cpu_times()._asdict()
+    return sum(float(times.get(name, 0.0)) for name in ("user", "nice", "system", "irq", "softirq", "steal"))
 
 
 def own_time() -> float:
     """Return the processor time (s) of this process, its ended children, and its living descendants so far."""
-    uses = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    living = sum(processor_time(pid, children=True) for pid in _descendants(os.getpid()))
-    return sum(use.ru_utime + use.ru_stime for use in uses) + living
+    return sum(os.times()[:4]) + sum(processor_time(one.pid) for one in psutil.Process().children(recursive=True))
 
 
-def processor_time(pid: int, *, children: bool = False) -> float:
-    """Return the processor time (s) of a process, perhaps with that of its ended children; 0 once it has ended."""
+def processor_time(pid: int) -> float:
+    """Return the processor time (s) of a process and of its ended children; 0 once it has ended."""
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
+        times = psutil.Process(pid).cpu_times()
+    except psutil.Error:
         return 0.0
-    return sum(map(int, fields[11 : 15 if children else 13])) / os.sysconf("SC_CLK_TCK")
-
-
-def _descendants(pid: int) -> Iterator[int]:
-    for file in Path(f"/proc/{pid}/task").glob("*/children"):
-        try:
-            children = [int(child) for child in file.read_text().split()]
-        except OSError:  # the thread, or the process, has just ended
-            continue
-        for child in children:
-            yield child
-            yield from _descendants(child)
+    return float(times.user + times.system + times.children_user + times.children_system)
 
 
 # ---------------------------------------------------------------- commands, and failures

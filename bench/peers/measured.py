@@ -50,18 +50,10 @@ class PartRun(msgspec.Struct, kw_only=True):
 def measure_in_turns(
     measures: Callable[[], Sequence[Measure]], rounds: int, tell: Callable[[str], None] = lambda text: None
 ) -> PartRun:
-    """Measure all, round by round, each round in another order.
+    """Measure all, round by round, each round in another order, and tell what begins.
 
-    What fails is left out from then on, with its reason; the others go on.
-
-    Parameters
-    ----------
-    measures
-        Makes the measures; what they share may take a while to make, or fail, too.
-    rounds
-        How often each is measured.
-    tell
-        Takes what begins, in words.
+    What fails is left out from then on, with its reason; the others go on. What the measures share may take a while to
+    make, or fail, too.
     """
     part = PartRun(
         began=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),

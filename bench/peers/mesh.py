@@ -99,18 +99,8 @@ def seconds_per_round(
 ) -> float:
     """Return the time (s) of a round of a mesh, its start not counted.
 
-    Parameters
-    ----------
-    transport
-        See `MeshMember.transport`.
-    neighbours
-        The agents, and whose states each waits for.
-    rounds
-        How many are measured.
-    sizes
-        Bytes of a measurement and of a state.
-    processes
-        Processes that agents share; 0 gives each agent its own.
+    `neighbours` are the agents, and whose states each waits for; `sizes` the bytes of a measurement and of a state;
+    `processes` those that agents share, where 0 gives each agent its own.
     """
     hosts = shared_out(tuple(neighbours), processes or len(neighbours))
     with tempfile.TemporaryDirectory(prefix="gp-mesh-") as folder:

@@ -33,13 +33,7 @@ LOOK = 0.002
 
 
 class OurCase:
-    """The islanding experiment, case IV: nine agents, full graph, T_c 20 ms, h 2 ms, 7 s.
-
-    Parameters
-    ----------
-    end : float, optional
-        Duration (s) instead of the experiment's: shorter in tests.
-    """
+    """The islanding experiment, case IV: nine agents, full graph, T_c 20 ms, h 2 ms; 7 s, or until another end (s)."""
 
     def __init__(self, end: float | None = None) -> None:
         scenario = gp.load("islanding").replace({"paper": None})

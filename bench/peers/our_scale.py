@@ -96,10 +96,7 @@ def measure(agents: int, T_c: float, end: float) -> dict[str, float]:
 def timed_run(plant: PlantConfig, agents: Any, built: Plant, folder: Path) -> tuple[float, float, float]:
     """Run and record one case in this process; return times (s) from its first row on.
 
-    Returns
-    -------
-    tuple
-        Processor time of the plant at its interface and of all else, and the time by the clock.
+    They are processor time of the plant at its interface and of all else, and the time by the clock.
     """
     assert plant.end is not None
     spent = 0.0

@@ -26,8 +26,17 @@ import pandas as pd
 import typer
 
 from bench.harness import MachineUse, commit, load, machine, markdown, say
-from bench.soak.judging import HEAL, Finding, Verdict, growths, judge_checks, judge_growth, judge_late, judge_times
-from bench.soak.process_looks import ProcessSize
+from bench.soak.judging import (
+    HEAL,
+    Finding,
+    ProcessSize,
+    Verdict,
+    growths,
+    judge_checks,
+    judge_growth,
+    judge_late,
+    judge_times,
+)
 from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from bench.soak.process_looks import ProcessSize
 from scenarios.checks.check_verdict import CheckVerdict, Violation, summary
 
 FLAT = 0.05
@@ -50,6 +49,28 @@ STARTS = 6
 Verdict = Literal["PASS", "FAIL", "-"]
 
 
+class ProcessSize(NamedTuple):
+    """Size of a process at one time."""
+
+    at: float
+    """When (s, monotonic)."""
+    name: str
+    """Agent, "plant" or "command"."""
+    pid: int
+    """Process id."""
+    born: float
+    """When it was started (s, monotonic)."""
+    memory: float
+    """Anonymous resident memory (MB)."""
+    files: int
+    """Open files, sockets among them."""
+
+    @property
+    def age(self) -> float:
+        """Time since its start (s)."""
+        return self.at - self.born
+
+
 class Finding(NamedTuple):
     """One row of the result."""
 
@@ -70,27 +91,14 @@ class Growth(NamedTuple):
 
     @property
     def part(self) -> float:
-        """Growth as a part.
-
-        Examples
-        --------
-        >>> Growth("plant", 40.0, 42.0).part
-        0.05
-        """
+        """Growth as a part: 0.05 from 40 to 42."""
         return round(self.after / self.before - 1.0, 6)
 
 
 def growths(sizes: Sequence[ProcessSize], of: Literal["memory", "files"], stays: Iterable[str]) -> list[Growth]:
     """Return the growth of each process that stays, of young agents, and of all processes together.
 
-    Parameters
-    ----------
-    sizes : Sequence[ProcessSize]
-        All looks, in the order of time; one look at all processes has one time.
-    of : str
-        The size that is compared.
-    stays : Iterable[str]
-        Processes that run all the time.
+    Sizes are in the order of time, and one look at all processes has one time; `stays` run all the time.
     """
     if not sizes:
         return []
@@ -168,20 +176,12 @@ def judge_checks(
     kills: Sequence[tuple[str, float]],
     heals: Sequence[float] = (),
 ) -> Finding:
-    """Return the verdict of the checks.
+    """Return the verdict of the checks of a run.
 
-    Parameters
-    ----------
-    verdicts : tuple[CheckVerdict, ...]
-        Of the run.
-    silences : Sequence[Violation]
-        All that the check of last words names: its verdict shows some of them.
-    kills : Sequence[tuple[str, float]]
-        Agents that this program has killed, and when (s of run time): the check of last words names each of them, as
-        nothing in the run tells why they are silent, and no others.
-    heals : Sequence[float]
-        Run times (s) at which agents that were parted used each other again. What they held meanwhile is old, so the
-        frequency moves; its check knows changes of switches, loads and inverters alone, and may name it then.
+    `silences` are all that the check of last words names; its verdict shows some of them. It names each of the `kills`
+    (agent and run time), as nothing in the run tells why they are silent, and no others. `heals` are run times (s) at
+    which agents that were parted used each other again: what they held meanwhile is old, so the frequency moves; its
+    check knows changes of switches, loads and inverters alone, and may name it then.
     """
     if not verdicts:
         return Finding("checks", "none fails", "there is no checks.json", "FAIL")

@@ -77,20 +77,10 @@ class SoakAction(NamedTuple):
 def soak_actions(
     seed: int, replaced: Sequence[str], agents: Sequence[str], spare: str, microgrids: Sequence[str]
 ) -> Iterator[SoakAction]:
-    """Yield actions without end.
+    """Yield actions without end, drawn from a seed.
 
-    Parameters
-    ----------
-    seed : int
-        Of all draws.
-    replaced : Sequence[str]
-        Agents that leave, die and freeze; the others stay, so that a long life is measured too.
-    agents : Sequence[str]
-        All agents, whose links are cut.
-    spare : str
-        Agent of an inverter that is off at first.
-    microgrids : Sequence[str]
-        Names of the microgrids.
+    `replaced` leave, die and freeze; the others of `agents` stay, so that a long life is measured too. `spare` is the
+    agent of an inverter that is off at first.
     """
     rng = random.Random(seed)
     kinds, again = _deals(rng, DECK), _deals(rng, replaced)

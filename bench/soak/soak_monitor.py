@@ -18,14 +18,7 @@ OFFSETS = 50
 
 
 class SoakMonitor:
-    """Takes the messages of a run in real time at speed 1.
-
-    Examples
-    --------
-    >>> monitor = SoakMonitor()
-    >>> monitor.use("inv1", "inv2"), monitor.seconds_in_band
-    (False, 0.0)
-    """
+    """Takes the messages of a run in real time at speed 1."""
 
     def __init__(self) -> None:
         self.inverters: tuple[str, ...] = ()

@@ -9,23 +9,17 @@ import os
 import signal
 import subprocess
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from time import monotonic, sleep
 from types import TracebackType
 from typing import NamedTuple, Self
 
-import numpy as np
+import psutil
 
 import gridpeers as gp
 from bench.harness import GRIDPEERS
-from bench.soak.judging import LAST_WORDS
-from bench.soak.process_looks import (
-    ProcessSize,
-    processes,
-    size,
-    size_of,
-)
+from bench.soak.judging import LAST_WORDS, ProcessSize
 from bench.soak.soak_monitor import HOLD, SoakMonitor
 from scenarios.checks.check_verdict import CheckVerdict, Violation
 from scenarios.checks.checks_file import FILE as CHECKS
@@ -46,27 +40,17 @@ END = 20.0
 
 
 class LiveProcesses:
-    """The processes of one run. Use it as a context: none is left.
+    """The commands of one run, in a folder for their logs. Use it as a context: none is left.
 
     Each is in a session of its own: the Ctrl-C of a terminal reaches the bench alone, which ends them.
-
-    Parameters
-    ----------
-    folder : Path
-        For the logs; the processes work there.
-    run : str
-        Name of the run.
     """
 
     def __init__(self, folder: Path, run: str) -> None:
         endpoint = free_endpoint()
         self.folder = folder
         self.address = RunAddress(run=run, connect=(endpoint,))
-        """Where clients find the run."""
         self.listen = ["--run", run, "--listen", endpoint]
-        """Options of the command that has the plant."""
         self.connect = ["--run", run, "--connect", endpoint]
-        """Options of all other commands."""
         self._children: list[subprocess.Popen[bytes]] = []
 
     def start(self, name: str, *words: str) -> subprocess.Popen[bytes]:
@@ -166,16 +150,8 @@ class SoakError(RuntimeError):
 class WatchedRun:
     """A live run with a record, looked at whenever it is waited for. Use it as a context: no process is left.
 
-    Parameters
-    ----------
-    folder : Path
-        For the record and the logs.
-    microgrids : Mapping[str, str]
-        The microgrid of each agent of the run.
-    spare : str
-        The agent that is not there at first.
-    recorded : bool, optional
-        Whether the run has a record, and with it a report and verdicts.
+    `microgrids` has the microgrid of each agent, and `spare` is the agent that is not there at first. Without a record
+    there is no report and no verdict.
     """
 
     def __init__(self, folder: Path, microgrids: Mapping[str, str], spare: str, *, recorded: bool = True) -> None:
@@ -222,9 +198,12 @@ class WatchedRun:
             self._client.find_plant(BUILD)
             self._subscriber = RunSubscriber(self._client, self.monitor)
             self._need(self._until(lambda: self.monitor.t > CALM and self._calm(), BUILD), "the run is not calm")
-            for name, pid in processes(self._up.pid).items():
-                if name in (PLANT, "command", *self.agents):
-                    self._pids[name] = pid, born
+            self._pids["command"] = self._up.pid, born
+            for child in psutil.Process(self._up.pid).children():
+                with suppress(OSError):  # its name is that of its log, as it may be forked; it may just have ended
+                    name = Path(f"/proc/{child.pid}/fd/2").readlink().stem
+                    if name in (PLANT, *self.agents):
+                        self._pids[name] = child.pid, born
             missing = {PLANT, *self.agents} - self._pids.keys()
             self._need(not missing, f"no process of {', '.join(sorted(missing))} is found")
             if self.monitor.pacing is not None:
@@ -271,7 +250,8 @@ class WatchedRun:
             self.problems.append(f"gridpeers down ended with {down.returncode}: {down.stdout}{down.stderr}".strip())
         began, peak = monotonic(), 0.0
         while self._up.poll() is None and monotonic() < began + CONCLUDE:
-            peak = max(peak, np.nan_to_num(size(self._up.pid, "VmHWM")))
+            with suppress(psutil.Error):
+                peak = max(peak, psutil.Process(self._up.pid).memory_info().rss / 1e6)
             sleep(0.05)
         took = monotonic() - began
         verdicts = [file for file in self.here.rglob(CHECKS)]
@@ -281,7 +261,7 @@ class WatchedRun:
             checks=checks,
             silences=all_silences(self.here, checks),
             report_s=took,
-            peak_MB=float(peak),
+            peak_MB=peak,
             files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},
             printed=self._processes.printed("up"),
         )
@@ -312,9 +292,10 @@ class WatchedRun:
     def _look_at_sizes(self) -> None:
         at = monotonic()
         for name, (pid, born) in list(self._pids.items()):
-            found = size_of(name, pid, born, at)
-            if found is not None:
-                self.sizes.append(found)
+            with suppress(psutil.Error):  # it has just ended
+                process = psutil.Process(pid)
+                memory, files = process.memory_full_info().uss / 1e6, process.num_fds()
+                self.sizes.append(ProcessSize(at, name, pid, born, memory, files))
 
     def _need(self, sound: bool, why: str) -> None:
         if not sound:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
 from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, SinglePhase, shortened
-from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
 from plant.gridlabd.gridlabd_plant import GridlabdPlant
@@ -47,20 +47,7 @@ class PlantDifferences(NamedTuple):
 
 
 def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
-    """Let both plants go through a run.
-
-    Parameters
-    ----------
-    run
-        What to go through.
-    factor
-        Factor on all its times.
-
-    Raises
-    ------
-    GridlabdError
-        If GridLAB-D is missing, or ended.
-    """
+    """Take both plants through a run, all of whose times are multiplied by a factor."""
     scenario, feeder = load_scenario(run.scenario)
     feeder = _with_single_phase(feeder, ON_ONE_PHASE if run.single_phase else ())
     config, agents = configs(scenario, feeder, run.case)
@@ -95,17 +82,7 @@ def _with_single_phase(feeder: Feeder, added: Sequence[SinglePhase]) -> Feeder:
     """Return the feeder with these inverters beside its own."""
     V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
     rows = (
-        InverterRow(
-            name=it.name,
-            kind=it.kind,
-            bus=it.bus,
-            phases=it.phase,
-            microgrid="single-phase",
-            P_rated=it.P_rated,
-            V_nom=V_nom[it.bus],
-            m_p=0.01,
-            m_q=0.05,
-        )
+        inverter_row(it.name, it.kind, it.bus, it.P_rated, V_nom[it.bus], phases=it.phase, microgrid="single-phase")
         for it in added
     )
     return replace(feeder, inverters=(*feeder.inverters, *rows))

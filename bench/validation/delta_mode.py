@@ -33,18 +33,7 @@ def delta_header(h: float, seconds: int, bus: str, *powerflow: str) -> str:
     """Write clock, modules and what finds islands.
 
     The recorder of a bus, into nowhere, keeps the clock going: without anything that wants to be called again GridLAB-D
-    stops at once.
-
-    Parameters
-    ----------
-    h
-        Step (s).
-    seconds
-        How long delta mode may run (s).
-    bus
-        Name of any node.
-    powerflow
-        Further settings of the module.
+    stops at once. `h` is the step (s), `seconds` how long delta mode may run, `powerflow` more settings of the module.
     """
     step = round(h * 1e9)
     enabled = f"enable_subsecond_models true;\n\tdeltamode_timestep {step};"
@@ -114,23 +103,10 @@ def record(
     read_between: Sequence[Property] = (),
     writes: Sequence[tuple[int, str, str, Any]] = (),
 ) -> RecordedRun:
-    """Run a model in delta mode.
+    """Run a model (GLM) in delta mode, and record so many steps, the first of delta mode included.
 
-    Parameters
-    ----------
-    model
-        The GLM.
-    steps
-        How many steps to record, the first of delta mode included.
-    read, read_between
-        What to record after each step and between its two solutions.
-    writes
-        Step at whose beginning it acts, object, property, value.
-
-    Raises
-    ------
-    RuntimeError
-        With GridLAB-D's last lines, if it failed.
+    `read` is recorded after each step and `read_between` between its two solutions; `writes` have the step at whose
+    beginning they act, object, property and value. RuntimeError has GridLAB-D's last lines, if it failed.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -170,15 +146,7 @@ FAILED = 3
 
 
 class DeltaRecorder:
-    """Records properties in the two places of a step where its callbacks are called.
-
-    Parameters
-    ----------
-    request
-        As in the module's text.
-    out
-        Where the recording goes; it is complete when the process ends with 0.
-    """
+    """Records properties in the two places of a step where its callbacks are called, for a request as above."""
 
     def __init__(self, request: dict[str, Any], out: Path) -> None:
         gridlabd = importlib.import_module("gridlabd")

@@ -107,13 +107,7 @@ READ: Sequence[Property] = (
 
 
 def record_gfm_gfl(changes: Mapping[int, complex], steps: int) -> RecordedRun:
-    """Run it; from each of the steps in `changes` on, Load4 has that impedance (ohm).
-
-    Raises
-    ------
-    RuntimeError
-        If GridLAB-D fails.
-    """
+    """Run it; from each of the steps in `changes` on, Load4 has that impedance (ohm)."""
     writes = [
         (step, "nLoad4", f"constant_impedance_{phase}", [z.real, z.imag])
         for step, z in changes.items()

@@ -16,11 +16,11 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
-from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from bench.validation.write_opendss import LIMITS, write_opendss
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.phasors import aligned_sum
-from plant.equipment import Bus, Feeder, InverterRow, Source
+from plant.equipment import Bus, Feeder, Source
 from plant.equipment.imported_equipment import LinearElement
 from plant.equipment.inverter_parameters import GfmParameters
 from plant.feeder.circuits import circuit_of
@@ -99,7 +99,7 @@ def behind_source(feeder: Feeder) -> Feeder:
 def behind_inverter(feeder: Feeder) -> Feeder:
     """Return our feeder with a grid-forming inverter as the storage; the substation stays behind its switch."""
     V_nom = V_LL / sqrt(3.0)
-    unit = InverterRow(name="gfm", kind="GFM", bus=BUS, microgrid="", P_rated=S_RATED, V_nom=V_nom, m_p=0.01, m_q=0.05)
+    unit = inverter_row("gfm", "GFM", BUS, S_RATED, V_nom)
     buses = (*feeder.buses, Bus(name=BUS, phases="ABC", V_nom=V_nom))
     return replace(feeder, buses=buses, elements=(_transformer(feeder),), inverters=(unit,))
 
@@ -143,15 +143,7 @@ ENGINE_STATE = {name: number for number, name in enumerate(CASES)}
 
 
 class GridFormingIsland:
-    """Our island in the cases, beside one engine's states.
-
-    Parameters
-    ----------
-    feeder
-        The microgrid feeder.
-    theirs
-        An engine's voltages in `STATES`.
-    """
+    """Our island in the cases, beside an engine's voltages in `STATES`."""
 
     def __init__(self, feeder: Feeder, theirs: SolvedStates) -> None:
         self._feeder, self._theirs = feeder, theirs

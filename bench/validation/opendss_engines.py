@@ -37,19 +37,9 @@ class SolvedStates(NamedTuple):
 
 
 def solve_scripts(engine: str, jobs: Sequence[tuple[Path, Sequence[Sequence[str]]]]) -> list[SolvedStates]:
-    """Solve scripts with an engine.
+    """Solve scripts with one of `ENGINES`; RuntimeError has its last lines, if it failed.
 
-    Parameters
-    ----------
-    engine
-        One of `ENGINES`.
-    jobs
-        Each script with the commands that lead from one of its states to the next; `[()]` is the script as it is.
-
-    Raises
-    ------
-    RuntimeError
-        With the engine's last lines, if it failed.
+    Each job is a script with the commands that lead from one of its states to the next; `[()]` is the script as it is.
     """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)

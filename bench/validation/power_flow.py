@@ -21,16 +21,11 @@ from plant.tables import read_feeder
 
 
 class SwitchStates:
-    """Combinations of open and closed switches of a feeder, and their islands.
+    """Combinations of open and closed switches of a feeder that has a substation, and their islands.
 
     An island without the substation gets a stiff source of 1 pu at its first bus with three phases. Where a closed
     switch of fewer phases is the only way to a section of three, the other phases of that section have no source: such
     a state has no operating point, and is left out.
-
-    Parameters
-    ----------
-    feeder
-        The feeder; it has a substation.
     """
 
     def __init__(self, feeder: Feeder) -> None:

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.random_script import RandomFeeder, Shape, random_feeder
-from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
+from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from plant.dynamics import Dynamics, PlantError
 from plant.dynamics.reduction import reduce_network
-from plant.equipment import Feeder, InverterRow
+from plant.equipment import Feeder
 from plant.equipment.named_loads import with_powers
 from plant.feeder.circuits import circuit_of
 from plant.feeder.installed_inverters import installed_inverters
@@ -61,10 +61,7 @@ class FeederStates(NamedTuple):
 def run_states(drawn: RandomFeeder, script: Path, *, dense: bool = False) -> FeederStates:
     """Run our plant through the states of a feeder whose script is written, by sparse factors or by dense matrices.
 
-    Raises
-    ------
-    FeederError, PlantError, ArithmeticError
-        If the import or the plant refuses it, or an island has no solution.
+    FeederError, PlantError, ArithmeticError: the import or the plant refuses it, or an island has no solution.
     """
     before = reduce_network.MOST_DENSE
     reduce_network.MOST_DENSE = before if dense else 0
@@ -78,19 +75,17 @@ class _Run:
     def __init__(self, drawn: RandomFeeder, feeder: Feeder) -> None:
         V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
         rows = [
-            InverterRow(
-                name=f"inv{k}",
-                kind=place.kind,
-                bus=place.bus,
+            inverter_row(
+                f"inv{k}",
+                it.kind,
+                it.bus,
+                it.P_rated,
+                V_nom[it.bus],
+                phases=it.phases,
+                neutral=it.neutral,
                 microgrid="1",
-                P_rated=place.P_rated,
-                V_nom=V_nom[place.bus],
-                m_p=0.01,
-                m_q=0.05,
-                phases=place.phases,
-                neutral=place.neutral,
             )
-            for k, place in enumerate(drawn.inverters)
+            for k, it in enumerate(drawn.inverters)
         ]
         self._drawn, self._rows = drawn, rows
         self._network = network = Network(replace(feeder, inverters=tuple(rows)))

@@ -63,15 +63,7 @@ class _Bus(NamedTuple):
 
 
 def random_feeder(seed: int, shape: Shape) -> RandomFeeder:
-    """Return the feeder of a seed: the same one at every call.
-
-    Parameters
-    ----------
-    seed
-        Any number.
-    shape
-        Whether the network of medium voltage has meshes.
-    """
+    """Return the feeder of a seed, whose network of medium voltage may have meshes: the same one at every call."""
     return _Draw(random.Random(f"feeder {seed} {shape}"), shape).feeder()
 
 

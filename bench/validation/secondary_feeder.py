@@ -1,138 +1,30 @@
 """The feeder of GridLAB-D's secondary-control autotest as tables: IEEE 123, islanded, with four inverters.
 
-The tables are those of `standard123` with what the autotest changes: conductors and distances instead of published
-impedances, no line charging, other loads and switches, and 2401.7 V as nominal voltage. Series impedances are those of
-the modified Carson equations and Kron's reduction: 60 Hz, earth of 100 ohm m; ohm per mile, distances in feet (W. H.
-Kersting, Distribution System Modeling and Analysis, 3rd ed., equations (4.39), (4.40), (4.55), (4.89) to (4.93)).
+The tables are those of `standard123` with what the autotest changes: other impedances of lines, no line charging, other
+loads and switches, and 2401.7 V as nominal voltage. secondary_line_configs.csv has the impedances that GridLAB-D
+computes from the autotest's conductors and distances: the modified Carson equations and Kron's reduction, 60 Hz, earth
+of 100 ohm m (W. H. Kersting, Distribution System Modeling and Analysis, 3rd ed., equations (4.39), (4.40), (4.55),
+(4.89) to (4.93)). Configurations 1 and 3 to 8 are IEEE's to the four digits that are published.
 """
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
-from math import log, pi, sqrt
+from math import pi, sqrt
 from pathlib import Path
-from typing import NamedTuple
 
-import numpy as np
+import pandas as pd
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 import plant
 from plant.equipment import Bus, Feeder, Line, LineConfig
 
-F, EARTH = 60.0, 100.0
-
-Impedance = NDArray[np.complex128]
-
-
-class Conductor(NamedTuple):
-    """One wire."""
-
-    R: float
-    """Resistance (ohm per mile)."""
-    gmr: float
-    """Geometric mean radius (ft)."""
-
-
-def overhead_impedance(
-    between: Sequence[Sequence[float]], to_neutral: Sequence[float], phase: Conductor, neutral: Conductor
-) -> Impedance:
-    """Return the impedance of a line with one neutral wire.
-
-    Parameters
-    ----------
-    between
-        Distances between the phases (ft), n x n.
-    to_neutral
-        Distances from the phases to the neutral (ft).
-    phase, neutral
-        Their wires.
-    """
-    n = len(to_neutral)
-    Z = np.empty((n + 1, n + 1), complex)
-    for i in range(n):
-        Z[i, i], Z[i, n], Z[n, i] = _own(phase), _mutual(to_neutral[i]), _mutual(to_neutral[i])
-        for j in range(n):
-            if i != j:
-                Z[i, j] = _mutual(between[i][j])
-    Z[n, n] = _own(neutral)
-    return _reduced(Z, n)
-
-
-def cable_impedance(
-    positions: Sequence[float], phase: Conductor, strand: Conductor, strands: int, radius: float
-) -> Impedance:
-    """Return the impedance of parallel cables with concentric neutrals.
-
-    Parameters
-    ----------
-    positions
-        Places of the cables along a line (ft).
-    phase, strand
-        The core and one strand of the neutral.
-    strands, radius
-        How many strands there are, and on which circle (ft).
-    """
-    n = len(positions)
-    neutral = Conductor(strand.R / strands, (strand.gmr * strands * radius ** (strands - 1)) ** (1.0 / strands))
-    Z = np.empty((2 * n, 2 * n), complex)
-    for i in range(2 * n):
-        for j in range(2 * n):
-            a, b = i % n, j % n
-            if i == j:
-                Z[i, i] = _own(phase if i < n else neutral)
-            else:
-                Z[i, j] = _mutual(radius if a == b else abs(positions[a] - positions[b]))
-    return _reduced(Z, n)
-
-
-def _own(wire: Conductor) -> complex:
-    return wire.R + _mutual(wire.gmr)
-
-
-def _mutual(distance: float) -> complex:
-    return complex(0.00158836 * F, 0.00202237 * F * (log(1.0 / distance) + 7.6786 + log(EARTH / F) / 2.0))
-
-
-def _reduced(Z: Impedance, n: int) -> Impedance:
-    """Return the impedance of the first n wires, with the others at zero voltage."""
-    reduced: Impedance = Z[:n, :n] - Z[:n, n:] @ np.linalg.solve(Z[n:, n:], Z[n:, :n])
-    return reduced
-
-
 V_NOM = 2401.7
 """Nominal voltage (V, line-to-neutral)."""
-
-MILE = 1.609344
-"""In km."""
 
 Row = dict[str, str]
 Tables = dict[str, list[Row]]
 
 TABLES = Path(plant.__file__).parent / "data" / "standard123"
-
-ACSR_336, ACSR_1_0, ACSR_4_0 = Conductor(0.306, 0.0244), Conductor(1.12, 0.00446), Conductor(0.592, 0.00814)
-
-AT_POLE = {"left": 5.656854, "middle": 4.272002, "right": 5.0}
-"""Distance to the neutral (ft) from the three places on the cross-arm, which are 2.5 and 4.5 ft apart."""
-
-APART = {frozenset(("left", "middle")): 2.5, frozenset(("middle", "right")): 4.5, frozenset(("left", "right")): 7.0}
-
-PLACES = {
-    "1": {"A": "left", "B": "middle", "C": "right"},
-    "2": {"A": "middle", "B": "right", "C": "left"},
-    "3": {"A": "right", "B": "left", "C": "middle"},
-    "4": {"A": "right", "B": "middle", "C": "left"},
-    "5": {"A": "middle", "B": "left", "C": "right"},
-    "6": {"A": "left", "B": "right", "C": "middle"},
-    "7": {"A": "left", "C": "right"},
-    "8": {"A": "left", "B": "right"},
-}
-"""Where each phase of a configuration hangs."""
-
-SINGLE_PHASE = {"9": ("A", ACSR_1_0), "10": ("B", ACSR_336), "11": ("C", ACSR_336)}
-"""Phase and wire, also of the neutral 5 ft away; the autotest has larger wires than IEEE in 10 and 11."""
 
 WITHOUT_LOAD = {"50", "66", "99", "102", "103", "104", "106", "107", "109", "111", "114"}
 
@@ -154,7 +46,7 @@ INVERTERS = {
 def island_tables() -> Tables:
     """Return the tables with the load at 251 switched off; a machine stands in for the substation of `source`."""
     tables = {path.stem: _read(path) for path in sorted(TABLES.glob("*.csv")) if path.stem != "published_voltages"}
-    tables["line_configs"] = line_configs()
+    tables["line_configs"] = _read(Path(__file__).with_name("secondary_line_configs.csv"))
     for line in tables["lines"]:
         if {line["from_bus"], line["to_bus"]} == {"51", "151"}:
             line["length_m"] = repr(700 * 0.3048)
@@ -187,31 +79,15 @@ def island_tables() -> Tables:
     return tables
 
 
-def line_configs() -> list[Row]:
-    """Return the autotest's impedances as a table."""
-    rows = []
-    for name, (phases, Z) in _impedances().items():
-        for i, first in enumerate(phases):
-            for j, second in enumerate(phases[i:], i):
-                per_km = complex(Z[i, j]) / MILE
-                numbers = {"R_ohm_per_km": per_km.real, "X_ohm_per_km": per_km.imag, "B_uS_per_km": 0.0}
-                ends = {"config": name, "phase_1": first, "phase_2": second}
-                rows.append(ends | {key: repr(number) for key, number in numbers.items()})
-    return rows
-
-
 def write_tables(tables: Tables, folder: Path) -> None:
     """Write tables as the CSV files of a feeder."""
     for name, rows in tables.items():
-        with (folder / f"{name}.csv").open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        pd.DataFrame(rows).to_csv(folder / f"{name}.csv", index=False)
 
 
 def _read(path: Path) -> list[Row]:
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+    rows: list[Row] = pd.read_csv(path, dtype=str, keep_default_na=False).to_dict("records")
+    return rows
 
 
 def _set_switch(tables: Tables, first: str, second: str, state: str) -> None:
@@ -239,23 +115,7 @@ def _loads(rows: list[Row]) -> list[Row]:
     return loads
 
 
-def _impedances() -> dict[str, tuple[str, Impedance]]:
-    """Return phases and impedance (ohm per mile) of each configuration."""
-    impedances = {}
-    for name, place in PLACES.items():
-        phases = "".join(sorted(place))
-        between = [[APART.get(frozenset((place[i], place[j])), 0.0) for j in phases] for i in phases]
-        to_neutral = [AT_POLE[place[phase]] for phase in phases]
-        if name == "2":  # the autotest has A and B of this configuration the other way round, to the neutral alone
-            to_neutral[0], to_neutral[1] = to_neutral[1], to_neutral[0]
-        impedances[name] = phases, overhead_impedance(between, to_neutral, ACSR_336, ACSR_4_0)
-    for name, (phase, wire) in SINGLE_PHASE.items():
-        impedances[name] = phase, overhead_impedance([[0.0]], [5.0], wire, wire)
-    core = Conductor(0.97, 0.0111)
-    radius = (1.06 - 0.0640837) / 24.0
-    impedances["12"] = "ABC", cable_impedance((0.0, 0.5, 1.0), core, core, 6, radius)
-    return impedances
-
+# ---------------------------------------------------------------- impedances of switches and regulators
 
 Z_SWITCH = 1e-4 - 1e-4j
 """Of each phase of a closed switch (ohm); found by fitting, good to 1e-9 ohm."""

@@ -113,13 +113,7 @@ SOLVER = (
 
 
 def record_secondary(seconds: float) -> RecordedRun:
-    """Run it for some seconds after the load has come on.
-
-    Raises
-    ------
-    RuntimeError
-        If GridLAB-D fails.
-    """
+    """Run it for some seconds after the load has come on."""
     steps = round(seconds / H) + 1
     injections = [(NODE[name], INJECTION, COMPLEX) for name in MACHINES]
     read = [

@@ -57,19 +57,8 @@ AUTOTEST = SecondarySettings()
 class SecondaryControl:
     """The controller between two steps.
 
-    Parameters
-    ----------
-    participants
-        By name.
-    start
-        GridLAB-D's clock at the first step (s). When a sample is due is decided by rounding at this magnitude.
-    settings
-        Its settings.
-
-    Attributes
-    ----------
-    offsets : dict of str to float
-        How far each participant's set-point is moved (pu).
+    `start` is GridLAB-D's clock at the first step (s): when a sample is due is decided by rounding at this magnitude.
+    `offsets` tell how far each participant's set-point is moved (pu).
     """
 
     def __init__(

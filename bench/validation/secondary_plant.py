@@ -28,11 +28,11 @@ from bench.validation.secondary_gridlabd import (
     H,
 )
 from bench.validation.secondary_law import Participant, SecondaryControl
+from bench.validation.validation_part import inverter_row
 from plant.dynamics import Circuit, Dynamics, Inverter
 from plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
 from plant.dynamics.kernel.current_limit import solve_within_limits
 from plant.dynamics.live_network import TOLERANCE
-from plant.equipment import InverterRow
 from plant.equipment.imported_equipment import LinearElement
 from plant.feeder.circuits import circuit_of
 from plant.network import Network
@@ -44,15 +44,7 @@ K_P, K_I = 10.0, 100.0
 
 
 class BusFrequency:
-    """Three phase-locked loops that start locked at nominal frequency.
-
-    Parameters
-    ----------
-    V
-        Phasors of the bus at the start, in the frame of nominal frequency (V).
-    h
-        Step (s).
-    """
+    """Three phase-locked loops that start locked at nominal frequency to phasors of a bus (V); `h` is the step (s)."""
 
     def __init__(self, V: NDArray[np.complex128], h: float) -> None:
         self._h, self._theta, self._w = h, np.angle(V), np.zeros(3)
@@ -69,18 +61,8 @@ class BusFrequency:
 class ReplayedMachines(Dynamics):
     """Dynamics that a caller takes from one network solution to the next.
 
-    A machine is an inverter without a controller: whatever its injection is when the network is solved, it stays.
-
-    Parameters
-    ----------
-    circuit
-        The network; the machines' admittances are part of it.
-    inverters
-        The inverters, then the machines as grid-following current sources.
-    machines
-        How many machines there are.
-    h
-        Step (s).
+    A machine is an inverter without a controller: whatever its injection is when the network is solved, it stays. The
+    last `machines` of the inverters are machines, as current sources; their admittances are part of the circuit.
     """
 
     def __init__(self, circuit: Circuit, inverters: tuple[Inverter, ...], machines: int, h: float) -> None:
@@ -97,10 +79,7 @@ class ReplayedMachines(Dynamics):
     def solve(self, J: NDArray[np.complex128], *, second: bool) -> NDArray[np.float64]:
         """Solve the network with the machines' injections J (A, machines x 3), and pass the inverters' controllers.
 
-        Returns
-        -------
-        float64[n, READING]
-            As `Dynamics.run`, of this solution; 0 for the machines.
+        Readings are those of `Dynamics.run`, of this solution; 0 for the machines.
         """
         units, network, net = self.inverters, self.network, self.network.net
         arrays = self.arrays()
@@ -137,13 +116,7 @@ class SecondaryRun(NamedTuple):
 
 
 class SecondaryPlant:
-    """Our plant with the controller.
-
-    Parameters
-    ----------
-    theirs
-        GridLAB-D's run: where to start, and the machines' injections.
-    """
+    """Our plant with the controller, from where GridLAB-D's run starts, and with its machines' injections."""
 
     def __init__(self, theirs: RecordedRun) -> None:
         J = [np.array([values[NODE[name], INJECTION] for name in MACHINES]).T for values in theirs]
@@ -231,9 +204,7 @@ def _network() -> Network:
         for name, machine in MACHINES.items()
     )
     rows = tuple(
-        InverterRow(
-            name=name, kind="GFL", bus=machine.bus, microgrid="", P_rated=machine.S_rated, V_nom=V_NOM, m_p=1.0, m_q=1.0
-        )
+        inverter_row(name, "GFL", machine.bus, machine.S_rated, V_NOM, m_p=1.0, m_q=1.0)
         for name, machine in MACHINES.items()
     )
     feeder = replace(feeder, source=None, elements=elements, inverters=feeder.inverters + rows)

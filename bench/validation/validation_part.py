@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib.metadata import PackageNotFoundError, version
 from math import floor, log10
-from typing import NamedTuple
+from typing import Any, Literal, NamedTuple
+
+from plant.equipment import InverterRow
+
+Kind = Literal["GFM", "GFL"]
 
 
 class ToleranceCheck(NamedTuple):
@@ -73,6 +77,12 @@ class ValidationPart(NamedTuple):
     def references(self) -> str:
         """Return the reference programs with their versions: "gridlabd 6.0.0"."""
         return ", ".join(f"{name} {_version(name)}" for name in self.needs)
+
+
+def inverter_row(name: str, kind: Kind, bus: str, P_rated: float, V_nom: float, **own: Any) -> InverterRow:
+    """Return an inverter of a feeder, with droops of 1 and 5 % and no microgrid unless its own keys say otherwise."""
+    usual: dict[str, Any] = {"microgrid": "", "m_p": 0.01, "m_q": 0.05}
+    return InverterRow(name=name, kind=kind, bus=bus, P_rated=P_rated, V_nom=V_nom, **(usual | own))
 
 
 def rounded_up(value: float) -> str:

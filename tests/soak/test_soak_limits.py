@@ -13,8 +13,7 @@ from typer.testing import CliRunner
 from agents.agent_config import AgentConfig, Control
 from bench.soak import __main__ as command
 from bench.soak.__main__ import StopRequest
-from bench.soak.judging import growths, judge_checks, judge_growth, judge_late, judge_times
-from bench.soak.process_looks import ProcessSize
+from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
 from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
