@@ -46,7 +46,7 @@ def machine() -> str:
     if cpuinfo.exists():
         names = [row.partition(":")[2].strip() for row in cpuinfo.read_text().splitlines() if "model name" in row]
         model = names[0] if names else model
-    versions = ", ".join(f"{name} {metadata.version(name)}" for name in ("eclipse-zenoh", "numba", "msgspec"))
+    versions = ", ".join(f"{name} {installed}" for name in PACKAGES if (installed := version(name)))
     system = f"{platform.system()}, Python {platform.python_version()}"
     return f"{model}, {os.cpu_count()} cores, load {load()}; {system}, {versions}"
 

@@ -25,7 +25,7 @@ def measure(
     parts: Annotated[
         list[str] | None,
         typer.Argument(
-            help="; ".join(f"{name}: {part.text}" for name, part in PARTS.items()) + ". All of them by default.",
+            help=" ".join(f"{name}: {part.__doc__}" for name, part in PARTS.items()) + " All of them by default.",
             show_default=False,
         ),
     ] = None,
@@ -40,7 +40,7 @@ def measure(
     measured: dict[str, PartRun] = {}
     for name in parts or PARTS:
         say(name)
-        measured[name] = measure_in_turns(partial(PARTS[name].measures, extent), extent.rounds, say)
+        measured[name] = measure_in_turns(partial(PARTS[name], extent), extent.rounds, say)
         if json:  # each part is kept once it is measured
             write_whole(json, msgspec.json.format(msgspec.json.encode(measured), indent=1).decode() + "\n")
     print(tables_text(measured))

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import msgspec
 
-from bench.harness import PACKAGES, MachineUse, commit, machine, reason, version
+from bench.harness import MachineUse, commit, machine, reason, version
 
 
 class Measure(NamedTuple):
@@ -31,8 +31,7 @@ class PartRun(msgspec.Struct, kw_only=True):
     commit: str
     """Of this repository; "+" behind it marks changes that were not committed."""
     machine: str
-    """Processor, cores, load before, system."""
-    versions: dict[str, str]
+    """Processor, cores, load before, system, versions."""
     loads: list[float]
     """Load (1 min) before, and after each round."""
     others: float = 0.0
@@ -59,7 +58,6 @@ def measure_in_turns(
         began=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         commit=commit(),
         machine=machine(),
-        versions={name: installed for name in PACKAGES if (installed := version(name))},
         loads=[os.getloadavg()[0]],
     )
     use = MachineUse()

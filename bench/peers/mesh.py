@@ -12,8 +12,8 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
-from time import monotonic
 
 import msgspec
 
@@ -117,12 +117,11 @@ def seconds_per_round(
             )
             for name in (HUB, *hosts)
         ]
-        log = Path(folder) / "log"
+        log, answer = Path(folder) / "log", b""
         with log.open("ab") as errors:
             children = [
                 subprocess.Popen(
-                    [sys.executable, "-m", "bench.peers.mesh_process"],
-                    stdin=subprocess.PIPE,
+                    [sys.executable, "-m", "bench.peers.mesh_process", msgspec.json.encode(member)],
                     stdout=subprocess.PIPE if member.is_hub else errors,
                     stderr=errors,
                     cwd=Path(__file__).parents[2],
@@ -130,34 +129,15 @@ def seconds_per_round(
                 for member in members
             ]
             try:
-                for child, member in zip(children, members, strict=True):
-                    assert child.stdin is not None
-                    child.stdin.write(msgspec.json.encode(member))
-                    child.stdin.close()
-                answer = _answer(children[0])
+                with suppress(subprocess.TimeoutExpired):
+                    answer = children[0].communicate(timeout=DEADLINE)[0]
             finally:
-                _end(children)
+                for child in children:
+                    try:
+                        child.wait(LEAVING if answer else 0.0)
+                    except subprocess.TimeoutExpired:
+                        child.kill()
+                        child.wait()
         if not answer:
             raise RuntimeError(f"{transport}: the mesh did not end: {log.read_text(errors='replace')[-1500:]}")
     return float(answer) / rounds
-
-
-def _answer(hub: subprocess.Popen[bytes]) -> bytes:
-    """Return what the hub prints; nothing if it fails, or does not end."""
-    hub.stdin = None  # closed: `communicate` would flush it
-    try:
-        return hub.communicate(timeout=DEADLINE)[0]
-    except subprocess.TimeoutExpired:
-        return b""
-
-
-def _end(children: Sequence[subprocess.Popen[bytes]]) -> None:
-    until = monotonic() + LEAVING
-    for child in children:
-        try:
-            child.wait(max(0.0, until - monotonic()))
-        except subprocess.TimeoutExpired:
-            child.kill()
-            child.wait()
-        if child.stdout is not None:
-            child.stdout.close()

@@ -1,12 +1,10 @@
-"""One process of a mesh (`bench.peers.mesh`): its configuration on standard input; the hub prints the seconds."""
+"""One process of a mesh (`bench.peers.mesh`), whose configuration is its argument; the hub prints the seconds."""
 
 from __future__ import annotations
 
 import sys
 from collections import Counter
-from collections.abc import Iterable
 from time import monotonic, perf_counter
-from typing import Protocol
 
 import msgspec
 
@@ -17,26 +15,10 @@ GREETING = 0.05
 """Time (s) between two greetings, by which all make sure to hear each other before anything is measured."""
 
 
-class Transport(Protocol):
-    """The rival's way to publish and to receive, for one process of the mesh."""
-
-    def subscribe(self, topic: str) -> None:
-        """Take in the messages of a topic."""
-
-    def publish(self, topic: str, payload: bytes) -> None:
-        """Send a message to all that take in its topic."""
-
-    def take(self, needed: int, timeout: float) -> Iterable[tuple[str, bytes]]:
-        """Wait for so many messages, but not longer than the timeout (s); return topics and payloads that came."""
-
-    def close(self) -> None:
-        """Leave."""
-
-
 class MeshNode:
     """One process of a mesh that meets the others by greetings: all transports but HELICS."""
 
-    def __init__(self, member: MeshMember, transport: Transport) -> None:
+    def __init__(self, member: MeshMember, transport: ZenohTransport | ZeromqTransport) -> None:
         self._member, self._transport = member, transport
         self._seen: Counter[str] = Counter()
         for other in member.others:
@@ -104,7 +86,7 @@ class MeshNode:
 
 def main() -> None:
     """Be one process of a mesh."""
-    member = msgspec.json.decode(sys.stdin.buffer.read(), type=MeshMember)
+    member = msgspec.json.decode(sys.argv[1], type=MeshMember)
     if member.transport.startswith("helics"):
         seconds = run_federate(member)
     else:

@@ -37,14 +37,6 @@ SCALED, SHORTEST = 600, 4
 """Agents times simulated seconds, and least simulated time (s), of a run of the part "scale"."""
 
 
-class BenchPart(NamedTuple):
-    """One part of the bench, whose measures take turns."""
-
-    measures: Callable[[Extent], Sequence[Measure]]
-    text: str
-    """For the help."""
-
-
 def plant(extent: Extent) -> list[Measure]:
     """Our plant beside GridLAB-D."""
     case = OurCase(extent.end)
@@ -116,11 +108,12 @@ def scale(extent: Extent) -> list[Measure]:
     ]
 
 
-PARTS = {
-    "plant": BenchPart(plant, "the plant beside GridLAB-D"),
-    "case": BenchPart(case, "one case in process"),
-    "sweep": BenchPart(sweep, "a sweep on all cores"),
-    "command": BenchPart(command, "the command's help, and its first case with processes"),
-    "tick": BenchPart(tick, "a tick with processes beside HELICS, ZeroMQ, bare Zenoh; a case start to end"),
-    "scale": BenchPart(scale, "a simulated second in one process, up to 999 agents"),
+PARTS: dict[str, Callable[[Extent], Sequence[Measure]]] = {
+    "plant": plant,
+    "case": case,
+    "sweep": sweep,
+    "command": command,
+    "tick": tick,
+    "scale": scale,
 }
+"""What makes the measures of each part, which take turns."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 import pandas as pd
 
@@ -13,35 +12,23 @@ from bench.peers.measured import PartRun
 PLANT = ("ours.plant.build", "ours.plant.steps")
 
 
-class Ratio(NamedTuple):
-    """A rival's time beside ours; each is a sum of values of one part."""
-
-    text: str
-    part: str
-    theirs: tuple[str, ...]
-    ours: tuple[str, ...]
-
-
-def _tick(kind: str, what: str, rival: str, agents: int) -> Ratio:
-    return Ratio(f"a tick, {kind}: {what}", "tick", (f"{rival}.tick.{agents}",), (f"ours.tick.{agents}",))
-
-
 RATIOS = (
-    Ratio("plant: GridLAB-D's steps, our build and steps", "plant", ("gridlabd.plant.steps",), PLANT),
-    Ratio("- the steps alone", "plant", ("gridlabd.plant.steps",), PLANT[1:]),
+    ("plant: GridLAB-D's steps, our build and steps", "plant", ("gridlabd.plant.steps",), PLANT),
+    ("- the steps alone", "plant", ("gridlabd.plant.steps",), PLANT[1:]),
     *(
-        _tick("a process for each agent", what, rival, 9)
-        for what, rival in (
-            ("HELICS zmq, empty federates", "helics-zmq"),
-            ("HELICS tcp, empty federates", "helics-tcp"),
-            ("ZeroMQ ipc, empty", "zeromq"),
-            ("bare Zenoh, empty", "zenoh"),
-            ("bare Zenoh, empty, the hub relays", "zenoh-star"),
+        (f"a tick, {text}", "tick", (f"{rival}.tick.{agents}",), (f"ours.tick.{agents}",))
+        for text, rival, agents in (
+            ("a process for each agent: HELICS zmq, empty federates", "helics-zmq", 9),
+            ("a process for each agent: HELICS tcp, empty federates", "helics-tcp", 9),
+            ("a process for each agent: ZeroMQ ipc, empty", "zeromq", 9),
+            ("a process for each agent: bare Zenoh, empty", "zenoh", 9),
+            ("a process for each agent: bare Zenoh, empty, the hub relays", "zenoh-star", 9),
+            ("three agents a process: bare Zenoh, empty", "zenoh", 3),
+            ("three agents a process: bare Zenoh, empty, the hub relays", "zenoh-star", 3),
         )
     ),
-    _tick("three agents a process", "bare Zenoh, empty", "zenoh", 3),
-    _tick("three agents a process", "bare Zenoh, empty, the hub relays", "zenoh-star", 3),
 )
+"""Rows of a rival beside ours: text, part, and the values whose sum is the rival's time, and ours."""
 
 
 def tables_text(parts: Mapping[str, PartRun]) -> str:
@@ -55,7 +42,7 @@ def tables_text(parts: Mapping[str, PartRun]) -> str:
         columns=["part", "value", "unit", *SPREAD],
     )
     ratios = pd.DataFrame(
-        [(ratio.text, *row) for ratio in RATIOS if (row := _ratio(ratio, parts))],
+        [(text, *row) for text, part, theirs, ours in RATIOS if (row := _ratio(parts, part, theirs, ours))],
         columns=["what", "the rival's (ms)", "ours (ms)", *(f"rival's / ours, {name}" for name in SPREAD)],
     )
     shown = [markdown(table.columns, table.to_numpy().tolist()) for table in (ratios, values) if len(table)]
@@ -75,14 +62,16 @@ def _unit(value: str) -> str:
     )
 
 
-def _ratio(ratio: Ratio, parts: Mapping[str, PartRun]) -> tuple[float, ...] | None:
+def _ratio(
+    parts: Mapping[str, PartRun], part: str, theirs: tuple[str, ...], ours: tuple[str, ...]
+) -> tuple[float, ...] | None:
     """Return medians (ms) and the ratio, whose rounds are those in which both took turns; None if one is missing."""
-    values = parts[ratio.part].values if ratio.part in parts else {}
-    if not all(name in values for name in (*ratio.theirs, *ratio.ours)):
+    values = parts[part].values if part in parts else {}
+    if not values.keys() >= {*theirs, *ours}:
         return None
-    frame = pd.DataFrame({name: pd.Series(values[name]) for name in {*ratio.theirs, *ratio.ours}})
-    theirs, ours = frame[list(ratio.theirs)].sum(axis=1), frame[list(ratio.ours)].sum(axis=1)
-    return 1e3 * theirs.median(), 1e3 * ours.median(), *_spread((theirs / ours).dropna())
+    frame = pd.DataFrame({name: pd.Series(values[name]) for name in {*theirs, *ours}})
+    them, us = frame[list(theirs)].sum(axis=1), frame[list(ours)].sum(axis=1)
+    return 1e3 * them.median(), 1e3 * us.median(), *_spread((them / us).dropna())
 
 
 def machines(parts: Mapping[str, PartRun]) -> Iterator[str]:
@@ -90,7 +79,6 @@ def machines(parts: Mapping[str, PartRun]) -> Iterator[str]:
     for name, part in parts.items():
         yield (
             f"- `{name}`: {part.began}, commit {part.commit}, {part.seconds:.0f} s; {part.machine}; load up to "
-            f"{max(part.loads):.1f}, others {100.0 * part.others:.0f} % of the processors; "
-            + ", ".join(f"{package} {found}" for package, found in part.versions.items())
+            f"{max(part.loads):.1f}, others {100.0 * part.others:.0f} % of the processors"
         )
         yield from (f"  - left out: {measure}: {why}" for measure, why in part.left_out.items())

@@ -116,8 +116,6 @@ class SoakEnd(NamedTuple):
     """Greatest memory of the command meanwhile (MB)."""
     files: Mapping[str, int]
     """Files of the run (bytes)."""
-    printed: str
-    """What `gridpeers up` printed."""
 
 
 class CountingClient(RunClient):
@@ -263,7 +261,6 @@ class WatchedRun:
             report_s=took,
             peak_MB=peak,
             files={file.name: file.stat().st_size for file in sorted(self.here.rglob("*")) if file.is_file()},
-            printed=self._processes.printed("up"),
         )
 
     def _others(self, name: str) -> tuple[str, ...]:
@@ -294,8 +291,9 @@ class WatchedRun:
         for name, (pid, born) in list(self._pids.items()):
             with suppress(psutil.Error):  # it has just ended
                 process = psutil.Process(pid)
-                memory, files = process.memory_full_info().uss / 1e6, process.num_fds()
-                self.sizes.append(ProcessSize(at, name, pid, born, memory, files))
+                memory = process.memory_info()
+                anonymous = (memory.rss - memory.shared) / 1e6
+                self.sizes.append(ProcessSize(at, name, pid, born, anonymous, process.num_fds()))
 
     def _need(self, sound: bool, why: str) -> None:
         if not sound:

@@ -18,7 +18,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from agents.agent_config import AgentConfig
-from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, SinglePhase, shortened
+from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, shortened
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from plant.equipment import Feeder, InverterRow
 from plant.feeder import Plant
@@ -49,7 +49,12 @@ class PlantDifferences(NamedTuple):
 def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
     """Take both plants through a run, all of whose times are multiplied by a factor."""
     scenario, feeder = load_scenario(run.scenario)
-    feeder = _with_single_phase(feeder, ON_ONE_PHASE if run.single_phase else ())
+    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
+    added = (
+        inverter_row(name, kind, bus, P_rated, V_nom[bus], phases=phase, microgrid="single-phase")
+        for name, kind, bus, phase, P_rated in (ON_ONE_PHASE if run.single_phase else ())
+    )
+    feeder = replace(feeder, inverters=(*feeder.inverters, *added))
     config, agents = configs(scenario, feeder, run.case)
     settings = replace(
         config.settings,
@@ -76,16 +81,6 @@ def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
     gaps = np.abs(rows - rows_theirs)
     angles = (first.angle, second.angle) if run.reclosing else None
     return PlantDifferences(t, {quantity: gaps[:, :, k] for k, quantity in enumerate(QUANTITIES)}, angles)
-
-
-def _with_single_phase(feeder: Feeder, added: Sequence[SinglePhase]) -> Feeder:
-    """Return the feeder with these inverters beside its own."""
-    V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
-    rows = (
-        inverter_row(it.name, it.kind, it.bus, it.P_rated, V_nom[it.bus], phases=it.phase, microgrid="single-phase")
-        for it in added
-    )
-    return replace(feeder, inverters=(*feeder.inverters, *rows))
 
 
 def _started(ours: Plant, feeder: Feeder, run: ComparedRun, config: PlantConfig) -> GridlabdPlant:

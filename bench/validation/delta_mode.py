@@ -189,7 +189,10 @@ class DeltaRecorder:
             self._rows.append(_values(self._read))
             for step, name, key, value in self._writes:
                 if step == len(self._rows):
-                    self._write(name, key, value)
+                    if isinstance(value, list):  # real and imaginary part
+                        self._core.doubles(name, key, len(value))[:] = value
+                    else:
+                        self._core.write(name, key, value)
             if len(self._rows) == self._steps:
                 np.savez(self._out, rows=np.array(self._rows), between=np.array(self._between))
                 os._exit(0)  # GridLAB-D would go on to its own end
@@ -197,12 +200,6 @@ class DeltaRecorder:
             print(f"{type(error).__name__}: {error}", file=sys.stderr, flush=True)
             os._exit(FAILED)
         return mode
-
-    def _write(self, name: str, key: str, value: Any) -> None:
-        if isinstance(value, list):  # real and imaginary part
-            self._core.doubles(name, key, len(value))[:] = value
-        else:
-            self._core.write(name, key, value)
 
 
 def _values(properties: Sequence[Any]) -> list[float]:

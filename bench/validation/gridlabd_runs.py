@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Literal, NamedTuple
 
 import msgspec
 from msgspec.structs import replace
 
+from bench.validation.validation_part import Kind
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.plant_config import PlantConfig, SwitchEvent
 
@@ -40,17 +40,6 @@ class Reclosing(msgspec.Struct, frozen=True):
     """Time (s) that the run goes on."""
 
 
-class SinglePhase(NamedTuple):
-    """A single-phase inverter that a run adds to the feeder's own."""
-
-    name: str
-    kind: Literal["GFM", "GFL"]
-    bus: str
-    phase: Literal["A", "B", "C"]
-    P_rated: float
-    """Rating (W)."""
-
-
 class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One run: the events and limits that both plants go through; what is left out is the scenario's."""
 
@@ -80,14 +69,14 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.case != "I"
 
 
-ON_ONE_PHASE = (
-    SinglePhase("s1", "GFL", "96", "B", 50e3),
-    SinglePhase("s2", "GFL", "103", "C", 40e3),
-    SinglePhase("s3", "GFL", "47", "A", 30e3),
-    SinglePhase("g1", "GFM", "114", "A", 60e3),
-    SinglePhase("g2", "GFM", "38", "B", 60e3),
+ON_ONE_PHASE: tuple[tuple[str, Kind, str, str, float], ...] = (
+    ("s1", "GFL", "96", "B", 50e3),
+    ("s2", "GFL", "103", "C", 40e3),
+    ("s3", "GFL", "47", "A", 30e3),
+    ("g1", "GFM", "114", "A", 60e3),
+    ("g2", "GFM", "38", "B", 60e3),
 )
-"""Four on laterals of their phase, and one at a bus of three phases."""
+"""Name, kind, bus, phase and rating (W); four on laterals of their phase, and one at a bus of three phases."""
 
 RUNS = msgspec.convert(
     tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")), dict[str, ComparedRun]

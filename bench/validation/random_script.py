@@ -22,6 +22,12 @@ neutral is then at up to 38 pu, and rounding moves it by 1e-4 pu, in either engi
 LIMITS = ("vminpu=0.8 vmaxpu=1.2", "vminpu=0.8 vmaxpu=1.2", "")
 """Voltages within which loads keep their law; the last are the engine's own, 0.95 and 1.05 pu."""
 
+CONNECTIONS = (
+    *("wye-wye", "wye-wye", "delta-wye", "delta-wye", "wye-delta", "floating wye-delta", "delta-delta"),
+    *("four", "four", "one phase"),
+)
+"""Of transformers; some are drawn twice as often."""
+
 UNEVEN = """New LineCode.uneven nphases=3 units=km rmatrix=(0.22 | 0.10 0.21 | 0.09 0.09 0.23)
 ~ xmatrix=(0.63 | 0.31 0.65 | 0.26 0.24 0.64) cmatrix=(11 | -3 10 | -2 -1 9)
 New LineCode.four nphases=4 units=km rmatrix=(0.25 | 0.05 0.25 | 0.05 0.05 0.25 | 0.05 0.05 0.05 0.28)
@@ -186,20 +192,7 @@ New Circuit.random bus1=s basekv={MV} pu={rng.uniform(1.0, 1.04):.3f} angle={rng
         common += f" kvs=({MV} {LV}) kvas=({kVA} {kVA}) taps=(1 {tap})"
         if rng.random() < 0.3:
             common += f" %noloadloss={rng.uniform(0.1, 0.4):.2f} %imag={rng.uniform(0.2, 1.0):.2f}"
-        connection = rng.choice(
-            (
-                "wye-wye",
-                "wye-wye",
-                "delta-wye",
-                "delta-wye",
-                "wye-delta",
-                "floating wye-delta",
-                "delta-delta",
-                "four",
-                "four",
-                "one phase",
-            )
-        )
+        connection = rng.choice(CONNECTIONS)
         lines, ends = self._lines, f"buses=({bus.name} {low})"
         if connection.endswith("delta"):
             common += f" {ANTIFLOAT}"

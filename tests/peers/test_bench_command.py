@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from bench.peers.__main__ import app
 from bench.peers.measured import Measure
-from bench.peers.parts import PARTS, SHORT, BenchPart, Extent
+from bench.peers.parts import PARTS, SHORT, Extent
 
 
 @pytest.fixture
@@ -22,8 +22,8 @@ def parts(monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(extent: Extent) -> NoReturn:
         raise RuntimeError("no feeder")
 
-    monkeypatch.setitem(PARTS, "tick", BenchPart(measured, "made up"))
-    monkeypatch.setitem(PARTS, "plant", BenchPart(fails, "made up"))
+    monkeypatch.setitem(PARTS, "tick", measured)
+    monkeypatch.setitem(PARTS, "plant", fails)
 
 
 @pytest.mark.usefixtures("parts")
@@ -50,5 +50,5 @@ def test_a_part_that_is_unknown_is_told_with_those_that_there_are() -> None:
 @pytest.mark.parametrize("name", ["command", "scale"])
 def test_the_real_measures_of_a_part_give_values(name: str) -> None:
     """As short as can be: none fails."""
-    for measure in PARTS[name].measures(SHORT):
+    for measure in PARTS[name](SHORT):
         assert measure.run()
