@@ -36,9 +36,6 @@ def say(text: str) -> None:
     print(f"{text} ...", file=sys.stderr, flush=True)
 
 
-# ---------------------------------------------------------------- the machine
-
-
 def machine() -> str:
     """Return one line on processor, cores, load, system and versions."""
     model = platform.processor() or platform.machine()
@@ -116,9 +113,6 @@ def processor_time(pid: int) -> float:
     return float(times.user + times.system + times.children_user + times.children_system)
 
 
-# ---------------------------------------------------------------- commands, and failures
-
-
 def checked(command: Sequence[str], timeout: float = DEADLINE) -> str:
     """Run a command and return what it prints.
 
@@ -155,10 +149,8 @@ def reason(error: Exception) -> str:
     return (first if len(lines) == 1 else f"{first} ... {lines[-1]}")[:LONGEST]
 
 
-def _words(command: Sequence[str] | str) -> str:
+def _words(command: Sequence[str]) -> str:
     """Return a command as a person types it."""
-    if isinstance(command, str):
-        return command
     words = list(command)
     if tuple(words[: len(GRIDPEERS)]) == GRIDPEERS:
         words[: len(GRIDPEERS)] = ["gridpeers"]
@@ -167,9 +159,7 @@ def _words(command: Sequence[str] | str) -> str:
     return shlex.join(words)
 
 
-def _lines(text: str | bytes | None) -> list[str]:
-    if isinstance(text, bytes):
-        text = text.decode(errors="replace")
+def _lines(text: str | None) -> list[str]:
     return [line.strip() for line in (text or "").splitlines() if line.strip()]
 
 

@@ -15,9 +15,8 @@ import msgspec
 import typer
 
 from bench.harness import say
-from bench.peers.measured import PartRun, measure_in_turns
+from bench.peers.measured import PartRun, measure_in_turns, tables_text
 from bench.peers.parts import PARTS, SHORT, Extent
-from bench.peers.tables import tables_text
 from scenarios.results.run_files import write_whole
 
 

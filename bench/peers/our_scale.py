@@ -34,9 +34,6 @@ from scenarios.schema.configs import configs
 ISLAND, JOINT = 9, "450"
 """Inverters of the feeder `microgrid123`, and its bus at which copies are joined."""
 
-FEW = 99
-"""Agents up to which the first run of a process is seen to be slower, and is not counted."""
-
 SCENARIO = """\
 name = "scale"
 [plant]
@@ -74,8 +71,7 @@ def measure(agents: int, T_c: float, end: float) -> dict[str, float]:
         read = process_time() - began
         plant, configured = configs(scenario, feeder, "ring")
         built = build_plant(plant)
-        if agents <= FEW:
-            timed_run(plant, configured, built, folder / "first")
+        timed_run(plant, configured, built, folder / "first")  # the first run of a process is slower
         began = process_time()
         built = build_plant(plant)
         build = process_time() - began

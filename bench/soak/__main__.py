@@ -44,9 +44,6 @@ from scenarios.live.client.run_client import NobodyError
 from scenarios.schema import load_scenario
 from wire.messages import PLANT
 
-STAY = 2
-"""Agents that are never replaced: the first leader and the first follower of the paper."""
-
 TOLD = 10
 """Actions after which progress is told."""
 
@@ -71,7 +68,7 @@ class StopRequest:
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a soak that it ended: 128 and the number of the signal; 0 of one that it did not."""
+        """Exit code of a soak that it ended; 0 of one that it did not."""
         return 0 if self.asked is None else 128 + self.asked
 
 
@@ -109,9 +106,7 @@ def soak(folder: Path, seconds: float, seed: int, stop: StopRequest) -> tuple[st
     """Run for some time (s), or until a request; return the result as Markdown, and whether all limits were kept."""
     feeder = load_scenario("islanding")[1]
     microgrids = {row.name: row.microgrid for row in feeder.inverters}
-    leader = next(row.name for row in feeder.inverters if row.kind == "GFM")
-    follower = next(row.name for row in feeder.inverters if row.kind == "GFL")
-    stays = [leader, follower][:STAY]
+    stays = [next(row.name for row in feeder.inverters if row.kind == kind) for kind in ("GFM", "GFL")]
     (spare, *_) = (row.name for row in feeder.spares)
     replaced = [name for name in microgrids if name not in stays]
     before, began = load(), monotonic()

@@ -293,7 +293,8 @@ class WatchedRun:
                 process = psutil.Process(pid)
                 memory = process.memory_info()
                 anonymous = (memory.rss - memory.shared) / 1e6
-                self.sizes.append(ProcessSize(at, name, pid, born, anonymous, process.num_fds()))
+                if memory.rss:  # else it has ended, and nobody has asked for its status yet
+                    self.sizes.append(ProcessSize(at, name, pid, born, anonymous, process.num_fds()))
 
     def _need(self, sound: bool, why: str) -> None:
         if not sound:

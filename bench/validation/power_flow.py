@@ -30,6 +30,8 @@ class SwitchStates:
 
     def __init__(self, feeder: Feeder) -> None:
         self._feeder = feeder
+        assert feeder.source is not None
+        self._substation = feeder.source.bus
         self._network = Network(feeder)
         self._bridges = {each.name: each for each in feeder.switches if len(each.phases) < len(PHASES)}
         self._three_phase = [bus.name for bus in feeder.buses if set(bus.phases) >= set(PHASES)]
@@ -56,14 +58,11 @@ class SwitchStates:
     def sources(self, closed: frozenset[str]) -> dict[str, frozenset[str]]:
         """Return the bus of each island's source, and the island's buses."""
         if closed not in self._islands:
-            substation = self._feeder.source
-            assert substation is not None
-            islands = self._network.islands(closed)
             self._islands[closed] = {
-                substation.bus
-                if substation.bus in island
-                else next(bus for bus in self._three_phase if bus in island): island
-                for island in islands
+                self._substation
+                if self._substation in island
+                else next(b for b in self._three_phase if b in island): island
+                for island in self._network.islands(closed)
             }
         return self._islands[closed]
 
@@ -85,7 +84,7 @@ class SwitchStates:
 
     def commands(self, states: list[frozenset[str]]) -> Iterator[list[str]]:
         """Return the commands for OpenDSS that lead from one state to the next; sources are made in the first."""
-        anchors = sorted({bus for closed in states for bus in self.sources(closed)} - {self._substation.bus})
+        anchors = sorted({bus for closed in states for bus in self.sources(closed)} - {self._substation})
         kV = {bus.name: bus.V_nom * 3**0.5 / 1e3 for bus in self._feeder.buses}
         new = [
             f"New Vsource.at{bus} bus1={bus} basekv={kV[bus]!r} pu=1 angle=0 {IDEAL_SOURCE} enabled=no"
@@ -100,13 +99,8 @@ class SwitchStates:
             yield [*new, *switching, *enabling]
             new = []
 
-    @property
-    def _substation(self) -> Source:
-        assert self._feeder.source is not None
-        return self._feeder.source
-
     def _solve(self, bus: str, closed: frozenset[str]) -> NDArray[np.complex128]:
-        if bus == self._substation.bus:
+        if bus == self._substation:
             network = self._network
         else:
             network = Network(replace(self._feeder, source=Source(bus=bus, V_pu=1.0, angle=0.0)))

@@ -9,6 +9,7 @@ from __future__ import annotations
 import tomllib
 from math import sqrt
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -16,7 +17,6 @@ from numpy.typing import NDArray
 
 from bench.validation.delta_mode import COMPLEX, REAL, RecordedRun, delta_header, record
 from bench.validation.secondary_feeder import INVERTERS, island_tables
-from bench.validation.secondary_law import AUTOTEST, SecondarySettings
 from plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from plant.gridlabd.model.glm_block import block
 from plant.gridlabd.model.glm_inverters import inverter_blocks
@@ -26,6 +26,26 @@ Z_0, Z_2 = 0.005 + 0.05j, 0.0072 + 0.254j
 """Impedances of zero and negative sequence of a machine (pu), those of GridLAB-D's class."""
 
 PHASES = np.exp(-2j * np.pi / 3.0 * np.arange(3))
+
+
+class SecondarySettings(NamedTuple):
+    """The settings of the autotest."""
+
+    f_nom: float = 60.0
+    """Hz."""
+    dead_band: float = 0.001
+    """Hz, to either side."""
+    bias: float = 12.1187
+    """B (MW/Hz)."""
+    k_i: float = 0.04
+    """Of the integrator (1/s)."""
+    T: float = 0.1
+    """Between two samples of the frequency (s)."""
+    T_s: float = 0.2
+    """Between two publications, and two samples of the powers (s)."""
+
+
+AUTOTEST = SecondarySettings()
 
 
 class Machine(msgspec.Struct, frozen=True):

@@ -1,7 +1,6 @@
 """The tables of the bench: ratios are of one round, and what is missing is named."""
 
-from bench.peers.measured import PartRun
-from bench.peers.tables import tables_text
+from bench.peers.measured import PartRun, tables_text
 
 
 def part_of(values: dict[str, list[float]], left_out: dict[str, str]) -> PartRun:
