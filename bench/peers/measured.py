@@ -90,7 +90,6 @@ def measure_in_turns(
 
 PLANT = ("ours.plant.build", "ours.plant.steps")
 
-
 RATIOS = (
     ("plant: GridLAB-D's steps, our build and steps", "plant", ("gridlabd.plant.steps",), PLANT),
     ("- the steps alone", "plant", ("gridlabd.plant.steps",), PLANT[1:]),

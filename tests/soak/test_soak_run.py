@@ -28,6 +28,7 @@ def test_a_killed_agent_is_told_and_comes_back_and_a_cut_heals(tmp_path: Path) -
     assert [timed for timed in run.times if isinf(timed.seconds)] == []
     assert [name for name, _ in run.kills] == ["inv3"]
     assert {"plant", "command", *microgrids} == {size.name for size in run.sizes}
-    assert all(size.memory > 5.0 and size.files > 3 for size in run.sizes)
+    last = {size.name: size for size in run.sizes}.values()  # an agent that has just been started is small
+    assert [size for size in last if size.memory <= 5.0 or size.files <= 3] == []
     assert run.steps > 0
     assert (run.problems, end.status) == ([], 0)
