@@ -1,4 +1,4 @@
-"""Faults of links: delay, loss, duplicates, corruption, rate, slots, cuts; and a relay of real sockets beside them.
+"""Faults of links: delay, loss, duplicates, corruption, rate, slots, cuts.
 
 The pure core imports no clock, no socket and no file, and neither numpy nor scipy: agents' processes start fast.
 docs/netem.md has every model with its formula, keys and units.

@@ -8,7 +8,7 @@ from pathlib import PurePosixPath
 from xdist.scheduler import LoadFileScheduling
 from xdist.workermanage import WorkerController
 
-REAL_TIME = ("tests/processes/realtime", "tests/schedules", "tests/processes/relay")
+REAL_TIME = ("tests/processes/realtime", "tests/schedules")
 """Folders of tests that keep real time: no two of them run at once, and what runs beside them gives way."""
 
 

@@ -10,7 +10,6 @@ import random
 from collections import Counter
 from collections.abc import Callable
 from importlib.util import find_spec
-from math import isfinite
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Protocol
@@ -20,9 +19,6 @@ from msgspec.structs import replace
 
 from agents.agent_config import AgentConfig
 from agents.realtime.realtime_agent import RealtimeAgent
-from netem.relay import EndpointError
-from netem.relay.endpoint import Endpoint
-from netem.relay.relay_command import RelayCommandError, new_faults, number
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from plant.plant_config import PlantConfig
@@ -247,7 +243,7 @@ class View:
 
 
 class Readers:
-    """Readers of what cores pass on unread, of configurations and of lines: each has one error for bad input."""
+    """Readers of what cores pass on unread, and of configurations: each has one error for bad input."""
 
     def take(self, payload: bytes, rng: random.Random) -> str:
         """Give the bytes to one of them."""
@@ -262,9 +258,6 @@ class Readers:
             (lambda: msgspec.json.decode(body, type=AgentConfig), (msgspec.DecodeError, UnicodeDecodeError)),
             (lambda: msgspec.json.decode(body, type=PlantConfig), (msgspec.DecodeError, UnicodeDecodeError)),
             (lambda: (epoch_of(text), run_of_plant(text), KEYS.parts(text)), ()),
-            (lambda: new_faults(text), (RelayCommandError,)),
-            (lambda: isfinite(number("delay", text)), (RelayCommandError,)),
-            (lambda: Endpoint.parse(text), (EndpointError,)),
         )
         read, errors = rng.choice(readers)
         try:

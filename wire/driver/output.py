@@ -5,8 +5,7 @@ middle of a write would end the process too. So the write itself detects it, bel
 rich alike. There are two reactions:
 
 - A command that exists for its output quits (`speaking`). If no reader is left, it ends silently with the exit
-  status that a shell gives for SIGPIPE; if the output cannot be written, it ends with one line on standard error. A
-  relay does the same: its effect on the network must not outlast the process that started it.
+  status that a shell gives for SIGPIPE; if the output cannot be written, it ends with one line on standard error.
 - A plant, an agent or a group of them continues, and its output is dropped. Its output is a log, and others depend on
   it. To leave as on SIGTERM would take an inverter off the network, or end the run for all, because a person
   quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
