@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from itertools import groupby, pairwise
+from collections.abc import Sequence
+from itertools import groupby, pairwise, product
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from netem.draws import Stream
+from netem.models.chain import RESTART
 from netem.models.copies import Corrupt, Duplicate, flip
 from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
 from tests.unit.netem.link_messages import channel, fates, steady
@@ -22,7 +26,14 @@ CHAINS = {
     "markov": Markov(p13=0.03, p31=0.2, p32=0.3, p23=0.4, p14=0.02),
 }
 
-probability = st.floats(0.0, 1.0)
+PATTERNS = {
+    "gilbert": GilbertElliott(p=0.2, r=0.4),
+    "alternating": GilbertElliott(p=1.0, r=1.0),
+    "gilbert-elliott": GilbertElliott(p=0.1, r=0.3, loss_good=0.1, loss_bad=0.7),
+    "markov": Markov(p13=0.2, p31=0.3, p32=0.3, p23=0.4, p14=0.1),
+}
+
+share = st.floats(0.0, 1.0)
 
 
 def lost(model: LossModel, n: int = N) -> list[bool]:
@@ -59,6 +70,40 @@ def test_states_follow_each_other_as_the_transition_matrix_says(name: str) -> No
         assert stats.binomtest(follows[True], follows.total(), both / weight).pvalue > 0.01
 
 
+@pytest.mark.parametrize("name", PATTERNS)
+def test_patterns_of_losses_have_the_probabilities_of_the_chain(name: str) -> None:
+    """Over 8000 seeds, each pattern of six messages with gaps over a start of the chain is as frequent as it should."""
+    model, numbers = PATTERNS[name], (0, 1, 3, RESTART, RESTART + 1, RESTART + 3)
+    drawn: Counter[tuple[bool, ...]] = Counter()
+    for seed in range(8000):
+        is_lost = model.sampler(Stream(seed, "inv1", "inv2", "loss"))
+        drawn[tuple(map(is_lost, numbers))] += 1
+    expected = {pattern: probability(model, numbers, pattern) for pattern in product((False, True), repeat=6)}
+    often = [pattern for pattern, share in expected.items() if share * 8000 >= 5.0]
+    shares = [expected[pattern] for pattern in often]
+    counts = [drawn[pattern] for pattern in often]
+
+    assert sum(expected.values()) == pytest.approx(1.0)
+    assert drawn.keys() <= {pattern for pattern, share in expected.items() if share > 0.0}
+    observed, told = [*counts, 8000 - sum(counts)], [8000 * share for share in (*shares, 1.0 - sum(shares))]
+    assert (
+        stats.chisquare(*zip(*((o, e) for o, e in zip(observed, told, strict=True) if e > 1e-6), strict=True)).pvalue
+        > 0.01
+    )
+
+
+def probability(model: LossModel, numbers: Sequence[int], lost: Sequence[bool]) -> float:
+    """Probability of one pattern of losses, by going along the chain message by message."""
+    P, pi, loss = np.array(model.transitions), np.array(model.stationary), np.array(model.loss_in_state)
+    state, before = pi, None
+    for number, is_lost in zip(numbers, lost, strict=True):
+        if before is not None:
+            same = number // RESTART == before // RESTART
+            state = state @ np.linalg.matrix_power(P, number - before) if same else state.sum() * pi
+        state, before = state * (loss if is_lost else 1.0 - loss), number
+    return float(state.sum())
+
+
 def test_gilberts_bursts_are_geometric() -> None:
     """With loss in the bad state only, a burst of l messages has probability r (1 - r)^(l - 1)."""
     model = CHAINS["gilbert"]
@@ -71,7 +116,7 @@ def test_gilberts_bursts_are_geometric() -> None:
 
 
 @steady
-@given(probability, st.floats(0.01, 1.0), probability, probability)
+@given(share, st.floats(0.01, 1.0), share, share)
 def test_gilbert_elliotts_stationary_law_is_left_by_one_step_as_it_was(
     p: float, r: float, good: float, bad: float
 ) -> None:
