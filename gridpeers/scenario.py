@@ -203,8 +203,6 @@ class Scenario:
             In real time: seconds of the run per second, from 0.1 to 50.
         strict : bool
             In real time: whether the run breaks when it cannot keep pace.
-        self_check : bool
-            Whether emulated links are tested against their configuration after each case; the report tells the result.
         progress : Callable[[str, float, float], None], optional
             Told the case, the time that it has reached (s) and its end (s).
         folder : str or Path, optional

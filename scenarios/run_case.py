@@ -15,7 +15,6 @@ from agents.agent_config import AgentConfig
 from plant.plant_config import PlantConfig
 from scenarios.drivers.free_endpoint import local_endpoint
 from scenarios.drivers.outcome import Outcome
-from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_info import RecordInfo
 from scenarios.results.figure_processes import prepare_figures
 from scenarios.results.law_failures import ended_by_a_law
@@ -68,9 +67,8 @@ def run_case(
     time = request.scenario.time
     plant, agents = _configs(request, case)
     record = _record_info(request, case, toml, plant, agents)
-    self_check = EmulationConfig.of_tree(plant.links) if request.self_check and plant.links else None
     ahead = request.lasting and request.clock == "simulated"  # in real time nothing else may take a core
-    with Recorder(request.folder / case, self_check=self_check, record=record) as recorder:
+    with Recorder(request.folder / case, record=record) as recorder:
 
         def note(telemetry: Telemetry) -> None:
             nonlocal ahead

@@ -35,8 +35,6 @@ class Request(RunMetrics):
     """Number of processes that agents share; 0 gives each agent its own. It decides no number."""
     strict: bool = False
     """Wall-clock: whether the run breaks when the plant cannot keep pace."""
-    self_check: bool = False
-    """Whether emulated links are tested against their configuration after each case, which takes some seconds."""
     outside: tuple[str, ...] | None = None
     """Inverters that federates of a HELICS federation control instead of our agents; None for a run without HELICS."""
     lasting: bool = True

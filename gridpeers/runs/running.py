@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 class How(Pace, total=False):
     """Options of a run beside its driver; `gridpeers.Scenario.run` explains them."""
 
-    self_check: bool
     progress: Progress | None
     folder: str | Path | None
 
@@ -41,7 +40,6 @@ def run(
     cases: Iterable[str] | None,
     driver: Driver,
     *,
-    self_check: bool = False,
     progress: Progress | None = None,
     folder: str | Path | None = None,
     **pace: Unpack[Pace],
@@ -73,7 +71,6 @@ def run(
         scenario=spec,
         feeder=scenario.feeder,
         driver=driver,
-        self_check=self_check,
         folder=home.path,
         lasting=folder is not None,
         **pace,

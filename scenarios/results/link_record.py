@@ -9,19 +9,13 @@ from collections import Counter
 from collections.abc import Iterator
 from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import msgspec
 
 from netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
-from netem.schema.pattern import Link
-from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_reports import data_of
 from scenarios.results.run_files import write_whole
-from wire.messages import PLANT, LinkReport
-
-if TYPE_CHECKING:
-    from netem.check.verify import Report
+from wire.messages import LinkReport
 
 COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 """Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
@@ -136,25 +130,16 @@ class LinkRecord:
             for link, of in sorted(parts.items())
         }
 
-    def write(self, folder: Path, setup: EmulationConfig | None = None) -> list[str]:
-        """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent.
-
-        Parameters
-        ----------
-        folder : Path
-            The case's folder.
-        setup : EmulationConfig, optional
-            The faults that the case configures, to test the links against them: slow, as it imports scipy.stats.
-        """
+    def write(self, folder: Path) -> list[str]:
+        """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent."""
         if not self.sent:
             return []
-        check = None if setup is None else self._check(setup)
         write_whole(folder / "links.csv", self._csv())
-        write_whole(folder / "links.json", self._json(check))
+        write_whole(folder / "links.json", self._json())
         if self._file is not None:
             self._file.unlink(missing_ok=True)
             self._file = None
-        return list(self._lines(check))
+        return list(self._lines())
 
     def _csv(self) -> Iterator[str]:
         """Yield the text of links.csv: a run of an hour has hundreds of megabytes."""
@@ -168,24 +153,14 @@ class LinkRecord:
             text.truncate()
         yield text.getvalue()
 
-    def _check(self, setup: EmulationConfig) -> Report:
-        """Test every link over which anything was sent; see `netem.check.verify`."""
-        from netem.check.verify import verify
-
-        names = (*setup.microgrids, PLANT)
-        links = [Link(src, dst) for src in names for dst in names if (src, dst) in self.counts]
-        spans = {link: spans for link in links if (spans := setup.netem.spans(link, setup.microgrids))}
-        return verify(list(self.traces()), spans, setup.netem.seed)
-
-    def _json(self, check: Report | None) -> str:
-        """Return the text of links.json: the hash of all verdicts, the counts of every link, the tests if any."""
+    def _json(self) -> str:
+        """Return the text of links.json: the hash of all verdicts, the counts of every link."""
         counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]
         whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
-        whole |= {"tests": [row._asdict() for row in check.rows]} if check else {}
         whole |= {"failures": sorted(self.failures)} if self.failures else {}
         return json.dumps(whole, indent=1, default=str) + "\n"
 
-    def _lines(self, check: Report | None) -> Iterator[str]:
+    def _lines(self) -> Iterator[str]:
         """Yield the lines for the report."""
         dropped: Counter[str] = Counter()
         lies: Counter[str] = Counter()
@@ -195,15 +170,11 @@ class LinkRecord:
         false = ", ".join(f"{count} of {src}" for src, count in lies.most_common() if count)
         false = f", false states: {false}" if false else ""
         shares = (f"{reason} {100.0 * count / self.sent:.2f} %" for reason, count in dropped.most_common())
-        checked = ""
-        if check is not None:
-            tested, failed = (sum(row.ok is not None for row in check.rows), len(check.warnings))
-            checked = "; self-check: " + (f"{tested} tests, {failed or 'none'} failed" if tested else "nothing to test")
         yield (
             f"emulated links: {self.sent} messages over {sum(of.sent > 0 for of in self.counts.values())} links, "
-            f"dropped: {', '.join(shares) or 'none'}{false}{checked} (links.json, links.csv)"
+            f"dropped: {', '.join(shares) or 'none'}{false} (links.json, links.csv)"
         )
-        yield from (f"WARNING: {warning}" for warning in (*self.warnings, *(check.warnings if check else ())))
+        yield from (f"WARNING: {warning}" for warning in self.warnings)
         if self.failures:
             first, *others = sorted(self.failures)
             more = f" (and {len(others)} more of this kind, links.json)" if others else ""

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import msgspec
 
-from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.results.link_record import LinkRecord
 from scenarios.results.packed_events import PackedEvents
 from scenarios.results.run_files import write_whole
@@ -136,8 +135,6 @@ class Recorder:
         Folder of the case; the recorder makes it.
     gaps : bool, optional
         Whether rows may be missing, as in a run whose recorder was out of reach for too long; else that is an error.
-    self_check : EmulationConfig, optional
-        The faults that the case configures, to test the emulated links against them at the end.
     record : RecordInfo, optional
         The run, for its record run.mcap in the same folder; None writes none.
     """
@@ -147,10 +144,9 @@ class Recorder:
         folder: Path | None = None,
         *,
         gaps: bool = False,
-        self_check: EmulationConfig | None = None,
         record: RecordInfo | None = None,
     ) -> None:
-        self._gaps, self._folder, self._self_check = gaps, folder, self_check
+        self._gaps, self._folder = gaps, folder
         self._hash = hashlib.sha256()
         self._file: BinaryIO | None = None
         if folder is not None:
@@ -268,7 +264,7 @@ class Recorder:
         file, link_lines = None, []
         if self._folder is not None:
             self._write_events(self._folder)
-            link_lines = self.links.write(self._folder, self._self_check)
+            link_lines = self.links.write(self._folder)
             file = (self._folder / PARTIAL).rename(self._folder / "history.csv")
         self._finished = True
         return Recorded(

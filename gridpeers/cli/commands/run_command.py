@@ -68,9 +68,6 @@ def run(
     seed: Annotated[
         int | None, typer.Option(min=0, metavar="N", help="Seed instead of the one in the scenario.")
     ] = None,
-    self_check: Annotated[
-        bool, typer.Option("--self-check", help="Test afterwards whether emulated links did what the scenario says.")
-    ] = False,
     require_checks: Annotated[
         bool,
         typer.Option("--require-checks", help="Exit code 1 also if a check fails; one that is not judged has not."),
@@ -109,7 +106,7 @@ def run(
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
     page = page_socket(port) if view else None
     chosen_cases = chosen(spec, case, seed)
-    carry_out(chosen_cases, feeder, driver, out, pace, self_check=self_check, require_checks=require_checks, page=page)
+    carry_out(chosen_cases, feeder, driver, out, pace, require_checks=require_checks, page=page)
 
 
 def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
@@ -140,7 +137,6 @@ def carry_out(
     out: Path | None,
     pace: Pace,
     *,
-    self_check: bool = False,
     require_checks: bool = False,
     outside: tuple[str, ...] | None = None,
     page: socket.socket | None = None,
@@ -191,9 +187,7 @@ def carry_out(
     explanation = f"still starting: waiting for the HELICS federation at {broker} ..." if federate else COMPILING
     if spec.plant.simulator == "gridlabd":
         explanation = RESTING
-    request = Request(
-        scenario=spec, feeder=feeder, driver=driver, folder=folder, self_check=self_check, outside=outside, **pace
-    )
+    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, outside=outside, **pace)
     left = f"what came until then is in {shown(folder)}/"
     with page_beside(folder, page, spec.name):
         try:

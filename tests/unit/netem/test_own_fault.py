@@ -8,8 +8,6 @@ import msgspec
 import pytest
 
 from netem.channel import Channel
-from netem.check.verify import LinkTest, verify
-from netem.ledger import LinkTrace
 from netem.models.own_fault import FAULTS, LinkFault
 from netem.receiver import Receiver
 from netem.schema.change import replayed
@@ -48,16 +46,6 @@ class Leaves(LinkFault):
 class Early(LinkFault):
     def judge(self, message, draws):
         return -0.1
-
-class Sized(LinkFault):
-    def judge(self, message, draws):
-        return 0.1 if message.size > 50 else 0.0
-
-class Counts(LinkFault):
-    seen = 0
-    def judge(self, message, draws):
-        Counts.seen += 1
-        return 0.0 if Counts.seen < 250 else 0.1
 
 class Deaf(LinkFault):
     def judge(self, message):
@@ -130,52 +118,6 @@ def test_one_that_fails_does_nothing_from_then_on_and_is_told_once(folder: str, 
     assert sorted(arrived) == ([0.0, 0.0, 0.0, 0.1, 0.1, 0.1] if name == "Late" else [0.0] * 6)
     assert said in told
     assert receiver.take_failures() == ()
-
-
-def rows(entry: Fault, **changed: float) -> tuple[dict[str, LinkTest], tuple[str, ...]]:
-    """Findings of the self-check on 200 messages, of which some had another delay (s) than the link gave them."""
-    link = channel(entry)
-    fates = [link.judge(seq, 0.02 * seq, 100) for seq in range(200)]
-    outcomes = [fate.reason or fate.deliveries[0][0] for fate in fates]
-    for seq, delay in changed.items():
-        outcomes[int(seq.removeprefix("m"))] = delay
-    trace = LinkTrace(*LINK, tuple(range(200)), tuple(0.02 * seq for seq in range(200)), tuple(outcomes))
-    found = verify([trace], {LINK: entry.spans(*LINK, {})}, seed=1)
-    return {row.what: row for row in found.rows}, found.warnings
-
-
-def test_the_self_check_asks_it_again_and_sees_the_delay_behind_it(folder: str) -> None:
-    """It must say what it said in the run; what it added is taken away before the delay is tested."""
-    found, warnings = rows(fault(folder, "Jam", delay=0.2, loss=0.3))
-
-    own = found["my_faults:Jam"]
-    assert (own.realised, own.ok) == (f"the same, {own.n} times", True)
-    assert found["delay"].n < own.n < 200, "those that it drops have no delay, those that loss drops do not meet it"
-    assert found["delay"].realised == f"exactly, {found['delay'].n} times"
-    assert found["delay"].ok is found["loss"].ok is True
-    assert warnings == ()
-
-
-def test_the_self_check_finds_a_fault_that_cannot_be_repeated(folder: str) -> None:
-    """One message that came later than judge says, and a fault that counts what it has seen in other runs."""
-    tampered, (warning,) = rows(fault(folder, "Jam"), m199=3.0)
-    row = tampered["my_faults:Jam"]
-    counting, told = rows(fault(folder, "Counts"))
-
-    assert (row.realised, row.ok) == ("otherwise for 1 of 200", False)
-    assert "judge may depend on the message and the draws alone" in warning
-    assert counting["my_faults:Counts"].ok is False
-    assert len(told) == 1
-
-
-def test_the_self_check_says_what_it_cannot_ask(folder: str) -> None:
-    """Sizes of messages are not recorded, and of two such faults it cannot tell which did what."""
-    sized, _ = rows(fault(folder, "Sized", delay=0.2))
-    both = Fault(on="inv1 -> inv2", own=(*fault(folder, "Jam").own, *fault(folder, "Sized").own))
-
-    assert sized["my_faults:Sized"].realised.startswith("not tested: it fails, or looks at the size of a message")
-    assert sized["delay"].realised == "not tested: my_faults:Sized on it"
-    assert rows(both)[0]["my_faults:Jam"].realised == "not tested: my_faults:Sized on it"
 
 
 def test_every_problem_of_an_entry_is_told_at_its_key(folder: str) -> None:
