@@ -18,11 +18,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special, stats
 
-from netem.draws import Stream
+from netem.draws import RESTART, Stream
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace, Outcome, copies_of
 from netem.models import INSTANT
-from netem.models.chain import RESTART
 from netem.models.delay import Constant, RandomDelay, Trace
 from netem.models.loss import Bernoulli, LossModel
 from netem.models.own_fault import DROPPED_BY_OWN, judge_of

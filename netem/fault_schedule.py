@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from heapq import heappop, heappush
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
+
+import msgspec
 
 from netem.models import INSTANT
-from netem.schema.fault import Span
+from netem.models.medium import Cut
+from netem.schema.fault import Fault, Span
+from netem.schema.netem import Netem
+from netem.schema.pattern import Link, links_among, parse
+from wire.plugins.plugin import Plugin
 
 CUTS = ("cut", "partition")
 """Kinds that let nothing pass as long as they hold."""
@@ -125,3 +132,151 @@ class FaultSchedule:
                 else:
                     spans.append(Span(kind, start, end, model))
         return tuple(spans)
+
+
+class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True):
+    """Faults end on some links: those that hold at `from_s`; what a scenario has for later still comes."""
+
+    on: str
+    """Which links; see `netem.schema.pattern`."""
+    from_s: float
+    """From when on (s of run time)."""
+    kinds: tuple[str, ...] = ()
+    """Kinds that end, e.g. ("cut",); empty is all."""
+
+
+Change = Fault | Heal
+"""A live change. A `Fault` takes precedence over what the scenario has of its kinds, until it ends."""
+
+
+def changed(schedule: FaultSchedule, change: Change, link: Link, microgrids: Mapping[str, str]) -> FaultSchedule:
+    """Return the schedule of a link after a change, the same object if the change is not about the link."""
+    if isinstance(change, Fault):
+        spans = change.spans(*link, microgrids)
+        return schedule.with_spans(spans) if spans else schedule
+    if not parse(change.on).matches(*link, microgrids):
+        return schedule
+    return schedule.healed(change.from_s, change.kinds or None)
+
+
+def schedule_of(link: Link, netem: Netem, changes: Iterable[Change], microgrids: Mapping[str, str]) -> FaultSchedule:
+    """Return the schedule of one link: the scenario's entries, then the changes since, in that order."""
+    schedule = FaultSchedule(netem.spans(link, microgrids))
+    for change in changes:
+        schedule = changed(schedule, change, link, microgrids)
+    return schedule
+
+
+MOST_SPANS, PAST = 16, 60.0
+"""Number of faults of a link above which old ones are forgotten: those that ended so long (s of run time) before the
+present change and before the latest one. A change takes effect at its own time, and commands may arrive slightly out of
+order."""
+
+
+class Horizon:
+    """The time before which no link is looked up any more, as live changes come.
+
+    Examples
+    --------
+    >>> horizon = Horizon()
+    >>> [horizon.after(Heal(on="*", from_s=t)) for t in (100.0, 130.0, 120.0)]
+    [-inf, 40.0, 60.0]
+    """
+
+    def __init__(self) -> None:
+        self._latest = -math.inf
+        """Latest time of a change so far (s)."""
+
+    def after(self, change: Change) -> float:
+        """Return it (s of run time) after one more change."""
+        over = min(self._latest, change.from_s) - PAST
+        self._latest = max(self._latest, change.from_s)
+        return over
+
+
+def without_old(schedule: FaultSchedule, over: float) -> FaultSchedule:
+    """Return a schedule without the faults that had ended by the time `over` (s), if it has many."""
+    return schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule
+
+
+class LinkSchedules:
+    """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
+
+    Only the times of changes to come are looked up, so faults that ended long ago are forgotten.
+
+    Parameters
+    ----------
+    netem : Netem
+        The scenario's entries.
+    microgrids : Mapping[str, str]
+        Microgrid of each inverter.
+
+    Examples
+    --------
+    >>> schedules = LinkSchedules(Netem(), {"inv1": "MG1", "inv2": "MG1"})
+    >>> schedules.apply(Fault(on="inv1 -> inv2", cut=Cut(), from_s=1.0))
+    >>> [kind for kind in schedules.of(Link("inv1", "inv2")).at(2.0).active]
+    ['cut']
+    """
+
+    def __init__(self, netem: Netem, microgrids: Mapping[str, str]) -> None:
+        self._netem, self._microgrids = netem, microgrids
+        self._horizon = Horizon()
+
+    @cached_property
+    def _schedules(self) -> dict[Link, FaultSchedule]:
+        """Schedule of each link, once one is asked for: most runs have no live changes."""
+        return {link: schedule_of(link, self._netem, (), self._microgrids) for link in links_among(self._microgrids)}
+
+    def apply(self, change: Change) -> None:
+        """Take up a change."""
+        over = self._horizon.after(change)
+        for link, before in self._schedules.items():
+            self._schedules[link] = without_old(changed(before, change, link, self._microgrids), over)
+
+    def of(self, link: Link) -> FaultSchedule:
+        """Return the schedule of a link after all changes so far."""
+        return self._schedules[link]
+
+
+def replayed(netem: Netem, changes: Sequence[Change], microgrids: Mapping[str, str]) -> Iterator[Fault]:
+    """Yield entries that do without changes what a scenario did with its changes, those of one receiver after another.
+
+    Links of one receiver that fared alike share an entry. A partition becomes a cut; one by islands is left out, as its
+    links are not known here. The faults of one receiver are in memory at a time: of a long run there are thousands.
+    """
+    links = links_among(microgrids)
+    for dst in dict.fromkeys(link.dst for link in links):
+        alike: dict[tuple[Span, ...], list[str]] = {}
+        for link in links:
+            if link.dst == dst:
+                spans = schedule_of(link, netem, _about(link, changes, microgrids), microgrids).flat()
+                alike.setdefault(spans, []).append(link.src)
+        for spans, sources in alike.items():
+            on = f"{sources[0]} -> {dst}" if len(sources) == 1 else f"{{{', '.join(sources)}}} -> {dst}"
+            for span in _cuts_joined(spans):
+                to_s = None if math.isinf(span.to_s) else span.to_s
+                yield Fault(on=on, from_s=span.from_s, to_s=to_s, **_entry(span))
+
+
+def _about(link: Link, changes: Sequence[Change], microgrids: Mapping[str, str]) -> list[Change]:
+    """Return the changes that are about a link: thousands of them have few different patterns, each matched once."""
+    matches = {on: parse(on).matches(*link, microgrids) for on in {change.on for change in changes}}
+    return [change for change in changes if matches[change.on]]
+
+
+def _entry(span: Span) -> dict[str, Any]:
+    """Return the key and value of an entry for one fault."""
+    if isinstance(span.model, Plugin):
+        return {"own": (span.model,)}
+    return {"cut" if span.kind == "partition" else span.kind: span.model}
+
+
+def _cuts_joined(spans: Iterable[Span]) -> list[Span]:
+    """Return the spans with cuts and partitions as one kind, so that no two entries of a link overlap."""
+    both = [span for span in spans if span.kind in ("cut", "partition")]
+    rest = [span for span in spans if span.kind not in ("cut", "partition")]
+    # where a cut that keeps meets one that loses, messages are lost: the latter comes last, and so takes precedence
+    both.sort(key=lambda span: not span.model.hold)
+    joined = FaultSchedule(Span("cut", span.from_s, span.to_s, Cut(hold=span.model.hold)) for span in both).flat()
+    return [*rest, *joined]

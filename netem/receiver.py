@@ -12,11 +12,10 @@ from typing import NamedTuple
 from zlib import crc32
 
 from netem.channel import FOREVER, NEVER, Channel
-from netem.fault_schedule import FaultSchedule
+from netem.fault_schedule import Change, FaultSchedule, Horizon, changed, schedule_of, without_old
 from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
 from netem.models import INSTANT
-from netem.models.copies import flip
-from netem.schema.change import Change, Horizon, changed, schedule_of, without_old
+from netem.models.medium import flip
 from netem.schema.fault import Span
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link

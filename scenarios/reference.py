@@ -16,7 +16,7 @@ from agents.graphs import GRAPHS
 from netem.models import own_fault
 from netem.models.own_fault import FAULTS
 from netem.schema.fault import Fault
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import NodeFault
 from netem.schema.partition import Partition
 from plant.helics.helics_settings import HelicsSettings
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck

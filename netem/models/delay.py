@@ -22,8 +22,7 @@ from typing import Annotated
 
 import msgspec
 
-from netem.draws import Stream
-from netem.models.chain import Chain
+from netem.draws import Chain, Stream
 from wire.schema.plausible import Plausible, Unit, in_percent
 from wire.schema.table_schema import Problem
 

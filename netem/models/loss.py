@@ -12,8 +12,7 @@ from typing import Annotated
 
 import msgspec
 
-from netem.draws import Stream
-from netem.models.chain import Chain
+from netem.draws import Chain, Stream
 from wire.schema.plausible import Probability
 from wire.schema.table_schema import Problem
 

@@ -3,13 +3,52 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Annotated
 
 import msgspec
 
+from netem.draws import Stream
 from netem.models import INSTANT
-from wire.schema.plausible import Plausible, Unit
+from netem.models.delay import DELAY
+from wire.schema.plausible import Plausible, Probability, Unit
 from wire.schema.table_schema import Problem
+
+LONGEST_FLAP = 600.0
+"""Longest plausible up or down time (s)."""
+
+
+class Cut(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Nothing passes as long as the entry holds; in a file `cut = true` says the same."""
+
+    hold: bool = False
+    """False: messages are lost, reason "cut". True: they are kept, and all go on when the cut ends."""
+
+    def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
+        """Return until when the link is down at t (s of run time), None if it is up."""
+        return to_s if from_s <= t < to_s else None
+
+
+class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Up for up_s, down for down_s, and so on, beginning with up at the entry's from_s."""
+
+    up_s: Annotated[float, Unit("s"), Plausible("the up time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
+    """How long the link is up (s)."""
+    down_s: Annotated[float, Unit("s"), Plausible("the down time of a flap", 0.0, LONGEST_FLAP, above_zero=True)]
+    """How long it is down (s)."""
+    hold: bool = False
+    """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
+
+    def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
+        """Return until when the link is down at t (s of run time), None if it is up."""
+        if not from_s <= t < to_s:
+            return None
+        period = self.up_s + self.down_s
+        number = math.floor((t - from_s) / period)
+        end = from_s + (number + 1) * period
+        if t < end - self.down_s:
+            return None
+        return min(end, to_s)
 
 
 class Rate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -81,3 +120,55 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
                 text = f"{value:g} s does not go with period_s = {self.period_s:g} s: slots repeat with the period"
                 problems.append(Problem(key, text))
         return problems
+
+
+_WHETHER, _WHICH, _PER_COPY = 0, 1, 2
+"""Indices of the draws of the first copy of a corrupted message; those of the next follow."""
+
+
+class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """With probability p a copy follows, a fixed time later; in a file `duplicate = 0.01` says: at once."""
+
+    p: Annotated[float, Probability("a duplicate")]
+    """Probability that a delivered message has a copy."""
+    extra_delay_s: Annotated[float, Unit("s"), DELAY] = 0.0
+    """How much later the copy arrives (s)."""
+
+    def sampler(self, stream: Stream) -> Callable[[int], bool]:
+        """Return, by message number, whether there is a copy."""
+        uniform, p = stream.uniform, self.p
+        return lambda seq: uniform(seq) < p
+
+
+class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """With probability p a bit of a copy is flipped, each bit alike; in a file `corrupt = 0.001` says the same."""
+
+    p: Annotated[float, Probability("a corruption")]
+    """Probability that an arriving copy of a message is corrupted."""
+    checksum: bool = False
+    """True: the link notices it by its checksum (CRC-32 finds every single bit) and drops the copy, reason "checksum".
+    False: the copy is handed on, and the receiver finds it by the message's own CRC-32: a reject, of kind "corrupt"."""
+
+    def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
+        """Return the bit that is flipped by message number, copy and size (bytes), None if none is."""
+        uniform, below, p = stream.uniform, stream.below, self.p
+
+        def bit(seq: int, copy: int, size: int) -> int | None:
+            index = copy * _PER_COPY
+            if size == 0 or uniform(seq, index + _WHETHER) >= p:
+                return None
+            return below(8 * size, seq, index + _WHICH)
+
+        return bit
+
+
+def flip(payload: bytes, bit: int) -> bytes:
+    """Return the payload with one bit flipped; bit 0 is the lowest of the first byte.
+
+    Examples
+    --------
+    >>> flip(b"abc", 9)
+    b'a`c'
+    """
+    byte, place = divmod(bit, 8)
+    return payload[:byte] + bytes([payload[byte] ^ (1 << place)]) + payload[byte + 1 :]

@@ -109,14 +109,14 @@ FAULTS: Registry[Any] = Registry(
     "link faults",
     _objection,
     own={
-        "cut": "netem.models.gates:Cut",
-        "flap": "netem.models.gates:Flap",
+        "cut": "netem.models.medium:Cut",
+        "flap": "netem.models.medium:Flap",
         "loss": "netem.models.loss:Bernoulli",
         "rate": "netem.models.medium:Rate",
         "slots": "netem.models.medium:Slots",
         "delay": "netem.models.delay:Constant",
-        "duplicate": "netem.models.copies:Duplicate",
-        "corrupt": "netem.models.copies:Corrupt",
+        "duplicate": "netem.models.medium:Duplicate",
+        "corrupt": "netem.models.medium:Corrupt",
     },
 )
 """Faults by name; those of gridpeers come first, each by the model that a bare number means."""

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from netem.models.gates import Cut
+from netem.models.medium import Cut
 from netem.schema.fault import EndTime, RunTime, Span
 from wire.messages import PLANT
 from wire.schema.relations import problems_of

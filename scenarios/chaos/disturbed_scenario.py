@@ -12,8 +12,7 @@ from typing import Any
 from msgspec.structs import replace
 
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.partition import Partition
 from plant.equipment import Feeder
 from plant.tables import read_feeder

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from time import monotonic
 from typing import Any, NamedTuple
 
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import NodeFault
 from scenarios.drivers.children import Children
 from scenarios.emulation.emulation_config import EmulationConfig
 

@@ -9,13 +9,13 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
+from netem.fault_schedule import LinkSchedules
 from netem.ledger import LinkCounts
 from netem.liar import HeardFrom, LiveHearing, lies_about
 from netem.models import INSTANT
 from netem.models.lie import lie_in_words
 from netem.receiver import Receiver
-from netem.schema.change import LinkSchedules
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import NodeFault
 from netem.schema.pattern import Link, links_among, parse
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from netem.schema.change import Change, Heal
+from netem.fault_schedule import Change, Heal
 from netem.schema.fault import LONGEST_RUN, Fault
 from netem.schema.pattern import Link, objections
 from scenarios.emulation.link_descriptions import words

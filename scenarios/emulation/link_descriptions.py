@@ -7,10 +7,9 @@ from typing import Any
 import msgspec
 
 from netem.models.delay import Constant, Uniform
-from netem.models.gates import Cut
 from netem.models.loss import Bernoulli
-from netem.models.medium import Rate
-from netem.schema.profiles import PROFILES
+from netem.models.medium import Cut, Rate
+from netem.schema.fault import PROFILES
 from wire.plugins.plugin import Plugin
 
 

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from agents.carriers.make import close_laws, make_law
 from agents.laws.law import Law
-from netem.schema.change import Heal
+from netem.fault_schedule import Heal
 from netem.schema.fault import Fault
 from plant.plant_interface import LivePlant
 from scenarios.emulation.emulated_links import links_of

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.trace_file import with_traces
 from plant.equipment import Feeder
 from plant.equipment.bus_islands import SwitchOperations, islands_after

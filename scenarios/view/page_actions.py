@@ -7,10 +7,10 @@ from typing import Literal
 
 import msgspec
 
+from netem.fault_schedule import Heal
 from netem.models.delay import Constant
-from netem.models.gates import Cut
 from netem.models.loss import Bernoulli
-from netem.schema.change import Heal
+from netem.models.medium import Cut
 from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from scenarios.live.client.run_address import RunAddress, UsageError, check_name

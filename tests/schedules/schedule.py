@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from random import Random
 from typing import Any, NamedTuple
 
+from netem.fault_schedule import Heal
 from netem.models.delay import Uniform
-from netem.schema.change import Heal
 from netem.schema.fault import Fault
 from scenarios.emulation.link_command import EVERYTHING, LinkCommand
 

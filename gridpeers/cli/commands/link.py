@@ -93,7 +93,7 @@ def cut(
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
     with usage_errors():
-        from netem.models.gates import Cut
+        from netem.models.medium import Cut
 
         _give(
             links,
@@ -204,7 +204,7 @@ def _give(
     access: Access,
 ) -> None:
     """Check a link command, give it, and print the receivers' answers."""
-    from netem.schema.change import Heal
+    from netem.fault_schedule import Heal
     from netem.schema.fault import Fault
     from netem.schema.pattern import objections
     from scenarios.emulation.link_command import LinkCommand

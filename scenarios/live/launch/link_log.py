@@ -11,7 +11,7 @@ from pathlib import Path
 import msgspec
 
 from agents.agent_config import MAX_AGE
-from netem.schema.change import Change, replayed
+from netem.fault_schedule import Change, replayed
 from netem.schema.netem import Netem
 from plant.equipment import Feeder
 from scenarios.emulation.link_command import LinkCommand

@@ -9,9 +9,8 @@ from functools import lru_cache
 
 import msgspec
 
-from netem.fault_schedule import FaultSchedule
+from netem.fault_schedule import Change, FaultSchedule, schedule_of
 from netem.ledger import LinkCounts
-from netem.schema.change import Change, schedule_of
 from netem.schema.pattern import Link, links_among
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.emulation.link_command import LinkCommand

@@ -11,12 +11,11 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from netem.fault_schedule import Heal, replayed
 from netem.ledger import LinkTrace, Outcome
 from netem.models.delay import Normal
-from netem.schema.change import Heal, replayed
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.partition import Partition
 from scenarios.drivers.inprocess import run_inprocess
 from scenarios.emulation.emulation_config import EmulationConfig

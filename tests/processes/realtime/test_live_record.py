@@ -12,8 +12,7 @@ from msgspec.structs import replace
 from agents.agent_config import AgentConfig
 from netem.models.delay import Normal
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import PlantConfig
 from scenarios.drivers.process_driver import run_processes

@@ -13,17 +13,16 @@ import pytest
 from scipy import stats
 
 from lab.link_laws import LinkLaws, LinkTest, blocks_of, improbable, law, link_tests
+from netem.draws import RESTART
+from netem.fault_schedule import Heal
 from netem.ledger import LinkTrace
-from netem.models.chain import RESTART
 from netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
-from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott, Markov
+from netem.models.medium import Cut, Flap
 from netem.receiver import Receiver
-from netem.schema.change import Heal
-from netem.schema.fault import Fault
+from netem.schema.fault import PROFILES, Fault
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link
-from netem.schema.profiles import PROFILES
 from scenarios.checks.check_registry import CHECKS
 from scenarios.checks.check_verdict import NotJudgedError
 from tests.record.recorded_runs import recorded_run

@@ -12,9 +12,8 @@ import msgspec
 from netem.models.delay import AnyDelay
 from netem.models.lie import AnyLie
 from netem.models.loss import AnyLoss
-from netem.schema.fault import KINDS
+from netem.schema.fault import KINDS, PROFILES
 from netem.schema.netem import Netem
-from netem.schema.profiles import PROFILES
 from tests.unit.netem.link_messages import MICROGRIDS
 from wire.schema.table_reading import read_table
 

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 from netem.channel import Channel
 from netem.fault_schedule import FaultSchedule
-from netem.models.copies import Duplicate
 from netem.models.delay import Constant
-from netem.models.gates import Cut, Flap
-from netem.models.medium import Rate, Slots
+from netem.models.medium import Cut, Duplicate, Flap, Rate, Slots
 from netem.schema.fault import Span
 from netem.schema.pattern import Link
 from tests.unit.netem.link_messages import T_C, channel, fates, steady

@@ -8,8 +8,7 @@ import pytest
 
 from netem.liar import HeardFrom, LieTime, LiveHearing, lies_about
 from netem.models.lie import Extreme, Freeze, Lie, Offset, Random, Replay, Scale
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from wire.codec import decode, encode
 from wire.messages import State
 

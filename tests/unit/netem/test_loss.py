@@ -12,10 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.draws import Stream
-from netem.models.chain import RESTART
-from netem.models.copies import Corrupt, Duplicate, flip
+from netem.draws import RESTART, Stream
 from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
+from netem.models.medium import Corrupt, Duplicate, flip
 from tests.unit.netem.link_messages import channel, fates, steady
 
 N = 20_000

@@ -10,15 +10,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from netem.fault_schedule import Change, Heal, replayed, schedule_of
 from netem.models.delay import Constant, Lognormal, Normal
-from netem.models.gates import Cut
 from netem.models.loss import Bernoulli, GilbertElliott
-from netem.schema.change import Change, Heal, replayed, schedule_of
-from netem.schema.fault import Fault
+from netem.models.medium import Cut
+from netem.schema.fault import PROFILES, Fault
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition
 from netem.schema.pattern import Link, links_among
-from netem.schema.profiles import PROFILES
 from tests.unit.netem.link_messages import MICROGRIDS, steady
 from wire.schema.table_reading import read_table
 

@@ -8,9 +8,9 @@ import msgspec
 import pytest
 
 from netem.channel import Channel
+from netem.fault_schedule import replayed
 from netem.models.own_fault import FAULTS, LinkFault
 from netem.receiver import Receiver
-from netem.schema.change import replayed
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.pattern import Link

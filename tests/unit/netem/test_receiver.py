@@ -11,14 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
+from netem.fault_schedule import MOST_SPANS, Heal
 from netem.ledger import LinkTrace
-from netem.models.copies import Corrupt, Duplicate
 from netem.models.delay import Lognormal, Uniform
-from netem.models.gates import Cut, Flap
 from netem.models.loss import GilbertElliott
-from netem.models.medium import Rate, Slots
+from netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
 from netem.receiver import Receiver
-from netem.schema.change import MOST_SPANS, Heal
 from netem.schema.fault import Fault, Span
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition

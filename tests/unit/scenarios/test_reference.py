@@ -11,8 +11,7 @@ import pytest
 from agents.agent_config import DegradedCommunication, Gains
 from gridpeers.cli.commands.show import Topic
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.partition import Partition
 from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from scenarios.field_docs import field_docs

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from scenarios.drivers import fault_injector
 from scenarios.drivers.fault_injector import FaultInjector
 from scenarios.emulation.emulation_config import EmulationConfig

@@ -7,12 +7,11 @@ from typing import Any
 
 import pytest
 
-from netem.models.gates import Cut
-from netem.schema import change
-from netem.schema.change import MOST_SPANS, PAST, Heal, LinkSchedules
+from netem import fault_schedule
+from netem.fault_schedule import MOST_SPANS, PAST, Heal, LinkSchedules
+from netem.models.medium import Cut
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.pattern import links_among
 from scenarios.emulation.emulated_links import EmulatedLinks
 from scenarios.emulation.emulation_config import EmulationConfig
@@ -98,7 +97,7 @@ def test_a_run_with_many_commands_says_and_does_the_same_without_the_faults_that
     """A heal names the same links, and every message has the same fate, whatever is forgotten meanwhile."""
     commands = _commands(900.0)
     bounded = _effects_and_arrivals(commands)
-    monkeypatch.setattr(change, "MOST_SPANS", len(commands))
+    monkeypatch.setattr(fault_schedule, "MOST_SPANS", len(commands))
 
     assert len(commands) > 150
     assert bounded == _effects_and_arrivals(commands)

@@ -12,8 +12,8 @@ from msgspec.structs import replace
 
 from agents.realtime.link_command_receiver import LinkCommandReceiver
 from agents.realtime.realtime_agent import RealtimeAgent
-from netem.schema import change
-from netem.schema.change import Heal
+from netem import fault_schedule
+from netem.fault_schedule import Heal
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.pattern import links_among
@@ -173,13 +173,13 @@ def test_a_link_with_a_fault_that_is_yet_to_come_was_not_impaired_before() -> No
 def test_a_late_heal_looks_at_no_command_of_before_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """However many commands a run has had, the next one is held against each link once: a plant must not pause."""
     looks: list[object] = []
-    plain = change.changed
+    plain = fault_schedule.changed
 
     def counted(*given: Any) -> Any:
         looks.append(given[1])
         return plain(*given)
 
-    monkeypatch.setattr(change, "changed", counted)
+    monkeypatch.setattr(fault_schedule, "changed", counted)
     links = EmulatedLinks("plant", SETUP)
     heal = LinkCommand(heal=Heal(on="inv2 -> inv1", from_s=0.0)).to_tree()
     costs = []

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from netem.ledger import LinkCounts
-from netem.models.copies import Corrupt, Duplicate
+from netem.models.medium import Corrupt, Duplicate
 from netem.receiver import Receiver
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem

@@ -10,8 +10,7 @@ import msgspec
 import pytest
 
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault
+from netem.schema.netem import Netem, NodeFault
 from netem.schema.partition import Partition
 from scenarios.catalogue_files import CATALOGUE
 from scenarios.live.launch.ended_scenario import ended_scenario

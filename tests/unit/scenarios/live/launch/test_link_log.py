@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from agents.agent_config import MAX_AGE
-from netem.schema.change import Heal, schedule_of
+from netem.fault_schedule import Heal, schedule_of
 from netem.schema.fault import Fault
 from netem.schema.netem import Netem
 from netem.schema.partition import Partition

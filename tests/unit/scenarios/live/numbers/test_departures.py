@@ -10,8 +10,7 @@ import msgspec
 import pytest
 
 from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.node_fault import NodeFault, Skew
+from netem.schema.netem import Netem, NodeFault, Skew
 from plant.equipment import Feeder
 from plant.equipment.imported_equipment import LoadPart
 from scenarios.drivers.inprocess import run_inprocess
