@@ -9,44 +9,46 @@ AR(1) process: its innovations e are independent, and each :math:`e_n \operatorn
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from itertools import permutations, starmap
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from scipy import special, stats
 
+from gridpeers import Check, NotJudgedError, Range, Violation
 from netem.draws import RESTART, Stream
 from netem.fault_schedule import GATES
 from netem.ledger import LinkTrace, Outcome, copies_of
 from netem.models import INSTANT
-from netem.models.delay import Constant, RandomDelay, Trace
+from netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
 from netem.models.loss import Bernoulli, LossModel
 from netem.models.own_fault import DROPPED_BY_OWN, judge_of
 from netem.schema.fault import Span
+from netem.schema.netem import Netem
 from netem.schema.pattern import Link
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from scenarios.checks.checked_case import CheckedCase
 from scenarios.emulation.emulation_config import EmulationConfig
 from scenarios.record.record_reader import RunRecord
-from wire.messages import PLANT
 from wire.plugins.plugin import Plugin
-from wire.schema.plausible import Range
 
-MASKS = ("rate", "slots")
-"""Faults that add to a delay, so that its law cannot be seen alone; so do cuts that hold, FIFO and faults of a user."""
+MASKS = ("rate", "slots")  # add to a delay, so that its law cannot be seen alone
+
+_LAWS: dict[type[RandomDelay], Callable[[Any], Any]] = {
+    Uniform: lambda of: stats.uniform(of.low_s, of.high_s - of.low_s),
+    Normal: lambda of: stats.truncnorm(-of.mean_s / of.std_s, math.inf, of.mean_s, of.std_s),
+    Lognormal: lambda of: stats.lognorm(of.sigma, of.offset_s, of.median_s),
+    Pareto: lambda of: stats.pareto(of.shape, 0.0, of.minimum_s),
+}
 
 _Sent = np.recarray[Any, Any]
 _COLUMNS = [("seq", "i8"), ("t", "f8"), ("reason", "U16"), ("delay", "f8"), ("copies", "i8"), ("flipped", "i8")]
 """Messages of a link, each once: why it was dropped ("" if it was not), delay (s) of the first copy, NaN if dropped."""
 
-Finding = tuple[Any, ...]
-"""What, configured, realised, n and p of a `LinkTest`."""
-
+Finding = tuple[Any, ...]  # of a LinkTest, without the link
 Blocks = tuple[tuple[tuple[int, int], ...], ...]
-"""By start of the chain, messages without a gap: distance of the first from the one before, and their number."""
+"""For each start of the chain, messages without a gap: where the first is behind the start, and their number."""
 
 
 class LinkTest(NamedTuple):
@@ -54,12 +56,10 @@ class LinkTest(NamedTuple):
 
     link: Link
     what: str
-    """E.g. "loss" or "bursts"."""
     configured: str
     realised: str
     """Value in the run; why nothing was tested, if nothing was."""
     n: int = 0
-    """Number of messages or copies."""
     p: float | None = None
     """Probability that chance alone is as far off; 0 or 1 where nothing is left to chance, None if not tested."""
 
@@ -80,9 +80,7 @@ class LinkLaws(Check):
         if not (tree := record.info.plant.links):
             raise NotJudgedError("the run has no emulated links")
         config = EmulationConfig.of_tree(tree)
-        names = (*config.microgrids, PLANT)
-        spans = {link: config.netem.spans(link, config.microgrids) for link in starmap(Link, permutations(names, 2))}
-        tests = link_tests(record.links(), spans, config.netem.seed)
+        tests = link_tests(record.links(), config.netem, config.microgrids)
         if all(test.p is None for test in tests):
             raise NotJudgedError("no emulated link can be tested")
         for test in improbable(tests, self.level):
@@ -90,16 +88,17 @@ class LinkLaws(Check):
             yield Violation(text=f"{text}; by chance", agent=test.link.dst, value=test.p, limit=self.level)
 
 
-def link_tests(traces: Iterable[LinkTrace], spans: Mapping[Link, Sequence[Span]], seed: int) -> list[LinkTest]:
-    """Return the tests of all links that had messages: verdicts of all receivers beside the faults of each link."""
+def link_tests(traces: Iterable[LinkTrace], netem: Netem, microgrids: Mapping[str, str]) -> list[LinkTest]:
+    """Return the tests of all links that had messages: verdicts of all receivers beside the entries of a run."""
     by_link: dict[Link, list[LinkTrace]] = {}
     for trace in traces:
         by_link.setdefault(Link(trace.src, trace.dst), []).append(trace)
     return [
         LinkTest(link, *found)
         for link in sorted(by_link)
-        for span in spans.get(link, ())
-        for found in _tests(_sent(by_link[link], span), span, spans[link], Stream(seed, *link, span.kind), link)
+        for spans in [netem.spans(link, microgrids)]
+        for span in spans
+        for found in _tests(_sent(by_link[link], span), span, spans, Stream(netem.seed, *link, span.kind), link)
     ]
 
 
@@ -126,14 +125,13 @@ def _sent(traces: Sequence[LinkTrace], span: Span) -> _Sent:
 
 
 def _tests(sent: _Sent, span: Span, others: Sequence[Span], stream: Stream, link: Link) -> list[Finding]:
-    """Return what, configured, realised, n and p of each test of one entry."""
     kind, model = span.kind, span.model
     beside = [o for o in others if o is not span and o.from_s < span.to_s and span.from_s < o.to_s]
-    if kind in MASKS or (kind in GATES and (kind == "flap" or model.hold)):
+    if kind in MASKS or kind == "flap" or (kind in GATES and model.hold):
         return []
     if kind in GATES:
         through = int((sent.reason == "").sum())
-        return [(kind, "nothing passes", f"{through} passed", len(sent.seq), float(through == 0))]
+        return [(kind, "nothing passes", f"{through} passed", len(sent), float(through == 0))]
     met = sent[~np.isin(sent.reason, GATES) & ~np.isinf(sent.delay)]
     if kind == "loss":
         return _loss_tests(met, model)
@@ -146,9 +144,9 @@ def _tests(sent: _Sent, span: Span, others: Sequence[Span], stream: Stream, link
         return [_share(kind, int(arrived.flipped.sum()), int(arrived.copies.sum()), model.p)]
     masks = [it.kind for it in beside if it.kind in MASKS or isinstance(it.model, Plugin)]
     masks += [it.kind for it in beside if it.kind in GATES and it.model.hold] + ["fifo"] * model.fifo
-    if masks:
-        return [("delay", model.__struct_config__.tag, f"not tested: {' and '.join(masks)} on it")]
-    return _delay_tests(arrived, model, stream) if len(arrived) else []
+    if masks or not len(arrived):
+        return [("delay", model.__struct_config__.tag, f"not tested: {' and '.join(masks) or 'no message'} on it")]
+    return _delay_tests(arrived, model, stream)
 
 
 def _share(what: str, count: int, n: int, p: float) -> Finding:
@@ -170,18 +168,15 @@ def _loss_tests(met: _Sent, model: LossModel) -> list[Finding]:
 
 
 def _joined(seq: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
-    """Return which messages follow the one before them along the chain."""
     return np.asarray((np.diff(seq) == 1) & (seq[1:] % RESTART != 0))
 
 
 def blocks_of(seq: npt.NDArray[np.int64]) -> Blocks:
     """Return message numbers as `Blocks`."""
     blocks: dict[int, list[tuple[int, int]]] = {}
-    last: dict[int, int] = {}
     for run in np.split(seq, np.flatnonzero(~_joined(seq)) + 1):
-        block = int(run[0]) // RESTART
-        blocks.setdefault(block, []).append((int(run[0]) - last.get(block, int(run[0])), len(run)))
-        last[block] = int(run[-1])
+        block, first = divmod(int(run[0]), RESTART)
+        blocks.setdefault(block, []).append((first, len(run)))
     return tuple(map(tuple, blocks.values()))
 
 
@@ -197,16 +192,16 @@ def law(model: LossModel, blocks: Blocks, *, bursts: bool = False) -> npt.NDArra
         goes_on = np.ones_like(begins) if bursts else begins
         # states of the counter: those of the chain after a message that came, and after one that was lost
         enter, came, gone = (
-            np.concatenate([first @ kept + 0.0 * mark, mark * (first @ lost)], axis=2)
-            for first, mark in ((np.eye(len(pi)), goes_on), (P, begins), (P, goes_on))
+            np.concatenate([move @ kept + 0.0 * mark, mark * (move @ lost)], axis=2)
+            for move, mark in ((np.eye(len(pi)), goes_on), (P, begins), (P, goes_on))
         )
         step, product = np.concatenate([came, gone], axis=1), np.ones(len(z), complex)
         for block in set(blocks):
-            state = np.broadcast_to(pi.astype(complex), (len(z), 1, len(pi)))
-            for number, (distance, length) in enumerate(block):
-                if number:
-                    state = state @ both @ np.linalg.matrix_power(P, distance)
-                state = state @ enter @ np.linalg.matrix_power(step, length - 1)
+            state, last = np.broadcast_to(pi.astype(complex), (len(z), 1, len(pi))), -1
+            for first, length in block:
+                if last >= 0:
+                    state = state @ both @ np.linalg.matrix_power(P, first - last)
+                state, last = state @ enter @ np.linalg.matrix_power(step, length - 1), first + length - 1
             product *= state.sum(axis=(1, 2)) ** blocks.count(block)
         found.append(product)
     return np.maximum(np.fft.irfft(np.concatenate(found).conj(), n + 1), 0.0)
@@ -219,24 +214,22 @@ def _tail(count: int, probabilities: npt.NDArray[np.float64]) -> float:
 
 def _delay_tests(met: _Sent, model: Constant | Trace | RandomDelay, stream: Stream) -> list[Finding]:
     """Compare the delays of the first copies; `stream` says where a trace starts."""
-    n = len(met.seq)
     if not isinstance(model, RandomDelay):
         sampler = model.sampler(stream)
         off = np.abs(met.delay - np.array([sampler(int(seq)) for seq in met.seq])).max(initial=0.0)
-        return [("delay", "as its model says", f"up to {off:.3g} s off", n, float(off <= INSTANT))]
+        return [("delay", "as its model says", f"up to {off:.3g} s off", len(met), float(off <= INSTANT))]
     name = model.__struct_config__.tag
-    shares, phi = np.array([model.cdf(d) for d in met.delay]), model.correlation
+    shares, phi = _LAWS[type(model)](model).cdf(met.delay), model.correlation
     realised = f"mean {met.delay.mean():.4g} s"
     if not phi:
-        return [("delay", name, realised, n, float(stats.kstest(shares, "uniform").pvalue))]
+        return [("delay", name, realised, len(met), float(stats.kstest(shares, "uniform").pvalue))]
     scores, follows = special.ndtri(np.clip(shares, 2.0**-53, 1 - 2.0**-53)), _joined(met.seq)
     old, innovations = scores[:-1][follows], (scores[1:] - phi * scores[:-1])[follows] / math.sqrt(1 - phi**2)
     if not (pairs := len(old)):
         return [("delay", name, "not tested: no two messages in a row")]
     drift = float(innovations @ np.sign(old)) / math.sqrt(pairs)
     p, p_drift = float(stats.kstest(innovations, "norm").pvalue), float(2.0 * stats.norm.sf(abs(drift)))
-    off = f"off by {drift:.3g} standard deviations"
-    return [("delay", name, realised, pairs, p), ("delay correlation", f"{phi:g}", off, pairs, p_drift)]
+    return [("delay", name, realised, pairs, p), ("delay correlation", f"{phi:g}", "another", pairs, p_drift)]
 
 
 def _own_test(met: _Sent, span: Span, beside: Sequence[Span], stream: Stream, link: Link) -> Finding:

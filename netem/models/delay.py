@@ -63,10 +63,6 @@ class RandomDelay(DelayModel, frozen=True, kw_only=True):
         """Return the delay (s) that a share u of all messages do not exceed, 0 < u < 1."""
         raise NotImplementedError
 
-    def cdf(self, delay_s: float) -> float:
-        """Return the share of messages whose delay does not exceed `delay_s`: the inverse of `quantile`."""
-        raise NotImplementedError
-
     def sampler(self, stream: Stream) -> Sampler:
         """Draw one delay from one number of the stream."""
         quantile = self.quantile
@@ -104,10 +100,6 @@ class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
         """Return the delay (s) at share u."""
         return self.low_s + u * (self.high_s - self.low_s)
 
-    def cdf(self, delay_s: float) -> float:
-        """Return the share up to a delay (s)."""
-        return min(max((delay_s - self.low_s) / (self.high_s - self.low_s), 0.0), 1.0)
-
     def relations(self) -> list[Problem]:
         """Return contradictions between its values."""
         problems = []
@@ -136,11 +128,6 @@ class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):
         # from the upper side, where 1 - c is exact: c + u (1 - c) would round to 1 for u next to 1
         return max(self.mean_s - self.std_s * STANDARD.inv_cdf((1.0 - u) * (1.0 - below)), 0.0)
 
-    def cdf(self, delay_s: float) -> float:
-        """Return the share up to a delay (s)."""
-        above = STANDARD.cdf(self.mean_s / self.std_s)
-        return 1.0 - STANDARD.cdf((self.mean_s - delay_s) / self.std_s) / above if delay_s > 0.0 else 0.0
-
 
 class Lognormal(RandomDelay, frozen=True, kw_only=True, tag="lognormal"):
     r"""Lognormal law above a floor.
@@ -158,11 +145,6 @@ class Lognormal(RandomDelay, frozen=True, kw_only=True, tag="lognormal"):
     def quantile(self, u: float) -> float:
         """Return the delay (s) at share u."""
         return self.offset_s + self.median_s * math.exp(self.sigma * STANDARD.inv_cdf(u))
-
-    def cdf(self, delay_s: float) -> float:
-        """Return the share up to a delay (s)."""
-        above = delay_s - self.offset_s
-        return STANDARD.cdf(math.log(above / self.median_s) / self.sigma) if above > 0.0 else 0.0
 
 
 class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
@@ -183,10 +165,6 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
     def quantile(self, u: float) -> float:
         """Return the delay (s) at share u."""
         return self.minimum_s * float((1.0 - u) ** (-1.0 / self.shape))
-
-    def cdf(self, delay_s: float) -> float:
-        """Return the share up to a delay (s)."""
-        return 1.0 - float((self.minimum_s / delay_s) ** self.shape) if delay_s > self.minimum_s else 0.0
 
 
 class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):

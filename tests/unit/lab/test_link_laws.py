@@ -87,9 +87,7 @@ def traced(done: dict[str, Any], n: int = 2000, seed: int = 1, links: Iterable[L
 
 def held_against(traces: Iterable[LinkTrace], told: dict[str, Any], seed: int = 1) -> list[LinkTest]:
     """Tests of the verdicts against what the links were told."""
-    traces, fault = list(traces), Fault(on="* <-> *", **told)
-    links = [Link(trace.src, trace.dst) for trace in traces]
-    return link_tests(traces, {link: fault.spans(*link, MICROGRIDS) for link in links}, seed)
+    return link_tests(traces, Netem(seed=seed, links=(Fault(on="* <-> *", **told),)), MICROGRIDS)
 
 
 @pytest.mark.parametrize("name", SOUND)
@@ -166,7 +164,7 @@ def test_loss_is_judged_by_what_met_it_in_its_time() -> None:
     to = Receiver("inv2", netem, MICROGRIDS)
     for k in range(2000):
         to.offer("inv1", k, k * T_C, k * T_C, bytes(100))
-    found = link_tests(to.take_trace(), {LINK: netem.spans(LINK, MICROGRIDS)}, 1)
+    found = link_tests(to.take_trace(), netem, MICROGRIDS)
 
     assert [(test.what, test.configured, test.n) for test in found] == [
         ("loss", "0.5", 750),

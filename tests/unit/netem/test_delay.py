@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
+from netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
 from tests.unit.netem.link_messages import T_C, channel, delays, fates, steady
 
 N = 4000
@@ -35,13 +35,12 @@ def test_delays_follow_their_law(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", LAWS)
-def test_quantile_and_distribution_function_are_those_of_the_law(name: str) -> None:
-    """Both agree with scipy's, from the first thousandth of a millionth to the last."""
+def test_the_quantile_is_that_of_the_law(name: str) -> None:
+    """It agrees with scipy's, from the first thousandth of a millionth to the last."""
     model, law = LAWS[name]
 
     for u in (1e-9, 0.001, 0.3, 0.5, 0.9, 1 - 1e-9):
         assert model.quantile(u) == pytest.approx(law.ppf(u), rel=1e-6)
-        assert model.cdf(law.ppf(u)) == pytest.approx(u, abs=1e-9)
 
 
 @steady
@@ -58,11 +57,12 @@ def test_a_constant_delay_is_exact() -> None:
 
 
 @pytest.mark.parametrize("phi", [0.5, 0.95])
-@pytest.mark.parametrize("model", [Normal(mean_s=0.02, std_s=0.02), Pareto(minimum_s=0.02, shape=3.0)])
-def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(model: RandomDelay, phi: float) -> None:
+@pytest.mark.parametrize("name", ["normal, truncated", "pareto"])
+def test_correlated_delays_keep_their_law_and_are_autoregressive_beneath_it(name: str, phi: float) -> None:
     """The normal scores of correlated delays are an AR(1) process, of standard normal, independent innovations."""
+    model, law = LAWS[name]
     drawn = delays(channel(delay=msgspec.structs.replace(model, correlation=phi)), N)
-    scores = [NormalDist().inv_cdf(model.cdf(delay)) for delay in drawn]
+    scores = [NormalDist().inv_cdf(share) for share in law.cdf(drawn)]
     innovations = [(new - phi * old) / math.sqrt(1 - phi**2) for old, new in pairwise(scores)]
 
     assert stats.pearsonr(scores[1:], scores[:-1]).statistic == pytest.approx(phi, abs=4 * math.sqrt((1 - phi**2) / N))
