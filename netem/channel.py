@@ -44,19 +44,8 @@ DROPPED = {reason: Fate((), reason) for reason in (*GATES, "loss", DROPPED_BY_OW
 
 
 class Channel:
-    """A directed link.
+    """A directed link with its faults, by the seed of the run.
 
-    Parameters
-    ----------
-    link : Link
-        Who sends and who receives.
-    spans : Iterable[Span]
-        Its faults; see `netem.fault_schedule.FaultSchedule`.
-    seed : int
-        Seed of the run.
-
-    Notes
-    -----
     Messages are judged in the order of their numbers, each once: a queue and FIFO remember. All else depends on the
     number and the time alone.
 
@@ -92,13 +81,8 @@ class Channel:
     def reschedule(self, schedule: FaultSchedule, *, rewind: bool) -> None:
         """Use another schedule for the messages that follow.
 
-        Parameters
-        ----------
-        schedule : FaultSchedule
-            The new one.
-        rewind : bool
-            Whether messages that a cut of the old schedule keeps will be judged again, in order and before any other:
-            their effect on queue and order is undone.
+        With `rewind`, messages that a cut of the old schedule keeps will be judged again, in order and before any
+        other: their effect on queue and order is undone.
         """
         self.schedule = schedule
         self._samplers = {span: sampler for span, sampler in self._samplers.items() if span in schedule.spans}
@@ -107,17 +91,7 @@ class Channel:
             (self._busy_until, self._last), self._before_hold = self._before_hold, None
 
     def judge(self, seq: int, t: float, size: int) -> Fate:
-        """Return the fate of a message.
-
-        Parameters
-        ----------
-        seq : int
-            Its number, by which it finds its random numbers.
-        t : float
-            When it was sent (s of run time), which decides the faults that act on it.
-        size : int
-            Its length (bytes).
-        """
+        """Return the fate of a message: `seq` finds its random numbers, and `t`, when it was sent (s), its faults."""
         if not self._from <= t < self._to:
             self._enter(t)
         delay, held_until = 0.0, NEVER

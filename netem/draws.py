@@ -3,10 +3,8 @@ r"""Random numbers that are looked up, not drawn: a function of seed, link, purp
 .. math:: u = \left(\lfloor h / 2^{12} \rfloor + \tfrac12\right) 2^{-52}, \qquad
           h = \mathrm{BLAKE2b}_{64}(\text{seed}, \text{src}, \text{dst}, \text{purpose}; \text{seq}, \text{index})
 
-So no message, link or purpose shifts a number of another: adding an agent, a
-fault or a cut changes no other fate, and a message has the same fate in simulated and in wall-clock time, seen by
-whatever process, in whatever order. A generator with a state, such as `random.Random`, would have to draw equally often
-whatever is configured; a counter need not (Salmon et al.).
+So an agent, a fault or a cut that is added changes no other fate, and a message has the same fate in simulated and in
+wall-clock time, seen by whatever process, in whatever order (Salmon et al.).
 
 References
 ----------
@@ -27,16 +25,7 @@ _STANDARD = NormalDist()
 
 
 class Stream:
-    """The numbers of one link for one purpose.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the run.
-    src, dst : str
-        The link.
-    purpose : str
-        Kind of the fault, e.g. "loss". Two faults of one kind get the same number at one index.
+    """The numbers of one link for one purpose, e.g. "loss": two faults of one kind get the same number at one index.
 
     Examples
     --------
@@ -78,14 +67,10 @@ in 4096 is cut, which no test of a run can see."""
 
 
 class Chain(Generic[S]):
-    """State of a Markov chain at a message number.
+    """A Markov chain whose state is nevertheless a function of the message number alone.
 
-    Parameters
-    ----------
-    first : Callable[[int], S]
-        State at a number where the chain starts, from its stationary law.
-    step : Callable[[S, int], S]
-        State at a number, from the state at the number before.
+    `first` gives the state at a number where the chain starts, from its stationary law; `step` gives that at any other
+    number, from the state at the number before.
 
     Examples
     --------

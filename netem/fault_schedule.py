@@ -1,4 +1,4 @@
-"""The faults of one link over time, in the order of their precedence."""
+"""The faults of one link over time, in the order of their precedence, and what live changes make of them. Pure."""
 
 from __future__ import annotations
 
@@ -37,13 +37,10 @@ class Segment(NamedTuple):
 
 
 class FaultSchedule:
-    """Faults of one link.
+    """Faults of one link, those of a scenario first.
 
-    Parameters
-    ----------
-    spans : Iterable[Span]
-        Faults, those of a scenario first. Where two of one kind hold at once, the later one in this order counts; in
-        a scenario that is a problem, but a live command takes precedence over the scenario while it lasts.
+    Where two of one kind hold at once, the later one in this order counts: in a scenario that is a problem, but a live
+    command takes precedence over the scenario while it lasts.
     """
 
     def __init__(self, spans: Iterable[Span]) -> None:
@@ -87,28 +84,14 @@ class FaultSchedule:
                 return until, ""
             t = until
 
-    def with_spans(self, spans: Iterable[Span]) -> FaultSchedule:
-        """Return the schedule with more entries, which take precedence."""
-        return FaultSchedule((*self.spans, *spans))
-
     def healed(self, t: float, kinds: Collection[str] | None = None) -> FaultSchedule:
-        """Return the schedule without the entries that hold at time t (s), from then on; later ones stay.
-
-        Parameters
-        ----------
-        kinds : Collection[str], optional
-            Kinds to be ended; without them, all.
-        """
+        """Return the schedule without the entries of some kinds, or all, that hold at time t (s); later ones stay."""
         return FaultSchedule(
             span._replace(to_s=t)
             if span.from_s <= t + INSTANT < span.to_s and (kinds is None or span.kind in kinds)
             else span
             for span in self.spans
         )
-
-    def after(self, t: float) -> FaultSchedule:
-        """Return the schedule without the entries that have ended by time t (s); it tells nothing of earlier times."""
-        return FaultSchedule(span for span in self.spans if span.to_s > t)
 
     def flat(self) -> tuple[Span, ...]:
         """Return the same without precedence: spans that do not overlap within a kind, by kind and time."""
@@ -153,7 +136,7 @@ def changed(schedule: FaultSchedule, change: Change, link: Link, microgrids: Map
     """Return the schedule of a link after a change, the same object if the change is not about the link."""
     if isinstance(change, Fault):
         spans = change.spans(*link, microgrids)
-        return schedule.with_spans(spans) if spans else schedule
+        return FaultSchedule((*schedule.spans, *spans)) if spans else schedule
     if not parse(change.on).matches(*link, microgrids):
         return schedule
     return schedule.healed(change.from_s, change.kinds or None)
@@ -196,20 +179,14 @@ class Horizon:
 
 def without_old(schedule: FaultSchedule, over: float) -> FaultSchedule:
     """Return a schedule without the faults that had ended by the time `over` (s), if it has many."""
-    return schedule.after(over) if len(schedule.spans) > MOST_SPANS else schedule
+    many = len(schedule.spans) > MOST_SPANS
+    return FaultSchedule(span for span in schedule.spans if span.to_s > over) if many else schedule
 
 
 class LinkSchedules:
     """Schedules of all links of a run as live changes come, each change taken up once: there may be thousands.
 
     Only the times of changes to come are looked up, so faults that ended long ago are forgotten.
-
-    Parameters
-    ----------
-    netem : Netem
-        The scenario's entries.
-    microgrids : Mapping[str, str]
-        Microgrid of each inverter.
 
     Examples
     --------

@@ -78,13 +78,7 @@ class LinkCounts(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class Ledger:
-    """The verdicts and counts of one link.
-
-    Parameters
-    ----------
-    keep : bool
-        Whether the verdicts are kept until they are taken; their hash is kept in any case.
-    """
+    """The verdicts and counts of one link; without `keep` only the hash of the verdicts is kept."""
 
     __slots__ = ("_keep", "_kept", "_new", "_sha", "corrupted", "delivered", "dropped", "duplicated", "sent")
 

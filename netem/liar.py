@@ -47,16 +47,7 @@ def lies_about(netem: Netem, sender: str, receiver: str) -> tuple[LieTime, ...]:
 
 
 class HeardFrom:
-    """The states of one sender as one receiver hears them.
-
-    Parameters
-    ----------
-    seed : int
-        Of the run.
-    sender, receiver : str
-        Who sends and who hears.
-    lies : Iterable[LieTime]
-        The lies about the sender; see `lies_about`.
+    """The states of one sender as one receiver hears them, by the lies about the sender (`lies_about`).
 
     Examples
     --------
@@ -74,15 +65,7 @@ class HeardFrom:
         self._streams: dict[tuple[str, bool, str], Stream] = {}
 
     def told(self, state: State, before: Before) -> State:
-        """Return what is heard in place of a true state; the state itself if nobody lies about it.
-
-        Parameters
-        ----------
-        state : State
-            As its sender decided.
-        before : Callable[[float], State]
-            The sender's true state of a run time (s), or the last before it.
-        """
+        """Return what is heard in place of a true state; `before` gives the last true one at a run time (s)."""
         for each in self.lies:
             if each.holds(state.t):
                 state = each.lie.told(state, each.since, before, self._draw(each))

@@ -63,18 +63,10 @@ class _Inbound:
 
 
 class Receiver:
-    """All links into one receiver.
+    """All links into one receiver, an inverter or the plant.
 
-    Parameters
-    ----------
-    name : str
-        The receiver: an inverter, or the plant.
-    netem : Netem
-        Faults of the run's links.
-    microgrids : Mapping[str, str]
-        Microgrid of every known inverter, in the order of their table; see `meet` for others.
-    keep_trace : bool
-        Whether verdicts are kept for `take_trace`; their hash is in any case.
+    Microgrids are in the order of the inverters' table; `meet` adds others. Without `keep_trace` only the hash of the
+    verdicts is kept.
 
     Examples
     --------
@@ -119,22 +111,9 @@ class Receiver:
         return min(begun) <= t + INSTANT
 
     def offer(self, src: str, seq: int, t: float, at: float, payload: bytes, message: AnyMessage | None = None) -> None:
-        """Judge a message.
+        """Judge a message, sent at `t` (s of run time) and here without faults at `at` (s, on the receiver's clock).
 
-        Parameters
-        ----------
-        src : str
-            Its sender.
-        seq : int
-            Its number: it finds its random numbers by it.
-        t : float
-            When it was sent (s of run time), which decides the faults that act on it.
-        at : float
-            When it arrives without faults (s of run time, on the receiver's clock); t in simulated time.
-        payload : bytes
-            The message as it came.
-        message : AnyMessage, optional
-            The message decoded; `due` hands it on, so that nobody decodes it again.
+        `due` hands on the decoded `message` where there is one, so that nobody decodes it again.
         """
         inbound = self._links.get(src) or self._link(src)
         inbound.ledger.sent += 1
@@ -173,12 +152,7 @@ class Receiver:
         """Change links for messages sent at `change.from_s` (s of run time) or later; kept messages are judged anew.
 
         Of a link with many faults those that were over long ago are forgotten, unless it has messages that a cut keeps:
-        they may be of that time.
-
-        Returns
-        -------
-        tuple[str, ...]
-            Senders so far whose links to this receiver it changes.
+        they may be of that time. Returns the senders so far whose links it changes.
         """
         self.changes.append(change)
         over, concerned = self._horizon.after(change), list[str]()

@@ -23,10 +23,8 @@ LONGEST_REPLAY = 60.0
 """Longest time (s) by which a replay is old; each receiver keeps the states of that time."""
 
 Quantity = Literal["P_set", "V_set", "Q"]
-"""Quantities of a state that a lie can change."""
-
 QUANTITIES: tuple[Quantity, ...] = ("P_set", "V_set", "Q")
-"""All of them."""
+"""Quantities of a state that a lie can change."""
 
 _BOUNDS: dict[str, tuple[float, float]] = {
     name: (get_args(kind)[1].ge, get_args(kind)[1].le)
@@ -53,18 +51,9 @@ class Lie(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True,
     """Whether the plant hears the lie as well, so that the inverter follows it; else only its neighbours hear it."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return what is heard in place of a state.
+        """Return what is heard in place of a state, by a lie that began at `since` (s of run time).
 
-        Parameters
-        ----------
-        state : State
-            The true state.
-        since : float
-            When the lie began (s of run time).
-        before : Callable[[float], State]
-            The sender's earlier states.
-        draw : Callable[[str], Stream]
-            Random numbers for a quantity.
+        `before` gives the sender's earlier states, `draw` the random numbers for a quantity.
         """
         raise NotImplementedError
 

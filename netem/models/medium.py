@@ -1,4 +1,4 @@
-"""Media that let messages wait: a line of finite rate with a finite queue before it, and time slots."""
+"""What a medium does: links that are down, a line of finite rate with its queue, slots, copies, and flipped bits."""
 
 from __future__ import annotations
 

@@ -1,13 +1,7 @@
 """A user-defined fault: its base class, the registry of faults, and its judge.
 
-    @gridpeers.link_fault("jammer")
-    class Jammer(gridpeers.LinkFault):
-        '''Lose most messages in the first part of every second.'''
-        share: Annotated[float, Range(0, 1), "Part of a second."] = 0.2
-        def judge(self, message, draws):
-            return None if message.t % 1.0 < self.share and draws.uniform() < 0.9 else 0.0
-
 A message meets it after loss and before the line's rate: it is dropped, or goes on, later by what `judge` returns.
+docs/plugins.md has an example.
 """
 
 from __future__ import annotations
@@ -70,15 +64,10 @@ class MessageDraws:
 
 
 class LinkFault:
-    """Base of all user-defined faults. Parameters are annotated attributes (`wire.schema.table_schema`).
+    """Base of all user-defined faults; parameters are annotated attributes, and a wrong one raises ValueError.
 
     There is one object per link and entry. The result of `judge` should depend on the message and the draws alone:
     a receiver that joins late has not seen the messages before.
-
-    Raises
-    ------
-    ValueError
-        If a value is wrong, unknown or missing.
     """
 
     def __init__(self, **parameters: Any) -> None:
@@ -86,15 +75,7 @@ class LinkFault:
             setattr(self, name, value)
 
     def judge(self, message: LinkMessage, draws: MessageDraws) -> float | None:
-        """Return the added delay of a message (s, at least 0), None if it is lost.
-
-        Parameters
-        ----------
-        message : LinkMessage
-            The message.
-        draws : MessageDraws
-            Its random numbers; nothing else may be random.
-        """
+        """Return the added delay of a message (s, at least 0), None if it is lost; only `draws` may be random."""
         raise NotImplementedError
 
 
@@ -126,19 +107,7 @@ Judge = Callable[[int, float, int], float | None]
 
 
 def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[[str], None]) -> Judge:
-    """Return the judge of a fault on one link; a fault that fails is reported and does nothing from then on.
-
-    Parameters
-    ----------
-    plugin : Plugin
-        The fault.
-    src, dst : str
-        The link.
-    stream : Stream
-        Its random numbers.
-    tell : Callable[[str], None]
-        Takes a sentence on a fault that failed.
-    """
+    """Return the judge of a fault on one link; one that fails is told in a sentence, and does nothing from then on."""
     try:
         fault = made(FAULTS, plugin)
     except ValueError as error:

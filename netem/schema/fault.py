@@ -1,4 +1,8 @@
-"""An entry `[[link]]`: the faults of some links for a time."""
+"""An entry `[[link]]`: the faults of some links for a time; and profiles of real links by name.
+
+A profile is a starting point, not a measurement of a network: a number that is not from physics, a standard or a
+published requirement is marked as assumed. Delays are one way, for messages of some 100 bytes.
+"""
 
 from __future__ import annotations
 

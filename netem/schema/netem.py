@@ -92,15 +92,7 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Entries `[[node]]`."""
 
     def spans(self, link: Link, microgrids: Mapping[str, str]) -> tuple[Span, ...]:
-        """Return the faults of one link by all entries.
-
-        Parameters
-        ----------
-        link : Link
-            Who sends and who receives.
-        microgrids : Mapping[str, str]
-            Microgrid of every inverter, in the order of their table.
-        """
+        """Return the faults of one link by all entries; microgrids are in the order of the inverters' table."""
         found = [span for fault in self.links for span in fault.spans(*link, microgrids)]
         return (*found, *(span for part in self.partitions for span in part.spans(*link, microgrids)))
 
@@ -114,17 +106,8 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     ) -> list[Problem]:
         """Return everything that is wrong, each with the path of its key, e.g. `link[2].loss.p`.
 
-        Parameters
-        ----------
-        names : Sequence[str] or None
-            All inverters that are or may come, in the order of their table; None if they are not known, as the feeder
-            could not be read: then what does not depend on them is checked.
-        microgrids : Mapping[str, str]
-            The microgrid of each.
-        end_s : float
-            End of the run (s).
-        noted : Collection[str], optional
-            Paths of the problems that the reader found: their values are defaults, which are not judged.
+        Without `names`, as of a feeder that could not be read, what does not depend on them is checked. `noted` has the
+        paths of the problems that the reader found: their values are defaults, which are not judged.
         """
         found: list[Problem] = []
         for i, fault in enumerate(self.links):

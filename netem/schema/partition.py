@@ -40,15 +40,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """Whether messages between groups are kept and go on when the partition ends; else they are lost."""
 
     def group(self, name: str, microgrids: Mapping[str, str]) -> str | None:
-        """Return the group of an agent; None for the plant, unless a group names it.
-
-        Parameters
-        ----------
-        name : str
-            An inverter, or the plant.
-        microgrids : Mapping[str, str]
-            Microgrid of every inverter, in the order of their table.
-        """
+        """Return the group of an agent; None for the plant, unless a group names it."""
         microgrid = microgrids.get(name, "").lower()
         for i, group in enumerate(self.groups):
             if name in group or (microgrid and microgrid in (other.lower() for other in group)):
@@ -74,10 +66,7 @@ class Partition(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     def over(self, timeline: Sequence[tuple[float, Mapping[str, str]]]) -> tuple[Partition, ...]:
         """Return the partitions of listed groups that do the same as this one by island; any other unchanged.
 
-        Parameters
-        ----------
-        timeline : Sequence[tuple[float, Mapping[str, str]]]
-            From when on (s of run time, rising) each inverter stands in which island.
+        `timeline` says from when on (s of run time, rising) each inverter stands in which island.
 
         Examples
         --------

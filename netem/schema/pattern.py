@@ -95,16 +95,7 @@ def _side(text: str, whole: str) -> EndSet:
 
 
 def objections(text: str, names: Iterable[str] | None, microgrids: Mapping[str, str]) -> list[str]:
-    """Return the problems of a pattern: wrong form, unknown names, or no link at all.
-
-    Parameters
-    ----------
-    text : str
-        The pattern.
-    names : Iterable[str] or None
-        All inverters, spare ones included; None if they are not known, and any name may be one.
-    microgrids : Mapping[str, str]
-        The microgrid of each.
+    """Return the problems of a pattern: wrong form, unknown names, or no link at all; without `names` any may be one.
 
     Examples
     --------

@@ -65,15 +65,7 @@ def _rows(data: bytes, file: str) -> tuple[tuple[float, ...], list[str]]:
 
 
 def with_traces(netem: Netem, folder: Path) -> tuple[Netem, list[Problem]]:
-    """Return the same with the delays of every trace, and the problems of the files.
-
-    Parameters
-    ----------
-    netem : Netem
-        As a scenario has it.
-    folder : Path
-        The scenario's, from which paths are seen.
-    """
+    """Return the same with the delays of every trace, whose paths are seen from `folder`, and their problems."""
     found: list[Problem] = []
     faults = list(netem.links)
     for i, fault in enumerate(faults):
