@@ -121,6 +121,21 @@ def test_sound_runs_of_any_kind_and_length_fail_no_more_often_than_promised() ->
         assert stats.binomtest(sum(p <= level for p in first), len(first), level, "greater").pvalue > 0.001
 
 
+@pytest.mark.parametrize("name", ["gilbert", "gilbert-elliott", "correlated"])
+def test_what_a_test_calls_improbable_is_as_rare_as_it_says(name: str) -> None:
+    """Of 150 sound links no test has more values of p below 0.2 than a fifth, chance aside."""
+    values: dict[str, list[float]] = {}
+    for seed in range(150):
+        for test in held_against(traced(SOUND[name], 300, seed), SOUND[name], seed):
+            assert test.p is not None
+            values.setdefault(test.what, []).append(test.p)
+
+    assert all(
+        stats.binomtest(sum(p <= 0.2 for p in found), 150, 0.2, "greater").pvalue > 0.01 for found in values.values()
+    )
+    assert all(min(found) < 0.05 for found in values.values())
+
+
 def test_one_falsified_link_of_72_is_the_only_one_that_is_named() -> None:
     """Holm's method leaves enough to find a link that loses a fifth where a tenth was told."""
     told, done = ({"loss": GilbertElliott(p=p, r=0.5)} for p in (0.05, 0.125))
