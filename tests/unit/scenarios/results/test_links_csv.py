@@ -52,7 +52,7 @@ def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_mes
 
 
 def test_an_account_that_does_not_close_is_a_warning_of_every_run() -> None:
-    """The report tells of a message that is neither delivered nor dropped nor on its way, without any self-check."""
+    """The report tells of a message that is neither delivered nor dropped nor on its way, checked or not."""
     record = LinkRecord()
     count = LinkCounts(sent=3, duplicated=0, delivered=1, dropped={"loss": 1}, corrupted=0, in_flight=0)
     record.counts["inv1", "inv2"] = count
