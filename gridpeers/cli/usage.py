@@ -93,7 +93,7 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
 
 
 RUN = {
-    **dict.fromkeys(("numpy", "scipy", "numba", "llvmlite", "threadpoolctl"), "the plant"),
+    **dict.fromkeys(("numpy", "scipy", "numba", "threadpoolctl"), "the plant"),
     **dict.fromkeys(("mcap", "lz4", "zstandard", "msgpack"), "the record of a run"),
     "matplotlib": "the figures",
 }

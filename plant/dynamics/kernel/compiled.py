@@ -1,8 +1,7 @@
-"""How the plant's inner loop is compiled: by numba once, and from machine code on disk ever after.
+"""How the plant's inner loop is compiled: by numba once, whose cache keeps the machine code.
 
-To load numba and what its own cache keeps takes 0.6 s, twice as long as a case in one process. So the machine code of
-each function that Python calls is kept as it is (`machine_code`), and numba is imported only where some is missing.
-It is kept in the user's cache folder. Where that cannot be written, each process compiles for itself.
+It is in the user's cache folder. Where that cannot be written, each process compiles for itself. Numba's own choice
+would be a folder beside the sources, and an error where it can write none.
 """
 
 from __future__ import annotations
@@ -11,11 +10,13 @@ import hashlib
 import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any, Generic, ParamSpec, TypeVar
+from pickle import UnpicklingError
+from typing import Any, ParamSpec, TypeVar
 
-from plant.dynamics.kernel.call_arguments import UnpackableError, described, pack
-from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode, file_name
+from numba import njit
+from numba.core.caching import CompileResultCacheImpl, FunctionCache
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -23,19 +24,20 @@ _R = TypeVar("_R")
 _HERE = Path(__file__).parent
 
 
-def kernel_folders() -> tuple[Path | None, Path]:
-    """Return where machine code of these sources is kept, and where a packager may have put it: beside the sources.
+def kernel_folder() -> Path | None:
+    """Return where machine code of these sources is kept; None where the user has no home.
 
-    The first is `NUMBA_CACHE_DIR`, or the user's cache; None where the user has no home. An edit of `gfm.py` changes
-    the code of its callers in `step.py`, so the name of both folders carries a hash of all files here.
+    It is in `NUMBA_CACHE_DIR`, or in the user's cache, or beside the sources if a packager has put it there. An edit of
+    `gfm.py` changes the code of its callers in `step.py`, so its name carries a hash of all files here.
     """
     digest = hashlib.sha256()
     for source in sorted(_HERE.glob("*.py")):
         digest.update(source.read_bytes())
     name = f"kernels-{digest.hexdigest()[:16]}"
+    beside = _HERE / "__pycache__" / name
     chosen = os.environ.get("NUMBA_CACHE_DIR")
     base = Path(chosen) if chosen else user_cache()
-    return base / name if base else None, _HERE / "__pycache__" / name
+    return beside if beside.is_dir() else base / name if base else None
 
 
 def user_cache() -> Path | None:
@@ -51,86 +53,57 @@ def user_cache() -> Path | None:
     return folder / "gridpeers" if folder.is_absolute() else None
 
 
-FOLDER, BESIDE = kernel_folders()
-"""Where machine code of these sources is kept, and where it may be too."""
-
-
-def read_code(file: str) -> MachineCode | None:
-    """Return the machine code of a file's name; None if no folder has it."""
-    found = (MachineCode.read(folder / file) for folder in (FOLDER, BESIDE) if folder)
-    return next(filter(None, found), None)
+FOLDER = kernel_folder()
+"""Where machine code of these sources is kept."""
 
 
 def is_compiled(function: str) -> bool:
     """Whether machine code of a function is on disk."""
-    return any(True for folder in (FOLDER, BESIDE) if folder for _ in folder.glob(f"{function}-*{SUFFIX}"))
+    return FOLDER is not None and any(FOLDER.glob(f"*.{function}-*.nbi"))
 
 
-class Kernel(Generic[_P, _R]):
-    """A function that runs as machine code, called as it is written.
+class _Place:
+    """The folder of machine code as numba's cache asks for it; its name tells the sources."""
 
-    Parameters
-    ----------
-    function : Callable
-        What numba can compile; functions of ours that it calls are `Kernel`s too.
-    locked : bool, optional
-        Whether calls keep Python's lock.
-    """
+    @classmethod
+    def from_function(cls, *_: Any) -> _Place:
+        return cls()
 
-    def __init__(self, function: Callable[_P, _R], *, locked: bool = True) -> None:
-        self.__name__, self.__doc__, self.__module__ = function.__name__, function.__doc__, function.__module__
-        self.function = function
-        self._locked = locked
-        self._linked: dict[tuple[Any, ...], Callable[[bytes], Any] | None] = {}
-        """By the kinds of arguments; None where numba calls it."""
-        self._dispatcher: Any = None
+    def ensure_cache_path(self) -> None:
+        Path(self.get_cache_path()).mkdir(parents=True, exist_ok=True)
 
-    def __call__(self, *args: _P.args, **named: _P.kwargs) -> _R:
-        """Call it; the first call with arguments of its types links the machine code, or compiles it."""
+    def get_cache_path(self) -> str:
+        return str(FOLDER)
+
+    def get_source_stamp(self) -> str:
+        return ""
+
+    def get_disambiguator(self) -> str:
+        return ""
+
+
+class _Files(CompileResultCacheImpl):
+    _locator_classes = [_Place]  # type: ignore[list-item]  # noqa: RUF012
+
+
+class _Cache(FunctionCache):
+    """Numba's cache in our folder, which may also be read-only or full."""
+
+    _impl_class = _Files
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
         try:
-            kinds, words = pack(args)
-        except UnpackableError:  # a record by itself, for instance: tests call a model so
-            return self._by_numba(*args, **named)
-        if named:
-            return self._by_numba(*args, **named)
-        try:
-            linked = self._linked[kinds]
-        except KeyError:
-            linked = self._linked[kinds] = self._link(args, described(kinds))
-        if linked is None:
-            return self._by_numba(*args)
-        result: _R = linked(words)
-        return result
-
-    def _link(self, args: tuple[Any, ...], types: str) -> Callable[[bytes], Any] | None:
-        """Link the machine code for arguments of these types, compiled first where there is none on disk."""
-        file = file_name(f"{self.function.__module__}.{self.function.__name__}", types)
-        code = read_code(file)
-        try:
-            if code is None:
-                from plant.dynamics.kernel.compiling import compile_call
-
-                code = compile_call(self.dispatcher, args)
-                if FOLDER:
-                    code.keep(FOLDER / file)
-            return code.linked(self.__name__, locked=self._locked)
-        except RuntimeError:  # of llvmlite: on a system, or with a version of it, where this was never tried
+            found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except (OSError, EOFError, UnpicklingError):  # no folder, or half a file
+            with suppress(OSError):
+                self.flush()  # type: ignore[no-untyped-call]
             return None
+        # Two processes that compile a function for two types at a time may both give their code the same file.
+        return found if found is not None and tuple(found.signature.args) == tuple(sig) else None
 
-    def _by_numba(self, *args: Any, **named: Any) -> _R:
-        result: _R = self.dispatcher(*args, **named)
-        return result
-
-    @property
-    def dispatcher(self) -> Any:
-        """The function as numba compiles it; the functions of ours that it calls are given to numba likewise."""
-        if self._dispatcher is None:
-            from plant.dynamics.kernel.compiling import dispatcher_of
-
-            self._dispatcher, namespace = dispatcher_of(self.function, FOLDER)
-            seen = {name: each.dispatcher for name, each in namespace.items() if isinstance(each, Kernel)}
-            namespace.update(seen)
-        return self._dispatcher
+    def save_overload(self, sig: Any, data: Any) -> None:
+        with suppress(OSError):
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
 def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -138,10 +111,17 @@ def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
 
     No fast-math: sums keep their order, so the same inputs give the same bytes in every process.
     """
-    return Kernel(function)
+    return _compiled(function, nogil=False)
 
 
 def unlocked(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return a compiled function in a form that other threads run beside: by the same machine code."""
-    assert isinstance(function, Kernel)
-    return Kernel(function.function, locked=False)
+    """Compile a function beside whose calls other threads run."""
+    return _compiled(function, nogil=True)
+
+
+def _compiled(function: Callable[_P, _R], *, nogil: bool) -> Callable[_P, _R]:
+    dispatcher: Any = njit(error_model="numpy", nogil=nogil)(function)
+    if FOLDER:  # `cache=True` would take one of numba's own folders
+        dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
+    result: Callable[_P, _R] = dispatcher
+    return result

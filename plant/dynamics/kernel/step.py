@@ -87,5 +87,16 @@ def run_steps(
     return total
 
 
-run_steps_unlocked = unlocked(run_steps)
-"""The same without Python's lock, for networks so large that it is worth handing it back and forth."""
+@unlocked
+def run_steps_unlocked(
+    begin: int,
+    steps: int,
+    h: float,
+    tolerance: float,
+    net: Any,
+    units: Any,
+    x: NDArray[np.float64],
+    out: NDArray[np.float64],
+) -> int:
+    """Do the same without Python's lock, for networks so large that it is worth handing it back and forth."""
+    return run_steps(begin, steps, h, tolerance, net, units, x, out)

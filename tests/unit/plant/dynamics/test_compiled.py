@@ -1,9 +1,13 @@
+"""Compiled functions, and where their machine code is kept."""
+
+from __future__ import annotations
+
 import resource
 import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,9 +16,7 @@ from numpy.typing import NDArray
 
 from plant.build import build_plant
 from plant.dynamics import Dynamics
-from plant.dynamics.kernel import compiled, compiling
-from plant.dynamics.kernel.compiled import Kernel
-from plant.dynamics.kernel.machine_code import SUFFIX, MachineCode
+from plant.dynamics.kernel import compiled
 from scenarios.schema import load_scenario
 from scenarios.schema.configs import configs
 from scenarios.start_check import start_problem
@@ -23,37 +25,17 @@ from tests.side_by_side import compile_once
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
 
 
-class Inner(NamedTuple):
-    """A tuple in a tuple."""
-
-    values: Any
-    scale: float
-
-
-class Outer(NamedTuple):
-    """What a compiled function takes."""
-
-    inner: Inner
-    at: Any
-
-
-def gather(outer: Any, sign: float, count: int) -> tuple[int, float, bool, complex]:
-    """Sum picked values over a table of its own; everything that a compiled function of ours does and returns."""
-    own = np.empty((count, 2))
-    for i in range(count):
-        for k in range(2):
-            own[i, k] = sign * outer.inner.scale * outer.inner.values[outer.at[i], k]
-    return count, own.sum(), own[0, 0] > 0.0, complex(own[0, 0], own[count - 1, 1])
-
-
-def fill(into: NDArray[np.float64], value: float) -> None:
-    """Return nothing."""
+def fill(into: NDArray[Any], value: float) -> None:
+    """Write a value everywhere."""
     into[:] = value
 
 
-def spread(into: NDArray[np.float64], values: NDArray[np.float64]) -> None:
-    """Fail where the sizes differ."""
-    into[:] = values
+def filled(dtype: type = float) -> tuple[list[Any], int]:
+    """Return what a freshly declared function writes, and how often its code came from the disk."""
+    function: Any = compiled.compiled(fill)
+    into = np.zeros(2, dtype)
+    function(into, 3.0)
+    return into.tolist(), sum(function.stats.cache_hits.values())
 
 
 @pytest.fixture
@@ -70,84 +52,47 @@ def test_an_edit_of_compiled_code_renames_its_cache(
     """Whichever file with compiled code is edited, machine code of the text before is not loaded again."""
     folder = Path(shutil.copytree(source.parent, tmp_path / "dynamics", ignore=shutil.ignore_patterns("__pycache__")))
     monkeypatch.setattr(compiled, "_HERE", folder)
-    before = compiled.kernel_folders()
+    before = compiled.kernel_folder()
 
     with (folder / source.name).open("a") as file:
         file.write("\n")
 
-    assert not set(compiled.kernel_folders()) & set(before)
+    assert compiled.kernel_folder() != before
 
 
-def test_machine_code_gives_what_the_function_gives(folder: Path) -> None:
-    """Arrays in any order of memory, tuples in tuples, numbers; memory of its own; a result of several types."""
-    values, at = np.arange(24.0).reshape(3, 8)[:, ::3].T, np.array([2, 0])
-    for table in (values, np.ascontiguousarray(values)):
-        outer = Outer(Inner(table, 2.0), at)
-        expected = gather(outer, -1.0, 2)
-        kernel = Kernel(gather)
-
-        assert kernel(outer, -1.0, 2) == expected
-        assert kernel(outer, -1.0, 2) == kernel.dispatcher(outer, -1.0, 2)
-    assert len(list(folder.glob(f"*{SUFFIX}"))) == 2  # a type of array each
-
-
-def test_what_is_written_into_an_array_stands_there(folder: Path) -> None:
-    """A function that returns nothing still has its effect; one without room for what it writes fails."""
-    table = np.zeros((3, 4))
-
-    assert Kernel(fill)(table[1], 5.0) is None
-    assert table.sum() == 20.0 == table[1].sum()
-    with pytest.raises(RuntimeError, match="spread: the compiled function failed"):
-        Kernel(spread)(table[0], np.zeros(3))
-
-
-def test_another_process_reads_machine_code_without_numba() -> None:
-    """A plant that has run on this machine starts without the compiler, whose import takes longer than a run."""
+def test_another_process_loads_the_step_and_compiles_nothing() -> None:
+    """A plant that has run on this machine starts in a second, where its compilation takes up to a minute."""
     compile_once()
     code = (
-        "import sys; from plant.loaded_kernels import load_kernels; load_kernels()\n"
-        "print(sorted({'numba', 'llvmlite'} & set(sys.modules)))"
+        "from plant.loaded_kernels import load_kernels; load_kernels()\n"
+        "from plant.dynamics.kernel.step import run_steps\n"
+        "print(*(sum(of.values()) for of in (run_steps.stats.cache_hits, run_steps.stats.cache_misses)))"
     )
 
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
 
-    assert done.stdout == "['llvmlite']\n"
-
-
-def test_a_file_under_another_name_is_none(folder: Path) -> None:
-    """Code of one function in the file of another would be called with what it cannot take, and end the process."""
-    Kernel(fill)(np.zeros(2), 1.0)
-    (file,) = folder.glob(f"*{SUFFIX}")
-
-    other = file.rename(file.with_name(f"other{SUFFIX}"))
-
-    assert MachineCode.read(other) is None
-
-
-def test_what_cannot_be_kept_leaves_nothing(folder: Path) -> None:
-    """A folder where its file should be: no part of a file stays beside it, however often that happens."""
-    code = MachineCode("name", "f", b"code")
-    (folder / f"fill{SUFFIX}").mkdir(parents=True)
-
-    code.keep(folder / f"fill{SUFFIX}")
-
-    assert [path.name for path in folder.iterdir()] == [f"fill{SUFFIX}"]
+    assert done.stdout == "1 0\n"
 
 
 def test_a_damaged_file_is_compiled_anew(folder: Path) -> None:
-    """Half a file, as of a full disk, is no machine code: linked, it would end the process."""
-    Kernel(fill)(np.zeros(2), 1.0)
-    (file,) = folder.glob(f"*{SUFFIX}")
-    whole = file.read_bytes()
-    assert MachineCode.read(file) is not None
-    file.write_bytes(whole[: len(whole) // 2])
-    assert MachineCode.read(file) is None
+    """Half a file, as after a power cut, is no machine code."""
+    filled()
+    for file in folder.iterdir():
+        file.write_bytes(file.read_bytes()[:30])
 
-    into = np.zeros(2)
-    Kernel(fill)(into, 3.0)
+    assert filled() == ([3.0, 3.0], 0)
+    assert filled() == ([3.0, 3.0], 1)
 
-    assert into.tolist() == [3.0, 3.0]
-    assert MachineCode.read(file) is not None
+
+def test_code_for_other_types_is_not_taken(folder: Path) -> None:
+    """Two processes that compile a function for two types at a time may give both the same file."""
+    filled()
+    (of_floats,) = folder.glob("*.1.nbc")
+    filled(int)
+    (of_integers,) = folder.glob("*.2.nbc")
+    of_floats.replace(of_integers)
+
+    assert filled(int) == ([3, 3], 0)
 
 
 @pytest.mark.parametrize("place", ["none", "file"])
@@ -158,37 +103,49 @@ def test_without_a_folder_to_write_functions_run_and_nothing_is_kept(
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setattr(compiled, "FOLDER", None if place == "none" else tmp_path / "file" / "kernels")
     monkeypatch.setattr(CacheImpl, "_locator_classes", [])  # numba's places: a read-only installation has none of them
-    into = np.zeros(2)
 
-    Kernel(fill)(into, 3.0)
-
-    assert into.tolist() == [3.0, 3.0]
+    assert filled() == ([3.0, 3.0], 0)
+    assert not compiled.is_compiled("fill")
 
 
-def test_numba_keeps_nothing_where_its_cache_has_no_room(folder: Path) -> None:
-    """A full home: numba would end the start with an error where it cannot write its own cache."""
+def test_on_a_full_disk_functions_run_and_nothing_is_kept(folder: Path) -> None:
+    """A full home: the process compiles for itself, and leaves no part of a file."""
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (compiling.ROOM // 2, hard))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
     try:
-        Kernel(fill)(np.zeros(2), 3.0)
+        assert filled() == ([3.0, 3.0], 0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
-    assert [path.suffix for path in folder.rglob("*")] == [SUFFIX]
+    assert list(folder.iterdir()) == []
 
 
 def test_machine_code_in_a_folder_that_is_read_alone_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An image whose builder left a warm cache beside the sources starts without the compiler, and writes nothing."""
-    Kernel(fill)(np.zeros(2), 1.0)
-    monkeypatch.setattr(compiled, "FOLDER", None)
-    monkeypatch.setattr(compiled, "BESIDE", folder)
-    monkeypatch.setattr(compiling, "compile_call", None)
-    into = np.zeros(2)
+    """An image whose builder left a warm cache starts without compiling; what it lacks is compiled and not kept."""
+    filled()
+    kept = sorted(folder.iterdir())
+    monkeypatch.setattr(compiled.FunctionCache, "save_overload", refuse)
 
-    Kernel(fill)(into, 3.0)
-
-    assert into.tolist() == [3.0, 3.0]
+    assert filled() == ([3.0, 3.0], 1)
+    assert filled(int) == ([3, 3], 0)
+    assert sorted(folder.iterdir()) == kept
     assert compiled.is_compiled("fill")
+
+
+def refuse(*_: object) -> None:
+    """Write nothing, as the system refuses it."""
+    raise PermissionError
+
+
+def test_machine_code_beside_the_sources_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A packager may put it there."""
+    monkeypatch.setattr(compiled, "_HERE", tmp_path)
+    kept = compiled.kernel_folder()
+    assert kept is not None
+    beside = tmp_path / "__pycache__" / kept.name
+    beside.mkdir(parents=True)
+
+    assert compiled.kernel_folder() == beside
 
 
 @pytest.mark.parametrize(
@@ -211,7 +168,7 @@ def test_compiled_kernels_go_into_the_users_cache(
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(compiled.sys, "platform", system)
 
-    kept, _ = compiled.kernel_folders()
+    kept = compiled.kernel_folder()
 
     assert (kept and str(kept.parent)) == expected
 
@@ -226,53 +183,6 @@ def test_a_user_without_a_home_has_no_cache_folder(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(Path, "home", unknown)
 
     assert compiled.user_cache() is None
-
-
-def test_where_machine_code_cannot_be_linked_numba_runs_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a system whose linker does not take it the function gives the same, and each start loads numba as before."""
-
-    def refuse(*_: object, **__: object) -> None:
-        raise RuntimeError("Symbols not found")
-
-    monkeypatch.setattr(MachineCode, "linked", refuse)
-    outer = Outer(Inner(np.arange(16.0).reshape(8, 2), 2.0), np.array([2, 0]))
-
-    assert Kernel(gather)(outer, -1.0, 2) == gather(outer, -1.0, 2)
-
-
-NO_MEMORY = """
-import resource
-from pathlib import Path
-from plant.dynamics.kernel.machine_code import file_name
-pages = int(Path("/proc/self/statm").read_text().split()[0])
-room = pages * resource.getpagesize() + 2**24
-resource.setrlimit(resource.RLIMIT_AS, (room, room))
-try:
-    file_name("step", "")
-except OSError as error:
-    print(error)
-"""
-
-
-def test_llvmlite_without_memory_is_told_as_such() -> None:
-    """Llvmlite says that its library could not be found or loaded; a campaign would take that for the scenario's."""
-    done = subprocess.run([sys.executable, "-c", NO_MEMORY], capture_output=True, text=True, timeout=60.0)
-
-    assert (done.stdout, done.stderr) == ("[Errno 12] Cannot allocate memory: 'libllvmlite.so'\n", "")
-
-
-def test_a_record_by_itself_goes_to_numba(folder: Path) -> None:
-    """What has no words here is called as before."""
-    record = np.zeros(1, [("a", "f8"), ("b", "f8")])[0]
-    record["a"] = 2.0
-
-    assert Kernel(take_a)(record, 3.0) == 6.0
-    assert not folder.exists() or not list(folder.glob(f"*{SUFFIX}"))
-
-
-def take_a(record: Any, factor: float) -> float:
-    """Read a field."""
-    return float(record.a * factor)
 
 
 def test_only_a_plant_that_takes_steps_compiles_the_step(monkeypatch: pytest.MonkeyPatch) -> None:
