@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import root
 
 from plant.dynamics.error import PlantError
 from plant.dynamics.reduction.blas import one_thread
 from plant.dynamics.reduction.reduced import Complex, Real
-from plant.dynamics.start.hybrid_root import Root, hybrid_root
 from plant.dynamics.start.power_flow import PowerFlow
 from plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
 
@@ -104,15 +104,12 @@ def _at_places(
         measured = np.where(units.positive_sequence, units.measured(V, I_out)[0].imag, trial)
         return np.asarray(at_rest.mismatch(place, units.regulated(V, I_out), measured)[free])
 
-    solution: Root | None = None
+    solution = None
     if free.size > MOST_BY_DIFFERENCES:
-        from scipy.optimize import root  # its import takes longer than the start of a small plant
-
         with one_thread():
-            found = root(mismatch, np.zeros(free.size), method="krylov", options=KRYLOV)
-        solution = Root(found.x, found.fun, bool(found.success))
+            solution = root(mismatch, np.zeros(free.size), method="krylov", options=KRYLOV)
     if solution is None or not solution.success:
-        solution = hybrid_root(mismatch, np.zeros(free.size), 1e-13)
+        solution = root(mismatch, np.zeros(free.size), method="hybr", options={"xtol": 1e-13})
     if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:
         raise PlantError(
             "no initial operating point: V_set0 cannot be met by droop, "
