@@ -19,7 +19,7 @@ _OF_AGENTS = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.
 
 _OF_PLANTS = (
     *("wire.driver.session:load_zenoh", "plant.plant_process"),
-    *("plant.lean_scipy:import_scipy_sparse", "plant.build", "plant.loaded_kernels:load_kernels"),
+    *("plant.build", "plant.loaded_kernels:load_kernels"),
 )
 """The same for plants. Agents have another server, because they do not load numpy."""
 
