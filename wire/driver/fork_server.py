@@ -45,10 +45,8 @@ def main() -> None:
     control = socket.socket(fileno=int(sys.argv[1]))
     for text in sys.argv[2:]:
         module, _, function = text.partition(":")
-        if _is_alone(control):
-            return
         found = import_module(module)
-        if function and not _is_alone(control):
+        if function:
             getattr(found, function)()
     gc.collect()
     gc.freeze()  # no collection touches these objects, so that the processes share their memory
@@ -60,14 +58,6 @@ def main() -> None:
     if not hasattr(sys.modules.get(job.words[0]), "__path__"):
         sys.modules.pop(job.words[0], None)  # runpy warns of a module that it runs and that is there already
     runpy.run_module(job.words[0], run_name="__main__", alter_sys=True)
-
-
-def _is_alone(control: socket.socket) -> bool:
-    """Whether nobody asks any more, because the process that did has died: then the rest need not be imported."""
-    try:
-        return not control.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
-    except BlockingIOError:
-        return False
 
 
 def _serve(control: socket.socket) -> _Job | None:
