@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import is_
 
 import numpy as np
 from numpy.typing import NDArray
@@ -71,7 +70,6 @@ class Dynamics:
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[switching.Trip] = []
-        self._arrays: Units | None = None
         units = self.inverters
         self._gfm_0, self._gfm_d = units.gfm_state.copy(), units.gfm_state.copy()
         self._gfl_0, self._gfl_d = units.gfl_state.copy(), units.gfl_state.copy()
@@ -163,12 +161,9 @@ class Dynamics:
         return out
 
     def arrays(self) -> Units:
-        """Return the state of all inverters as the compiled passes take it; they write into it.
-
-        It is the same tuple again while its arrays are: then a call need not look at them one by one.
-        """
-        units, before = self.inverters, self._arrays
-        now = Units(
+        """Return the state of all inverters as the compiled passes take it; they write into it."""
+        units = self.inverters
+        return Units(
             units.f_nom,
             units.gfm,
             units.gfm_at,
@@ -188,10 +183,6 @@ class Dynamics:
             units.I,
             units.limiting,
         )
-        if before is not None and all(map(is_, before, now)):
-            return before
-        self._arrays = now
-        return now
 
     def _advance(self, begin: int, steps: int, out: Real) -> int:
         units, network, arrays, tolerance = self.inverters, self.network, self.arrays(), self._tolerance
