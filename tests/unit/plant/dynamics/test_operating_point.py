@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import optimize
 
 from plant.dynamics.start import by_droop
 from plant.feeder import Plant
@@ -35,8 +34,8 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
         methods.append(named["method"])
         return root(*arguments, **named)
 
-    root = optimize.root
-    monkeypatch.setattr(optimize, "root", noted)
+    root = by_droop.root
+    monkeypatch.setattr(by_droop, "root", noted)
     monkeypatch.setattr(by_droop, "MOST_BY_DIFFERENCES", 0)
     many = start()
 
