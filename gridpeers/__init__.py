@@ -17,10 +17,6 @@ from importlib import import_module
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
-from gridpeers.origin import check_origin
-
-check_origin()
-
 if TYPE_CHECKING:
     from agents.carriers.law_registry import LAWS
     from agents.graphs import GRAPHS
