@@ -11,17 +11,17 @@ from math import inf
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.degraded_communication import SaturationDetector, StalenessWeights
-from agents.graphs import GraphError
-from agents.island_detector import IslandDetector
-from agents.laws.call import LawError, decide, failed_at, start_law
-from agents.laws.in_force import law_in_force
-from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
-from agents.laws.law_inputs import neighbour_of, neighbours_alike, own_of
-from agents.own_nameplate import nameplate_of
-from agents.topology import in_neighbours, rule_of
-from wire.messages import OFF, Measurement, Nameplate, State
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.degraded_communication import SaturationDetector, StalenessWeights
+from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.island_detector import IslandDetector
+from gridpeers.agents.laws.call import LawError, decide, failed_at, start_law
+from gridpeers.agents.laws.in_force import law_in_force
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own
+from gridpeers.agents.laws.law_inputs import neighbour_of, neighbours_alike, own_of
+from gridpeers.agents.own_nameplate import nameplate_of
+from gridpeers.agents.topology import in_neighbours, rule_of
+from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
 
 SIGN_OF_LIFE = 0.5
 """Longest silence of an agent whose law sends nothing, as part of the age at which neighbours drop a state."""
@@ -37,14 +37,14 @@ class Agent:
     law : Law, optional
         Law that decides the set-points; by default the paper's, with the configuration's gains.
     board : dict[str, State], optional
-        Last state of each agent that neighbours may use, where all agents of a run share it (`agents.agent_group`); by
-        default the agent keeps those that it hears.
+        Last state of each agent that neighbours may use, where all agents of a run share it
+        (`gridpeers.agents.agent_group`); by default the agent keeps those that it hears.
 
     Examples
     --------
     An inverter without secondary control keeps the set-points that the plant holds:
 
-    >>> from agents.agent_config import Control
+    >>> from gridpeers.agents.agent_config import Control
     >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
     ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="none", graph="none"), deadline=10.0,
     ...     connect=()))
@@ -205,7 +205,7 @@ class Agent:
         return neighbours
 
     def hear(self, state: State) -> None:
-        """Note the latest state of an agent whose nameplate is known; `wire.admission` has checked the sender."""
+        """Note the latest state of an agent with a nameplate; `gridpeers.wire.admission` has checked the sender."""
         if state.quiet:
             return  # its law sends nothing: its last state stays valid
         self.heard[state.sender] = state
@@ -222,8 +222,8 @@ class Agent:
         measurement : Measurement
             Present reading of the own sensors.
         neighbours : Sequence[str], optional
-            In-neighbours. The last state of each counts, with the weight by `agents.degraded_communication`; one
-            without a state, or in another island, is left out of the sums.
+            In-neighbours. The last state of each counts, with the weight by `gridpeers.agents.degraded_communication`;
+            one without a state, or in another island, is left out of the sums.
         ages : Mapping[str, float], optional
             Ages of these states (s of run time) by the own clock. By default the time from each state to the own
             measurement.

@@ -6,12 +6,12 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from wire.journal import RecordLevel
-from wire.plugins.plugin import Plugin
-from wire.schema.plausible import Plausible, Range, Unit
-from wire.schema.relations import Below
-from wire.schema.table_schema import NO_KEY, Example, Label
-from wire.trust.credentials import Credentials
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.plugins.plugin import Plugin
+from gridpeers.wire.schema.plausible import Plausible, Range, Unit
+from gridpeers.wire.schema.relations import Below
+from gridpeers.wire.schema.table_schema import NO_KEY, Example, Label
+from gridpeers.wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25
 """Age (s of run time) of a state or a measurement beyond which it is not used in wall-clock time."""
@@ -190,7 +190,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     star: bool = False
     """Whether the plant relays all messages, in simulated time: the agents have one link each."""
     epoch: int = 1
-    """Epoch of this process; see `wire.admission`."""
+    """Epoch of this process; see `gridpeers.wire.admission`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the plant, or real time."""
     speed: float = 1.0
@@ -199,7 +199,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Rate of the agent's own clock: 1.0001 gains 100 ppm. Wall-clock: the agent ticks that much more often; simulated:
     it takes a period for that much longer."""
     links: dict[str, Any] = {}
-    """Emulated links to this agent: `scenarios.emulation.emulation_config` as a tree, because agents know no netem.
+    """Emulated links to this agent: `gridpeers.scenarios.emulation.emulation_config`, as a tree: agents know no netem.
     Empty: none."""
     max_age: float = MAX_AGE
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""

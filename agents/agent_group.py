@@ -3,7 +3,7 @@
 Where no link is emulated and no agent joins, leaves or dies, messages decide nothing: at tick k an agent has the
 measurement of tick k and the states of tick k-1 of its in-neighbours, however they came. So the agents of one process
 can share one board with the last state of each, instead of a message, its checks and a copy for each link.
-`agents.lockstep_agent` takes the same decisions with messages; a process has no other way.
+`gridpeers.agents.lockstep_agent` takes the same decisions with messages; a process has no other way.
 """
 
 from __future__ import annotations
@@ -11,15 +11,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
-from agents.agent import Agent
-from agents.agent_config import AgentConfig
-from agents.decision_journal import DecisionJournal
-from agents.graphs import GraphError, RosterGraph
-from agents.laws.law import Law
-from agents.own_nameplate import check_nameplate
-from agents.topology import rule_of, without_missing
-from wire.journal import JournalBuffer
-from wire.messages import Journal, Measurement, State
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.decision_journal import DecisionJournal
+from gridpeers.agents.graphs import GraphError, RosterGraph
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.own_nameplate import check_nameplate
+from gridpeers.agents.topology import rule_of, without_missing
+from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.messages import Journal, Measurement, State
 
 
 class AgentGroup:

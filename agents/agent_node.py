@@ -2,24 +2,24 @@
 
 The node meets the other agents by their tokens and nameplates, and listens to its in-neighbours by the run's graph. It
 passes their states through the emulated links, if there are any, and reports these to the plant.
-`agents.lockstep_agent` and `agents.realtime.realtime_agent` decide when it ticks.
+`gridpeers.agents.lockstep_agent` and `gridpeers.agents.realtime.realtime_agent` decide when it ticks.
 """
 
 from __future__ import annotations
 
 from math import inf
 
-from agents.agent import Agent
-from agents.agent_config import AgentConfig
-from agents.laws.law import Law
-from agents.neighbour_states import NeighbourStates
-from agents.own_nameplate import check_nameplate
-from wire.actions import Listen
-from wire.codec import RejectedError, encode
-from wire.links import Links, arrived, is_usable
-from wire.messages import PLANT, Measurement, Nameplate, State, Stop
-from wire.node import Route
-from wire.plant_follower import PlantFollower
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.neighbour_states import NeighbourStates
+from gridpeers.agents.own_nameplate import check_nameplate
+from gridpeers.wire.actions import Listen
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.links import Links, arrived, is_usable
+from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
+from gridpeers.wire.node import Route
+from gridpeers.wire.plant_follower import PlantFollower
 
 _KEPT = State, Measurement
 """Messages that links deliver and a node keeps: as a tuple, for a union would be made anew for every message."""
@@ -39,7 +39,7 @@ class AgentNode(PlantFollower):
     law : Law or None
         Law that decides the set-points; None is the paper's.
     rate : float, optional
-        Most messages of one sender per s of run time; see `wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
     """
 
     def __init__(

@@ -8,13 +8,13 @@ from contextlib import ExitStack, closing
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.agent_sessions import AgentSessions
-from agents.carriers.make import make_law
-from agents.laws.law import Law
-from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
-from wire.driver.scheduling import schedule_as_batch
-from wire.keys import check_name
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_sessions import AgentSessions
+from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.laws.law import Law
+from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
+from gridpeers.wire.driver.scheduling import schedule_as_batch
+from gridpeers.wire.keys import check_name
 
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""

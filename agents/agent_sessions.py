@@ -8,16 +8,16 @@ from contextlib import suppress
 from threading import Timer
 from time import monotonic, sleep
 
-from agents.agent_config import AgentConfig
-from agents.known_agents import KnownAgents
-from agents.laws.law import Law
-from agents.lockstep_agent import LockstepAgent
-from agents.realtime.realtime_agent import RealtimeAgent
-from wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
-from wire.driver.process import ConfigurationError, MakeLinks
-from wire.driver.session import Session, SessionError
-from wire.node_group import NodeGroup
-from wire.trust.credentials import Credentials
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.known_agents import KnownAgents
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
+from gridpeers.wire.driver.process import ConfigurationError, MakeLinks
+from gridpeers.wire.driver.session import Session, SessionError
+from gridpeers.wire.node_group import NodeGroup
+from gridpeers.wire.trust.credentials import Credentials
 
 AnyAgent = RealtimeAgent | LockstepAgent
 

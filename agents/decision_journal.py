@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf
 
-from agents.agent import Agent
-from wire.journal import Decision, JournalBuffer
+from gridpeers.agents.agent import Agent
+from gridpeers.wire.journal import Decision, JournalBuffer
 
 _NOT_SATURATED = (0, 0)
 

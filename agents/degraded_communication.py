@@ -1,7 +1,7 @@
 """An agent's options for late, lost and missing states, and for saturation: `[degraded_communication]`. Pure.
 
-The law is `agents.laws.consensus`; this module sets its weights c_ij, gains and limits. r_ij, from 0 to 1, is the
-weight of neighbour j's state for i (`StalenessWeights`), and d_i the number of neighbours that count:
+The law is `gridpeers.agents.laws.consensus`; this module sets its weights c_ij, gains and limits. r_ij, from 0 to 1, is
+the weight of neighbour j's state for i (`StalenessWeights`), and d_i the number of neighbours that count:
 
 - weights "paper": c_ij = r_ij. The gain of the consensus on y = m_p P_set is kappa = m_p/k_p.
 - weights "degree-normalised": c_ij = r_ij/d_i. The gain is kappa_c, that of the leader's frequency error stays kappa:
@@ -21,7 +21,7 @@ from math import exp, inf
 
 from msgspec.structs import replace
 
-from agents.agent_config import DegradedCommunication, Gains
+from gridpeers.agents.agent_config import DegradedCommunication, Gains
 
 REMEMBERED = 51
 """Number of arrivals in the median of a link's ages: a second at 20 ms."""

@@ -18,16 +18,16 @@ from functools import lru_cache
 from types import FunctionType
 from typing import Annotated, Any, Protocol
 
-from wire.plugins.anybody import ANYTHING, line_of, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import Plugin, callable_objection, made
-from wire.plugins.registry import PluginError, Registry
-from wire.printable import printable
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.plugins.anybody import ANYTHING, line_of, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 class Member(Protocol):
-    """The part of a nameplate that rules use; a `wire.messages.Nameplate` has it."""
+    """The part of a nameplate that rules use; a `gridpeers.wire.messages.Nameplate` has it."""
 
     @property
     def kind(self) -> str:
@@ -163,12 +163,12 @@ GRAPHS: Registry[Any] = Registry(
     "graphs",
     lambda it: callable_objection(it, "members"),
     own={
-        "full": "agents.graphs:full",
-        "none": "agents.graphs:none",
-        "GFM-only": "agents.graphs:GFM_only",
-        "clustered": "agents.graphs:clustered",
-        "ring": "agents.graphs:ring",
-        "links": "agents.graphs:EdgeList",
+        "full": "gridpeers.agents.graphs:full",
+        "none": "gridpeers.agents.graphs:none",
+        "GFM-only": "gridpeers.agents.graphs:GFM_only",
+        "clustered": "gridpeers.agents.graphs:clustered",
+        "ring": "gridpeers.agents.graphs:ring",
+        "links": "gridpeers.agents.graphs:EdgeList",
     },
 )
 """Rules by name; those of gridpeers come first."""
@@ -203,7 +203,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     >>> neighbours_by(lambda members: {"inv3": ["inv33"]}, members, "star", strict=True)
     Traceback (most recent call last):
         ...
-    agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents are inv1, ...
+    gridpeers.agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents ...
     """
     heard_by = _evaluated(rule, members, name)
     for one, heard in heard_by.items() if strict else ():

@@ -21,7 +21,7 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass
 
-from wire.messages import Angle
+from gridpeers.wire.messages import Angle
 
 T_LEAK = 10.0
 """Time constant (s) with which slip decays: sensors that disagree by less than slip_max / T_LEAK (Hz) count as in

@@ -6,12 +6,12 @@ n times for each roster.
 
 from __future__ import annotations
 
-from agents.agent_config import Control
-from agents.graphs import RosterGraph
-from agents.topology import rule_of, without_missing
-from wire.admission import Admission
-from wire.membership import Membership
-from wire.messages import Nameplate, Prepare
+from gridpeers.agents.agent_config import Control
+from gridpeers.agents.graphs import RosterGraph
+from gridpeers.agents.topology import rule_of, without_missing
+from gridpeers.wire.admission import Admission
+from gridpeers.wire.membership import Membership
+from gridpeers.wire.messages import Nameplate, Prepare
 
 
 class KnownAgents:

@@ -24,22 +24,22 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import AgentConfig
-from agents.agent_node import AgentNode
-from agents.decision_journal import DecisionJournal
-from agents.graphs import GraphError
-from agents.known_agents import KnownAgents
-from agents.laws.law import Law
-from agents.topology import in_neighbours, is_pairwise
-from wire.codec import RejectedError, decode, encode
-from wire.journal import JournalBuffer
-from wire.links import REPORT_TICKS, Links
-from wire.membership import ASKED_AT_ONCE
-from wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
-from wire.node import Route
-from wire.timing.clock import time_of
-from wire.timing.tick_barrier import Awaited, TickBarrier
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_node import AgentNode
+from gridpeers.agents.decision_journal import DecisionJournal
+from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.known_agents import KnownAgents
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.topology import in_neighbours, is_pairwise
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.membership import ASKED_AT_ONCE
+from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
+from gridpeers.wire.node import Route
+from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing.tick_barrier import Awaited, TickBarrier
 
 CLOSING = 2.0
 """Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""

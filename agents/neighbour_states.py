@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from wire.messages import Measurement, State
+from gridpeers.wire.messages import Measurement, State
 
 
 class NeighbourStates:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from agents.agent_config import AgentConfig
-from wire.codec import RejectedError, decode, encode
-from wire.messages import Nameplate
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.messages import Nameplate
 
 
 def nameplate_of(config: AgentConfig) -> Nameplate:

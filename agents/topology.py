@@ -1,16 +1,16 @@
 """The communication graph: a rule turns nameplates into in-neighbours. Pure.
 
-No agent gets a list of neighbours. Each applies the run's rule (`agents.graphs`) to the nameplates of the agents on the
-roster, so an agent unknown so far can join. The rules of gridpeers are symmetric: if i listens to j, then j listens to
-i. A plugged-in rule need not be. Every link has weight c_ij = 1. In matrices the row is the receiver.
+No agent gets a list of neighbours. Each applies the run's rule (`gridpeers.agents.graphs`) to the nameplates of the
+agents on the roster, so an agent unknown so far can join. The rules of gridpeers are symmetric: if i listens to j, then
+j listens to i. A plugged-in rule need not be. Every link has weight c_ij = 1. In matrices the row is the receiver.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from agents.agent_config import Control
-from agents.graphs import (
+from gridpeers.agents.agent_config import Control
+from gridpeers.agents.graphs import (
     EdgeList,
     GFM_only,
     Graph,

@@ -24,17 +24,17 @@ import typer
 from msgspec.structs import replace
 
 from bench.harness import machine, markdown, say
-from scenarios.drivers.children import Child, Children
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.process_driver import run_processes
-from scenarios.drivers.secured import secured
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.trust.credentials import Credentials
-from wire.trust.key_folder import open_credentials
-from wire.trust.site_authority import issue, make_site
+from gridpeers.scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.drivers.secured import secured
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.site_authority import issue, make_site
 
 SIZE, STAMP = 119, 8
 """Bytes of a State, and of a time (s) in it."""

@@ -18,72 +18,72 @@ from operator import attrgetter
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from agents.carriers.law_registry import LAWS
-    from agents.graphs import GRAPHS
-    from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+    from gridpeers.agents.carriers.law_registry import LAWS
+    from gridpeers.agents.graphs import GRAPHS
+    from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
     from gridpeers.feeder import Feeder
+    from gridpeers.netem.models.own_fault import FAULTS, LinkFault
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
     from gridpeers.scenario import Scenario, load
+    from gridpeers.scenarios.checks.check_registry import CHECKS
+    from gridpeers.scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
+    from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
+    from gridpeers.scenarios.results.evaluation.claims import Claim
+    from gridpeers.scenarios.results.evaluation.metric import METRICS
+    from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
+    from gridpeers.scenarios.results.run_files import FolderError
+    from gridpeers.scenarios.run_request import BrokenRunError
+    from gridpeers.scenarios.schema.loading import catalogue
+    from gridpeers.scenarios.schema.scenario_errors import ScenarioError
     from gridpeers.studies.comparison import Comparison, compare
     from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.replaying import Counterfactual, counterfactual, replay
     from gridpeers.studies.sweeping import sweep
-    from netem.models.own_fault import FAULTS, LinkFault
-    from scenarios.checks.check_registry import CHECKS
-    from scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
-    from scenarios.checks.checked_case import CheckedCase
-    from scenarios.results.evaluation.benchmark_registry import CLAIMS
-    from scenarios.results.evaluation.claims import Claim
-    from scenarios.results.evaluation.metric import METRICS
-    from scenarios.results.evaluation.window_metrics import WindowData
-    from scenarios.results.run_files import FolderError
-    from scenarios.run_request import BrokenRunError
-    from scenarios.schema.loading import catalogue
-    from scenarios.schema.scenario_errors import ScenarioError
-    from wire.schema.plausible import Plausible, Range, Unit
+    from gridpeers.wire.schema.plausible import Plausible, Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
 
 _HOME = {
-    "BrokenRunError": "scenarios.run_request",
-    "Check": "scenarios.checks.check_verdict",
-    "CheckVerdict": "scenarios.checks.check_verdict",
-    "CheckedCase": "scenarios.checks.checked_case",
-    "Claim": "scenarios.results.evaluation.claims",
+    "BrokenRunError": "gridpeers.scenarios.run_request",
+    "Check": "gridpeers.scenarios.checks.check_verdict",
+    "CheckVerdict": "gridpeers.scenarios.checks.check_verdict",
+    "CheckedCase": "gridpeers.scenarios.checks.checked_case",
+    "Claim": "gridpeers.scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
     "Counterfactual": "gridpeers.studies.replaying",
     "Feeder": "gridpeers.feeder",
-    "FolderError": "scenarios.results.run_files",
-    "Law": "agents.laws.law",
-    "LinkFault": "netem.models.own_fault",
-    "Neighbour": "agents.laws.law",
-    "NotJudgedError": "scenarios.checks.check_verdict",
-    "Own": "agents.laws.law",
+    "FolderError": "gridpeers.scenarios.results.run_files",
+    "Law": "gridpeers.agents.laws.law",
+    "LinkFault": "gridpeers.netem.models.own_fault",
+    "Neighbour": "gridpeers.agents.laws.law",
+    "NotJudgedError": "gridpeers.scenarios.checks.check_verdict",
+    "Own": "gridpeers.agents.laws.law",
     "Prediction": "gridpeers.studies.prediction",
-    "Plausible": "wire.schema.plausible",
-    "Range": "wire.schema.plausible",
+    "Plausible": "gridpeers.wire.schema.plausible",
+    "Range": "gridpeers.wire.schema.plausible",
     "Result": "gridpeers.runs.result",
     "Results": "gridpeers.runs.result",
     "Scenario": "gridpeers.scenario",
-    "ScenarioError": "scenarios.schema.scenario_errors",
-    "SetPoints": "agents.laws.law",
-    "Term": "agents.laws.law",
-    "Terms": "agents.laws.law",
-    "Unit": "wire.schema.plausible",
-    "Violation": "scenarios.checks.check_verdict",
-    "WindowData": "scenarios.results.evaluation.window_metrics",
-    "catalogue": "scenarios.schema.loading",
-    "check": "scenarios.checks.check_registry:CHECKS.register",
-    "claim": "scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
+    "ScenarioError": "gridpeers.scenarios.schema.scenario_errors",
+    "SetPoints": "gridpeers.agents.laws.law",
+    "Term": "gridpeers.agents.laws.law",
+    "Terms": "gridpeers.agents.laws.law",
+    "Unit": "gridpeers.wire.schema.plausible",
+    "Violation": "gridpeers.scenarios.checks.check_verdict",
+    "WindowData": "gridpeers.scenarios.results.evaluation.window_metrics",
+    "catalogue": "gridpeers.scenarios.schema.loading",
+    "check": "gridpeers.scenarios.checks.check_registry:CHECKS.register",
+    "claim": "gridpeers.scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "counterfactual": "gridpeers.studies.replaying",
-    "graph": "agents.graphs:GRAPHS.register",
-    "law": "agents.carriers.law_registry:LAWS.register",
-    "link_fault": "netem.models.own_fault:FAULTS.register",
+    "graph": "gridpeers.agents.graphs:GRAPHS.register",
+    "law": "gridpeers.agents.carriers.law_registry:LAWS.register",
+    "link_fault": "gridpeers.netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
-    "metric": "scenarios.results.evaluation.metric:METRICS.register",
+    "metric": "gridpeers.scenarios.results.evaluation.metric:METRICS.register",
     "predict": "gridpeers.studies.prediction",
     "read": "gridpeers.runs.running",
     "replay": "gridpeers.studies.replaying",
@@ -144,7 +144,7 @@ if not TYPE_CHECKING:
 
             return version("gridpeers")
         if name not in _HOME:
-            from wire.schema.suggestion import suggestion
+            from gridpeers.wire.schema.suggestion import suggestion
 
             raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
         module, _, attributes = _HOME[name].partition(":")

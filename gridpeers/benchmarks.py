@@ -5,11 +5,11 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, Benchmark, Published, benchmark_of
-from scenarios.results.evaluation.claims import Claim, Judge, Verdict, judge
-from scenarios.results.evaluation.quantities import DIGITS, HEADINGS, UNITS, Quantity, label
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
+from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, Benchmark, Published, benchmark_of
+from gridpeers.scenarios.results.evaluation.claims import Claim, Judge, Verdict, judge
+from gridpeers.scenarios.results.evaluation.quantities import DIGITS, HEADINGS, UNITS, Quantity, label
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 
 __all__ = [
     "BENCHMARKS",

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
-from plant.equipment import NODES, PHASES, InverterRow
-from plant.equipment import Feeder as Tables
-from plant.equipment.imported_equipment import is_behind
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.plant.equipment import NODES, PHASES, InverterRow
+from gridpeers.plant.equipment import Feeder as Tables
+from gridpeers.plant.equipment.imported_equipment import is_behind
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,10 +47,10 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         Raises
         ------
-        plant.tables.FeederError
+        gridpeers.plant.tables.FeederError
             With every problem of its tables.
         """
-        from plant.tables import read_feeder
+        from gridpeers.plant.tables import read_feeder
 
         return cls._of(read_feeder(str(name), load_set))
 
@@ -78,10 +78,10 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         Raises
         ------
-        plant.tables.FeederError
+        gridpeers.plant.tables.FeederError
             With everything that the engine refuses, and everything that cannot be represented.
         """
-        from plant.imports.opendss import read_opendss
+        from gridpeers.plant.imports.opendss import read_opendss
 
         return cls._of(read_opendss(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
@@ -109,10 +109,10 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
         Raises
         ------
-        plant.tables.FeederError
+        gridpeers.plant.tables.FeederError
             With everything that GridLAB-D refuses, and everything that cannot be represented.
         """
-        from plant.imports.gridlabd.read_glm import read_glm
+        from gridpeers.plant.imports.gridlabd.read_glm import read_glm
 
         return cls._of(read_glm(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
@@ -164,9 +164,9 @@ class Feeder(Tables, frozen=True, kw_only=True):
         ValueError
             If the name or a phase of the bus is taken, the bus is not there or lacks a phase, or a value is wrong.
         """
-        from plant.tables.parameter_sets import as_set
-        from plant.tables.shunts import problems_of
-        from wire.schema.suggestion import suggestion
+        from gridpeers.plant.tables.parameter_sets import as_set
+        from gridpeers.plant.tables.shunts import problems_of
+        from gridpeers.wire.schema.suggestion import suggestion
 
         bus = str(bus)  # many buses have a number as their name
         found = {one.name: one for one in self.buses}.get(bus)
@@ -220,7 +220,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         import numpy as np
         import pandas as pd
 
-        from plant.network import Network, solve_power_flow
+        from gridpeers.plant.network import Network, solve_power_flow
 
         network = Network(self)
         closed = network.closed0 - {network.switch_name(name) for name in _listed(open_switches)}
@@ -242,7 +242,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
 
     def plot(self, *, voltages: bool = False) -> Figure:
         """Return a one-line diagram with microgrids, or coloured by each bus's lowest energised phase."""
-        from scenarios.results.plots.feeder_diagram import feeder_diagram
+        from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
 
         V: Any = None
         if voltages:
@@ -259,7 +259,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         OSError
             If the folder cannot be written.
         """
-        from plant.tables.write import write_feeder
+        from gridpeers.plant.tables.write import write_feeder
 
         write_feeder(self, Path(folder))
         return Path(folder)

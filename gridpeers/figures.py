@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from scenarios.results.plots.style import PAGE, Format, case_styles, save
+from gridpeers.scenarios.results.plots.style import PAGE, Format, case_styles, save
 
 __all__ = [
     "PAGE",

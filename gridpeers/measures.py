@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from scenarios.results import metrics
-from scenarios.results.event_windows import Window
-from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage
-from scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.results import metrics
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
+from gridpeers.scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage
+from gridpeers.scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
-    from plant.equipment import Feeder
-    from scenarios.schema import ScenarioModel
+    from gridpeers.plant.equipment import Feeder
+    from gridpeers.scenarios.schema import ScenarioModel
 
 __all__ = [
     "MPSI",
@@ -59,7 +59,7 @@ def nameplates_of(spec: ScenarioModel, feeder: Feeder, case: str = "") -> Namepl
     case : str, optional
         Leave out the inverters that have no agent in this case, as the sharing indices do.
     """
-    from scenarios.schema.participants import inverters_of, without_agent
+    from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 
     nameplates = Nameplates.of(inverters_of(spec, feeder))
     return nameplates.without(without_agent(spec, case)) if case else nameplates

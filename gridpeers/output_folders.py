@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from plant.tables.read import DATA, feeders
-from scenarios.results.run_files import (
+from gridpeers.plant.tables.read import DATA, feeders
+from gridpeers.scenarios.results.run_files import (
     RUNS,
     FolderError,
     empty_folder,
@@ -21,9 +21,9 @@ from scenarios.results.run_files import (
     shown,
     write_whole,
 )
-from scenarios.versions import versions
-from wire.driver.output import OutputLostError
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.versions import versions
+from gridpeers.wire.driver.output import OutputLostError
+from gridpeers.wire.schema.suggestion import suggestion
 
 __all__ = [
     "RUNS",

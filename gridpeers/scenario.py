@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
+from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.scenarios.schema.loading import check_tables, find_scenario, read_toml
+from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.values import plain
-from scenarios.schema import scenario_model as model
-from scenarios.schema.loading import check_tables, find_scenario, read_toml
-from scenarios.schema.scenario_errors import Problems, ScenarioError
 
 if TYPE_CHECKING:
     from typing import Unpack
 
+    from gridpeers.plant.equipment import Feeder
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import How
-    from plant.equipment import Feeder
-    from scenarios.run_request import Driver
-    from scenarios.sweep.file.paths import Tree
+    from gridpeers.scenarios.run_request import Driver
+    from gridpeers.scenarios.sweep.file.paths import Tree
 
 
 def as_scenario(it: Scenario | str | Path) -> Scenario:
@@ -134,14 +134,18 @@ class Scenario:
         >>> load("islanding").replace({"gains.k_p": "much", "case.VI.graph": "ring"})
         Traceback (most recent call last):
             ...
-        scenarios.schema.scenario_errors.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
+        gridpeers.scenarios.schema.scenario_errors.ScenarioError: replace: case.VI.graph: there is no case.VI; ...
         replace: gains.k_p: must be a number, got "much"
         """
         if not isinstance(changes, Mapping) or not all(isinstance(path, str) for path in changes):
             raise ScenarioError(
                 [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
             )
-        from scenarios.sweep.file.paths import PathError, put, remove  # with numpy, which a run starts without
+        from gridpeers.scenarios.sweep.file.paths import (  # with numpy, which a run starts without
+            PathError,
+            put,
+            remove,
+        )
 
         tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
         problems = Problems(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
@@ -165,8 +169,8 @@ class Scenario:
         ScenarioError
             If the feeder has no operating point to start from.
         """
-        from scenarios.schema.supply import supply_notes
-        from scenarios.start_check import start_problem
+        from gridpeers.scenarios.schema.supply import supply_notes
+        from gridpeers.scenarios.start_check import start_problem
 
         if problem := start_problem(self._spec, self._feeder):
             raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])
@@ -255,13 +259,13 @@ class Scenario:
     @property
     def inverters(self) -> tuple[str, ...]:
         """Names of the inverters, those that join later last."""
-        from scenarios.schema.participants import inverters_of
+        from gridpeers.scenarios.schema.participants import inverters_of
 
         return tuple(row.name for row in inverters_of(self._spec, self._feeder))
 
     @property
     def spec(self) -> model.ScenarioModel:
-        """All keys as typed values, defaults included (`scenarios.schema.scenario_model`)."""
+        """All keys as typed values, defaults included (`gridpeers.scenarios.schema.scenario_model`)."""
         return self._spec
 
     @property
@@ -276,7 +280,7 @@ class Scenario:
 
     def to_toml(self) -> str:
         """Return the text of a scenario file with every key spelled out."""
-        from scenarios.schema.scenario_writing import to_toml
+        from gridpeers.scenarios.schema.scenario_writing import to_toml
 
         return to_toml(self._spec, {})
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from scenarios.catalogue_files import SWEEPS
-from scenarios.schema.loading import read_toml
-from scenarios.sweep.file import Plan, read_sweep
+from gridpeers.scenarios.catalogue_files import SWEEPS
+from gridpeers.scenarios.schema.loading import read_toml
+from gridpeers.scenarios.sweep.file import Plan, read_sweep
 
 __all__ = ["Plan", "read_sweep", "sweep_title"]
 

@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from netem.schema.netem import Netem
-from plant.equipment import Feeder
-from plant.tables import read_feeder
-from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from scenarios.predict.linear_model import Loop, Ticks
-from scenarios.predict.load_steps import load_steps
-from scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
-from scenarios.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response
-from scenarios.schema import Case, ScenarioModel
-from scenarios.schema.configs import as_in
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.predict.delay_limits import delay_limit
+from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.scenarios.predict.linear_model import Loop, Ticks
+from gridpeers.scenarios.predict.load_steps import load_steps
+from gridpeers.scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
+from gridpeers.scenarios.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response
+from gridpeers.scenarios.schema import Case, ScenarioModel
+from gridpeers.scenarios.schema.configs import as_in
 
 __all__ = [
     "Case",

@@ -18,20 +18,20 @@ import numpy.typing as npt
 from scipy import special, stats
 
 from gridpeers import Check, NotJudgedError, Range, Violation
-from netem.draws import RESTART, Stream
-from netem.fault_schedule import GATES
-from netem.ledger import LinkTrace, Outcome, copies_of
-from netem.models import INSTANT
-from netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
-from netem.models.loss import Bernoulli, LossModel
-from netem.models.own_fault import DROPPED_BY_OWN, judge_of
-from netem.schema.fault import Span
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_reader import RunRecord
-from wire.plugins.plugin import Plugin
+from gridpeers.netem.draws import RESTART, Stream
+from gridpeers.netem.fault_schedule import GATES
+from gridpeers.netem.ledger import LinkTrace, Outcome, copies_of
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.delay import Constant, Lognormal, Normal, Pareto, RandomDelay, Trace, Uniform
+from gridpeers.netem.models.loss import Bernoulli, LossModel
+from gridpeers.netem.models.own_fault import DROPPED_BY_OWN, judge_of
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.plugins.plugin import Plugin
 
 MASKS = ("rate", "slots")  # add to a delay, so that its law cannot be seen alone
 

@@ -12,12 +12,12 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from netem.draws import Stream
-from netem.fault_schedule import GATES, FaultSchedule
-from netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
-from netem.schema.fault import Span
-from netem.schema.pattern import Link
-from wire.plugins.plugin import Plugin
+from gridpeers.netem.draws import Stream
+from gridpeers.netem.fault_schedule import GATES, FaultSchedule
+from gridpeers.netem.models.own_fault import DROPPED_BY_OWN, Judge, judge_of
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.wire.plugins.plugin import Plugin
 
 NEVER = -math.inf
 """A time that no message has."""
@@ -51,7 +51,7 @@ class Channel:
 
     Examples
     --------
-    >>> from netem.schema.fault import Fault
+    >>> from gridpeers.netem.schema.fault import Fault
     >>> fault = Fault(on="inv1 -> inv2", delay=0.25, loss=0.1)
     >>> channel = Channel(Link("inv1", "inv2"), fault.spans("inv1", "inv2", {}), seed=1)
     >>> channel.judge(0, 0.0, 100).deliveries

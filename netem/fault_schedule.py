@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from netem.models import INSTANT
-from netem.models.medium import Cut
-from netem.schema.fault import Fault, Span
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link, links_among, parse
-from wire.plugins.plugin import Plugin
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import Fault, Span
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link, links_among, parse
+from gridpeers.wire.plugins.plugin import Plugin
 
 CUTS = ("cut", "partition")
 """Kinds that let nothing pass as long as they hold."""
@@ -121,7 +121,7 @@ class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Faults end on some links: those that hold at `from_s`; what a scenario has for later still comes."""
 
     on: str
-    """Which links; see `netem.schema.pattern`."""
+    """Which links; see `gridpeers.netem.schema.pattern`."""
     from_s: float
     """From when on (s of run time)."""
     kinds: tuple[str, ...] = ()

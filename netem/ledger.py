@@ -8,8 +8,8 @@ from hashlib import sha256
 
 import msgspec
 
-from netem.channel import DROPPED, Fate
-from wire.bounds import Count, Label, Name, Time
+from gridpeers.netem.channel import DROPPED, Fate
+from gridpeers.wire.bounds import Count, Label, Name, Time
 
 Outcome = float | str | tuple[tuple[float, Count | None], ...]
 """Delay (s) of one sound copy; or why it was dropped; or delay and flipped bit of each copy."""

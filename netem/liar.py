@@ -7,11 +7,11 @@ from collections.abc import Callable, Iterable
 from math import inf
 from typing import NamedTuple
 
-from netem.draws import Stream
-from netem.models import INSTANT
-from netem.models.lie import Before, Lie, lie_in_words
-from netem.schema.netem import Netem
-from wire.messages import PLANT, State
+from gridpeers.netem.draws import Stream
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.lie import Before, Lie, lie_in_words
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.wire.messages import PLANT, State
 
 
 class LieTime(NamedTuple):
@@ -51,7 +51,7 @@ class HeardFrom:
 
     Examples
     --------
-    >>> from netem.models.lie import Offset
+    >>> from gridpeers.netem.models.lie import Offset
     >>> heard = HeardFrom(1, "inv3", "inv1", [LieTime(1.0, 2.0, "inv3", Offset(P_set_W=5.0))])
     >>> states = [State(sender="inv3", epoch=1, seq=k, t=0.5 * k, P_set=1.0, V_set=1.0, Q=0.0) for k in range(5)]
     >>> [heard.told(state, lambda t: states[0]).P_set for state in states]

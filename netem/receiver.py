@@ -11,16 +11,16 @@ from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 from zlib import crc32
 
-from netem.channel import FOREVER, NEVER, Channel
-from netem.fault_schedule import Change, FaultSchedule, Horizon, changed, schedule_of, without_old
-from netem.ledger import Ledger, LinkCounts, LinkTrace, combined
-from netem.models import INSTANT
-from netem.models.medium import flip
-from netem.schema.fault import Span
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link
-from wire.links import Arrival
-from wire.messages import AnyMessage
+from gridpeers.netem.channel import FOREVER, NEVER, Channel
+from gridpeers.netem.fault_schedule import Change, FaultSchedule, Horizon, changed, schedule_of, without_old
+from gridpeers.netem.ledger import Ledger, LinkCounts, LinkTrace, combined
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.medium import flip
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.wire.links import Arrival
+from gridpeers.wire.messages import AnyMessage
 
 MOST_FAILURES = 8
 """User-defined faults that failed and are named in one report, which must not become too long."""
@@ -70,7 +70,7 @@ class Receiver:
 
     Examples
     --------
-    >>> from netem.schema.fault import Fault
+    >>> from gridpeers.netem.schema.fault import Fault
     >>> netem = Netem(links=(Fault(on="inv1 -> inv2", delay=0.25),))
     >>> receiver = Receiver("inv2", netem, {"inv1": "MG1", "inv2": "MG1"})
     >>> receiver.offer("inv1", seq=0, t=0.0, at=0.0, payload=b"state")

@@ -1,12 +1,12 @@
-"""The plant: ``python -m plant < plant.json``. Exit statuses: see `wire.driver.process`."""
+"""The plant: ``python -m gridpeers.plant < plant.json``. Exit statuses: see `gridpeers.wire.driver.process`."""
 
 from __future__ import annotations
 
 import sys
 
-from plant.plant_config import PlantConfig
-from plant.plant_process import run_plant
-from wire.driver.process import main
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_process import run_plant
+from gridpeers.wire.driver.process import main
 
 if __name__ == "__main__":
-    sys.exit(main("plant", "the feeder and its inverters", PlantConfig, run_plant))
+    sys.exit(main("gridpeers.plant", "the feeder and its inverters", PlantConfig, run_plant))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from plant.plant_config import PlantConfig
+from gridpeers.plant.plant_config import PlantConfig
 
 
 class TickActions(NamedTuple):
@@ -35,7 +35,7 @@ class AgentSchedule:
 
     Examples
     --------
-    >>> from plant.plant_config import PlantSettings, ScheduledAction
+    >>> from gridpeers.plant.plant_config import PlantSettings, ScheduledAction
     >>> leave = ScheduledAction(t=2.0, inverter="inv2", action="leave")
     >>> config = PlantConfig(run="demo", settings=PlantSettings(), agents=("inv1", "inv2"), T_c=0.02, end=5.0,
     ...     record_step=0.01, deadline=10.0, listen=(), schedule=(leave,))

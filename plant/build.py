@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from plant.equipment import Feeder
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant
-from plant.tables import read_feeder
-from plant.tables.feeder_changes import changed
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.feeder_changes import changed
 
 
 def start_plant(config: PlantConfig) -> LivePlant:
@@ -22,11 +22,11 @@ def start_plant(config: PlantConfig) -> LivePlant:
         If it cannot start; the message says why, and what to do.
     """
     if config.settings.simulator == "helics":
-        from plant.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
+        from gridpeers.plant.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
 
         return HelicsPlant(config, _feeder(config))
     if config.bridged:
-        from plant.helics.bridged_plant import BridgedPlant
+        from gridpeers.plant.helics.bridged_plant import BridgedPlant
 
         return BridgedPlant(lambda: _here(config), config)
     return _here(config)
@@ -35,7 +35,7 @@ def start_plant(config: PlantConfig) -> LivePlant:
 def _here(config: PlantConfig) -> LivePlant:
     """Start a plant that we run ourselves."""
     if config.settings.simulator == "gridlabd":
-        from plant.gridlabd.start import start_gridlabd
+        from gridpeers.plant.gridlabd.start import start_gridlabd
 
         return start_gridlabd(config, _feeder(config))
     return build_plant(config)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
-from plant.plant_interface import PlantLike
-from wire.journal import LOT
-from wire.messages import Journal, Measurement, State, Telemetry
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.wire.journal import LOT
+from gridpeers.wire.messages import Journal, Measurement, State, Telemetry
 
 
 class DirectPlant(LockstepPlant):

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from plant.build import build_plant
-from plant.dynamics.kernel.compiled import is_compiled
-from plant.dynamics.kernel.step import run_steps
-from plant.plant_config import PlantConfig, PlantSettings
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.dynamics.kernel.compiled import is_compiled
+from gridpeers.plant.dynamics.kernel.step import run_steps
+from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 
 
 def load_kernels() -> None:

@@ -16,7 +16,7 @@ that records also starts the agents: while it is silent, no deadline for an agen
 At a scheduled leave the plant sends the agent a stop request and disconnects its inverter; at a join it connects the
 inverter at no load. At a scheduled death it sends the stop request, but the inverter stays. When an agent dies by
 itself, the plant removes it from the roster and the run continues, marked not reproducible; a death before tick 0
-ends the run, because it would be another run. `agents.lockstep_agent` explains why there is no deadlock.
+ends the run, because it would be another run. `gridpeers.agents.lockstep_agent` explains why there is no deadlock.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ from collections.abc import Iterator
 from math import inf
 from typing import Literal
 
-from plant.plant_config import PlantConfig
-from plant.plant_interface import PlantLike
-from plant.plant_node import CLOSING, STAYS, PlantNode
-from plant.telemetry_reporter import measurement_of
-from plant.unacknowledged_telemetry import UnacknowledgedTelemetry
-from wire.actions import Publish
-from wire.codec import RejectedError, encode
-from wire.links import REPORT_TICKS, Links, is_usable
-from wire.messages import (
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode
+from gridpeers.plant.telemetry_reporter import measurement_of
+from gridpeers.plant.unacknowledged_telemetry import UnacknowledgedTelemetry
+from gridpeers.wire.actions import Publish
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
+from gridpeers.wire.messages import (
     PLANT,
     Answer,
     AnyMessage,
@@ -47,9 +47,9 @@ from wire.messages import (
     State,
     Waiting,
 )
-from wire.node import ANYBODY, Route
-from wire.timing.tick_barrier import Awaited, TickBarrier
-from wire.traffic import TickTraffic
+from gridpeers.wire.node import ANYBODY, Route
+from gridpeers.wire.timing.tick_barrier import Awaited, TickBarrier
+from gridpeers.wire.traffic import TickTraffic
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
 

@@ -6,16 +6,16 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from plant.equipment.inverter_parameters import GflParameters as GflParameters
-from plant.equipment.inverter_parameters import GfmParameters as GfmParameters
-from plant.equipment.own_parameters import OwnParameters
-from plant.helics.helics_settings import HelicsSettings
-from plant.simulator import Simulator
-from wire.journal import RecordLevel
-from wire.messages import LoadSetting
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.table_schema import Example
-from wire.trust.credentials import Credentials
+from gridpeers.plant.equipment.inverter_parameters import GflParameters as GflParameters
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmParameters
+from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.plant.simulator import Simulator
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.messages import LoadSetting
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Example
+from gridpeers.wire.trust.credentials import Credentials
 
 
 class SyncCheck(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -124,7 +124,8 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 Method = Literal["first-order", "second-order"]
-"""Method of time stepping: `plant.dynamics.kernel.step`, GridLAB-D's, or `plant.dynamics.kernel.second_order_step`."""
+"""Method of time stepping: `gridpeers.plant.dynamics.kernel.step`, GridLAB-D's, or
+`gridpeers.plant.dynamics.kernel.second_order_step`."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -192,7 +193,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     listen: tuple[str, ...]
     """Endpoints the plant listens on; the rendezvous of the run."""
     links: dict[str, Any] = {}
-    """Emulated links to the plant: `scenarios.emulation.emulation_config` as a tree, because the plant knows no netem.
+    """Emulated links to the plant: `gridpeers.scenarios.emulation.emulation_config`, a tree: the plant knows no netem.
     Empty: none."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""
@@ -201,7 +202,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     recorders: tuple[str, ...] = ()
     """Recorders of the telemetry that the plant waits for before tick 0."""
     epoch: int = 1
-    """Epoch of this process; see `wire.admission`."""
+    """Epoch of this process; see `gridpeers.wire.admission`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the agents, or real time."""
     speed: float = 1.0
@@ -221,4 +222,4 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     on_law_failure: OnLawFailure = "droop"
     """What follows when the law of an agent fails."""
     feeder_map: dict[str, Any] = {}
-    """Wall-clock: the one-line diagram (`scenarios.live.show.feeder_map`), as a tree, for clients that draw it."""
+    """Wall-clock: the one-line diagram (`gridpeers.scenarios.live.show.feeder_map`) as a tree, for clients."""

@@ -1,15 +1,15 @@
-"""The interface of a plant to its node: that of `plant.feeder.Plant`, and of the plants of other simulators."""
+"""The interface of a plant to its node: that of `gridpeers.plant.feeder.Plant`, and of other simulators' plants."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Protocol
 
-from wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.messages import LoadSetting, PlantEvent
 
 
 class ReadingLike(Protocol):
-    """Sensor readings of one inverter; units as in `wire.messages.Measurement`."""
+    """Sensor readings of one inverter; units as in `gridpeers.wire.messages.Measurement`."""
 
     @property
     def P(self) -> float: ...  # noqa: D102
@@ -30,7 +30,7 @@ class ReadingLike(Protocol):
 
 
 class PlantLike(Protocol):
-    """The part of a plant that the lock-step uses; `plant.feeder.Plant` has it."""
+    """The part of a plant that the lock-step uses; `gridpeers.plant.feeder.Plant` has it."""
 
     @property
     def inverters(self) -> tuple[str, ...]:

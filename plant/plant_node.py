@@ -2,7 +2,7 @@
 
 The node meets the agents by their tokens and nameplates and refuses those that cannot take part. It holds the
 set-points that the links deliver, passes on the accounts of emulated links, and sends telemetry to recorders.
-`plant.lockstep_plant` and `plant.realtime.realtime_plant` decide when the plant advances.
+`gridpeers.plant.lockstep_plant` and `gridpeers.plant.realtime.realtime_plant` decide when the plant advances.
 """
 
 from __future__ import annotations
@@ -11,18 +11,18 @@ from collections.abc import Callable, Iterable
 from math import inf
 from typing import Literal
 
-from plant.agent_schedule import AgentSchedule
-from plant.plant_config import PlantConfig
-from plant.plant_interface import PlantLike
-from plant.telemetry_reporter import Reporter
-from wire.codec import encode
-from wire.journal import JournalBuffer
-from wire.keys import check_name
-from wire.links import Links, arrived
-from wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
-from wire.node import Node
-from wire.printable import printable
-from wire.timing.clock import ticks_until, time_of
+from gridpeers.plant.agent_schedule import AgentSchedule
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.plant.telemetry_reporter import Reporter
+from gridpeers.wire.codec import encode
+from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.keys import check_name
+from gridpeers.wire.links import Links, arrived
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
+from gridpeers.wire.node import Node
+from gridpeers.wire.printable import printable
+from gridpeers.wire.timing.clock import ticks_until, time_of
 
 CLOSING = 2.0
 """Longest wait (s) for the other nodes to close."""
@@ -49,7 +49,7 @@ class PlantNode(Node):
     links : Links or None
         Emulated links to the plant; None for none.
     rate : float, optional
-        Most messages of one sender per s of run time; see `wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
     """
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:

@@ -11,23 +11,25 @@ from time import monotonic
 import msgspec
 from msgspec.structs import replace
 
-from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant
-from plant.realtime.realtime_plant import RealtimePlant
-from plant.start_words import COMPILING, LISTENING, READY
-from wire.driver.drive import StoppedError, drive, perform, serve
-from wire.driver.open_files import OpenFilesError, check_open_files
-from wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
-from wire.driver.scheduling import schedule_as_batch
-from wire.driver.session import Session
-from wire.messages import PLANT
-from wire.packages import not_importable
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.start_words import COMPILING, LISTENING, READY
+from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
+from gridpeers.wire.driver.open_files import OpenFilesError, check_open_files
+from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
+from gridpeers.wire.driver.scheduling import schedule_as_batch
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.packages import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:
     """Start the configuration's plant."""
-    from plant.build import start_plant  # numba and scipy take a second: import them only once the session is open
+    from gridpeers.plant.build import (
+        start_plant,  # numba and scipy take a second: import them only once the session is open
+    )
 
     return start_plant(config)
 

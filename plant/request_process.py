@@ -16,9 +16,9 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any
 
-from plant.transient_folder import TransientFolder
+from gridpeers.plant.transient_folder import TransientFolder
 
-ROOT = str(Path(__file__).parents[1])
+ROOT = str(Path(__file__).parents[2])
 """Folder of our packages."""
 
 

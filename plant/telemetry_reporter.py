@@ -8,9 +8,9 @@ from typing import get_type_hints
 
 from msgspec.structs import replace
 
-from plant.plant_interface import PlantLike, ReadingLike
-from wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
-from wire.printable import printable
+from gridpeers.plant.plant_interface import PlantLike, ReadingLike
+from gridpeers.wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
+from gridpeers.wire.printable import printable
 
 _NUMBER_BYTES = 9
 """Bytes of one float in msgpack."""

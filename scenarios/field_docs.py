@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
-from wire.schema.type_words import in_words, kinds_of, shown
+from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
+from gridpeers.wire.schema.type_words import in_words, kinds_of, shown
 
 
 class FieldDoc(NamedTuple):
@@ -36,7 +36,7 @@ def field_docs(cls: type) -> tuple[FieldDoc, ...]:
 
     Examples
     --------
-    >>> from plant.plant_config import SwitchEvent
+    >>> from gridpeers.plant.plant_config import SwitchEvent
     >>> [doc.name for doc in field_docs(SwitchEvent)]
     ['t', 'switch', 'action', 'synchronised']
     >>> field_docs(SwitchEvent)[0].text
@@ -76,7 +76,7 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
 
     Examples
     --------
-    >>> from wire import bounds
+    >>> from gridpeers.wire import bounds
     >>> dict(alias_docs(bounds))["Rating"]
     'Rating (W): positive, at most a gigawatt.'
     """

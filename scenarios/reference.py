@@ -9,25 +9,25 @@ from typing import Any
 
 import msgspec
 
-from agents import graphs
-from agents.agent_config import DegradedCommunication, Gains
-from agents.carriers.law_registry import LAWS
-from agents.graphs import GRAPHS
-from netem.models import own_fault
-from netem.models.own_fault import FAULTS
-from netem.schema.fault import Fault
-from netem.schema.netem import NodeFault
-from netem.schema.partition import Partition
-from plant.helics.helics_settings import HelicsSettings
-from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
-from plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
-from scenarios.checks import check_registry
-from scenarios.checks.check_registry import CHECKS
-from scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
-from scenarios.results.evaluation import claims, metric
-from scenarios.results.evaluation.benchmark_registry import CLAIMS
-from scenarios.results.evaluation.metric import METRICS
-from scenarios.schema.scenario_model import (
+from gridpeers.agents import graphs
+from gridpeers.agents.agent_config import DegradedCommunication, Gains
+from gridpeers.agents.carriers.law_registry import LAWS
+from gridpeers.agents.graphs import GRAPHS
+from gridpeers.netem.models import own_fault
+from gridpeers.netem.models.own_fault import FAULTS
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
+from gridpeers.scenarios.checks import check_registry
+from gridpeers.scenarios.checks.check_registry import CHECKS
+from gridpeers.scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
+from gridpeers.scenarios.results.evaluation import claims, metric
+from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
+from gridpeers.scenarios.results.evaluation.metric import METRICS
+from gridpeers.scenarios.schema.scenario_model import (
     Case,
     Event,
     InverterTable,
@@ -37,11 +37,11 @@ from scenarios.schema.scenario_model import (
     ScenarioModel,
     Time,
 )
-from wire import bounds, keys, messages
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import KINDS
-from wire.plugins.registry import PluginError, Registry
-from wire.schema.table_schema import fields_of
+from gridpeers.wire import bounds, keys, messages
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import KINDS
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.schema.table_schema import fields_of
 
 _LAW = """A class derived from gridpeers.Law; `docs/laws.md` has the contract.
 

@@ -15,26 +15,26 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
 
-from plant.realtime.pacer import sentence
-from scenarios.results.broken_folder import broken_if_ended
-from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.figure_processes import drawn_on_all_cores
-from scenarios.results.metrics_file import Clock, case_facts, metrics_json
-from scenarios.results.record import Recorded
-from scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
-from scenarios.run_case import run_case
-from scenarios.run_request import BrokenRunError, Progress, Request
-from scenarios.schema.plugin_keys import claims_of
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.versions import version_of, versions
-from wire.driver.open_files import too_few_files
-from wire.driver.output import OutputLostError
-from wire.messages import Pacing
-from wire.packages import not_importable
+from gridpeers.plant.realtime.pacer import sentence
+from gridpeers.scenarios.results.broken_folder import broken_if_ended
+from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
+from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
+from gridpeers.scenarios.run_case import run_case
+from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
+from gridpeers.scenarios.schema.plugin_keys import claims_of
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import version_of, versions
+from gridpeers.wire.driver.open_files import too_few_files
+from gridpeers.wire.driver.output import OutputLostError
+from gridpeers.wire.messages import Pacing
+from gridpeers.wire.packages import not_importable
 
 if TYPE_CHECKING:
-    from scenarios.live.numbers.departures import Departures
-    from scenarios.results.report import RunReport
+    from gridpeers.scenarios.live.numbers.departures import Departures
+    from gridpeers.scenarios.results.report import RunReport
 
 
 def run(request: Request, progress: Progress) -> RunReport:
@@ -95,7 +95,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     pacing: dict[str, Pacing] = {}
     for case in scenario.cases:
         recorded[case], outcome = run_case(request, case, text, progress)
-        from scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
+        from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, late_moves
 
         notes += [f"case {case}: {note}" for note in (*outcome.notes, *recorded[case].link_lines)]
         if outcome.pacing is not None:
@@ -110,13 +110,13 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
-    from scenarios.checks.checked_case import CheckedCase
-    from scenarios.checks.checks_file import FILE, verdicts_json
-    from scenarios.checks.judging import JudgingStop, judge_case
-    from scenarios.results.evaluation.claims import judge, judged
-    from scenarios.results.findings import find
-    from scenarios.results.law_failures import law_failures
-    from scenarios.results.report import RunReport, plain
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
+    from gridpeers.scenarios.checks.checks_file import FILE, verdicts_json
+    from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
+    from gridpeers.scenarios.results.evaluation.claims import judge, judged
+    from gridpeers.scenarios.results.findings import find
+    from gridpeers.scenarios.results.law_failures import law_failures
+    from gridpeers.scenarios.results.report import RunReport, plain
 
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}
     findings = find(scenario, request.feeder, cases)
@@ -140,7 +140,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     write_whole(folder / FILE, verdicts_json(checks))
     with ExitStack() as beside:
         if request.lasting and stop.raised is None:
-            from scenarios.results.plots.drawing import drawing_of
+            from gridpeers.scenarios.results.plots.drawing import drawing_of
 
             last = recorded[list(recorded)[-1]]  # in wall-clock time each case has its own events
             histories = {case: record.history for case, record in cases.items()}
@@ -178,7 +178,7 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
     if request.clock == "simulated":
         return {}
-    from scenarios.live.numbers.departures import compare
+    from gridpeers.scenarios.live.numbers.departures import compare
 
     scenario = request.scenario
     return {

@@ -1,4 +1,4 @@
-"""One case of a run: its configurations to a driver (`scenarios.drivers`), and the driver's telemetry to its record."""
+"""One case of a run: its configurations to a driver (`gridpeers.scenarios.drivers`), its telemetry to its record."""
 
 from __future__ import annotations
 
@@ -11,27 +11,35 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.drivers.free_endpoint import local_endpoint
-from scenarios.drivers.outcome import Outcome
-from scenarios.record.record_info import RecordInfo
-from scenarios.results.figure_processes import prepare_figures
-from scenarios.results.law_failures import ended_by_a_law
-from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
-from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of
-from scenarios.versions import versions
-from wire.messages import Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.results.figure_processes import prepare_figures
+from gridpeers.scenarios.results.law_failures import ended_by_a_law
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.versions import versions
+from gridpeers.wire.messages import Telemetry
 
 if TYPE_CHECKING:
-    from plant.plant_interface import PlantLike
+    from gridpeers.plant.plant_interface import PlantLike
 
 _AFTER_RUN = (
-    *("scenarios.results.event_windows", "scenarios.results.findings", "scenarios.results.evaluation.claims"),
-    *("scenarios.results.report", "scenarios.results.plots.drawing", "scenarios.checks.judging"),
-    *("scenarios.checks.physics.balance_check", "scenarios.checks.communication.record_content"),
+    *(
+        "gridpeers.scenarios.results.event_windows",
+        "gridpeers.scenarios.results.findings",
+        "gridpeers.scenarios.results.evaluation.claims",
+    ),
+    *(
+        "gridpeers.scenarios.results.report",
+        "gridpeers.scenarios.results.plots.drawing",
+        "gridpeers.scenarios.checks.judging",
+    ),
+    *("gridpeers.scenarios.checks.physics.balance_check", "gridpeers.scenarios.checks.communication.record_content"),
 )
 """Modules that are used after a run, with numpy and scipy, and imported while it goes on: this process has little to do
 then."""
@@ -83,12 +91,12 @@ def run_case(
         progress(case, 0.0, time.end_s)
         try:
             if request.driver == "inprocess":
-                from scenarios.drivers.inprocess import run_inprocess
+                from gridpeers.scenarios.drivers.inprocess import run_inprocess
 
                 ready = None if plant_at_rest is None else plant_at_rest(plant)
                 outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder, plant=ready)
             else:
-                from scenarios.drivers.process_driver import run_processes
+                from gridpeers.scenarios.drivers.process_driver import run_processes
 
                 outcome = run_processes(
                     plant,
@@ -145,7 +153,7 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
         )
         agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.keys is not None:
-        from scenarios.drivers.secured import secured
+        from gridpeers.scenarios.drivers.secured import secured
 
         inverters = tuple(row.name for row in inverters_of(request.scenario, request.feeder))
         started = {agent.name for agent in agents}

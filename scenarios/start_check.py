@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from plant.build import plant_at_rest
-from plant.dynamics import PlantError
-from plant.equipment import Feeder
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
+from gridpeers.plant.build import plant_at_rest
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
 
 
 def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:

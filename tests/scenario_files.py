@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.schema import ScenarioError, load_scenario
+from gridpeers.scenarios.schema import ScenarioError, load_scenario
 
 
 def written(folder: Path, text: str) -> Path:

@@ -47,9 +47,9 @@ def compile_once() -> None:
     """Compile the plant's inner loops in a fresh clone, before several processes do it side by side."""
     from msgspec.structs import replace
 
-    from plant.build import build_plant
-    from scenarios.schema import load_scenario
-    from scenarios.schema.configs import configs
+    from gridpeers.plant.build import build_plant
+    from gridpeers.scenarios.schema import load_scenario
+    from gridpeers.scenarios.schema.configs import configs
 
     config, _ = configs(*load_scenario("islanding"), "I")
     build_plant(config)

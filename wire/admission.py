@@ -18,8 +18,8 @@ from __future__ import annotations
 
 from math import inf
 
-from wire.codec import RejectedError
-from wire.messages import AnyMessage
+from gridpeers.wire.codec import RejectedError
+from gridpeers.wire.messages import AnyMessage
 
 AHEAD = 50
 """Numbers by which a sender may be ahead of its run time, because it may send several at once."""
@@ -42,7 +42,7 @@ class Admission:
 
     Examples
     --------
-    >>> from wire.messages import Ready
+    >>> from gridpeers.wire.messages import Ready
     >>> admission, ready = Admission(), Ready(sender="inv1", epoch=7, seq=0, t=0.0)
     >>> admission.bind("inv1", 7)
     >>> admission.check(ready)
@@ -50,7 +50,7 @@ class Admission:
     >>> admission.check(ready)
     Traceback (most recent call last):
         ...
-    wire.codec.RejectedError: Ready(0) of epoch 7 of inv1, whose epoch is 3
+    gridpeers.wire.codec.RejectedError: Ready(0) of epoch 7 of inv1, whose epoch is 3
     """
 
     def __init__(self, rate: float = inf) -> None:

@@ -7,9 +7,9 @@ A process takes its messages out at every tick. Should it fall behind, or somebo
   never displaces a state, a measurement or a stop request;
 - messages above `SMALL` bytes have `BYTES` together, a quarter of it for strangers.
 
-A known sender is recognised by its name and epoch in the first bytes, as `wire.codec` writes them; nothing is decoded
-here. That is no proof of anything: all checks of `wire.node` follow. Whoever copies name and epoch has the room of that
-one sender, and no more.
+A known sender is recognised by its name and epoch in the first bytes, as `gridpeers.wire.codec` writes them; nothing is
+decoded here. That is no proof of anything: all checks of `gridpeers.wire.node` follow. Whoever copies name and epoch
+has the room of that one sender, and no more.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Loss(NamedTuple):
 
     key: str
     kind: str
-    """One of `wire.codec.KINDS`."""
+    """One of `gridpeers.wire.codec.KINDS`."""
     text: str
     """The problem of the first of them."""
     number: int
@@ -59,8 +59,8 @@ def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
 
     Examples
     --------
-    >>> from wire.codec import encode
-    >>> from wire.messages import Ready
+    >>> from gridpeers.wire.codec import encode
+    >>> from gridpeers.wire.messages import Ready
     >>> payload = encode(Ready(sender="inv1", epoch=7, seq=0, t=0.0))
     >>> is_marked(payload, "inv1", 7), is_marked(payload, "inv1", 8)
     (True, False)

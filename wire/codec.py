@@ -2,7 +2,7 @@
 
 A payload is msgpack, by msgspec, which checks types and bounds while it decodes, and its CRC-32 in the last four bytes:
 TCP's checksum of 16 bits misses an error now and then, and a flipped bit within a number would decode as another
-number. So a message from `decode` is as it was sent, and within `wire.bounds`. Any other payload raises a
+number. So a message from `decode` is as it was sent, and within `gridpeers.wire.bounds`. Any other payload raises a
 `RejectedError` of a kind in `KINDS`: receivers count it and continue, because no message may stop an agent.
 """
 
@@ -17,9 +17,9 @@ from zlib import crc32
 
 import msgspec
 
-from wire.bounds import LONGEST_MESSAGE
-from wire.messages import AnyMessage, Message
-from wire.printable import printable
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.messages import AnyMessage, Message
+from gridpeers.wire.printable import printable
 
 CRC = 4
 """Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first."""
@@ -89,7 +89,7 @@ def decode(payload: bytes) -> AnyMessage:
 
     Examples
     --------
-    >>> from wire.messages import Ready
+    >>> from gridpeers.wire.messages import Ready
     >>> decode(encode(Ready(sender="inv1", epoch=1, seq=0, t=0.0))).sender
     'inv1'
     """

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import msgspec
 
-from wire.printable import printable
+from gridpeers.wire.printable import printable
 
 Text = TypeVar("Text", bytes, str)
 T = TypeVar("T")

@@ -3,7 +3,7 @@
 The record of a run is what went into the pure cores and what came out of them; the same cores compute everything else
 again. A node therefore notes the bytes that it sends, what it hears, tokens that come and go, and the inputs of each
 decision. An entry is a msgpack array whose first value names its kind; entries follow each other without a frame, so a
-journal is cut at any entry and joined to the next part. `wire.messages.Journal` carries one part.
+journal is cut at any entry and joined to the next part. `gridpeers.wire.messages.Journal` carries one part.
 
 Three rules keep it small, because in simulated time a tick must not wait for its journal:
 
@@ -21,7 +21,7 @@ from typing import Any, Literal
 import msgspec
 from msgspec.structs import replace
 
-from wire.bounds import Count
+from gridpeers.wire.bounds import Count
 
 RecordLevel = Literal["all", "decisions", "physics"]
 """What nodes note: everything; decisions with their inputs, but no arrivals and no fates on links; or nothing, as the
@@ -79,7 +79,7 @@ class MessageReference(Entry, frozen=True, array_like=True, tag="heard"):
     seq: int
     """Number of the message."""
     rejected: str = ""
-    """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
+    """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
 
 class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
@@ -92,7 +92,7 @@ class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
     payload: bytes
     """Its bytes."""
     rejected: str = ""
-    """Kind of its rejection (`wire.codec.KINDS`); empty if it was used."""
+    """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
 
 class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
@@ -103,7 +103,7 @@ class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
     key: str
     """Key, without `gridpeers/<run>/`; empty for all others, where there are too many."""
     kind: str
-    """Kind of their rejection (`wire.codec.KINDS`)."""
+    """Kind of their rejection (`gridpeers.wire.codec.KINDS`)."""
     count: Count
     """Number of them."""
 
@@ -162,7 +162,7 @@ class Decision(Entry, frozen=True, array_like=True, tag="decision"):
     weights: list[float]
     """Weight of each, from 0 to 1; no list if all used ones have 1."""
     saturated: tuple[int, int] = (0, 0)
-    """Saturated sides of P and V; see `agents.laws.law.Own`."""
+    """Saturated sides of P and V; see `gridpeers.agents.laws.law.Own`."""
     at: float | None = None
     """Time of the decision on the own clock (s, monotonic); None in simulated time."""
     ages: list[float | None] = []

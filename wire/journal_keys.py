@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wire.messages import PLANT
+from gridpeers.wire.messages import PLANT
 
 EACH_TICK = ("measurement", "state", "set_points")
 """Kinds of keys with a message a tick."""

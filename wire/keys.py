@@ -12,8 +12,8 @@ from typing import Literal
 
 import msgspec
 
-from wire.bounds import MOST_COUNT, is_name
-from wire.trust.member import ROLES, Role
+from gridpeers.wire.bounds import MOST_COUNT, is_name
+from gridpeers.wire.trust.member import ROLES, Role
 
 READING = ("status", "links", "telemetry")
 """Verbs of commands that change nothing: they have a key of their own, on which viewers may publish."""
@@ -30,7 +30,7 @@ ANY_TOKEN = "gridpeers/*/alive/**"
 
 
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
-    """One kind of key, for the protocol's documentation and for access rules (`wire.trust.access_rules`)."""
+    """One kind of key, for the protocol's documentation and for access rules (`gridpeers.wire.trust.access_rules`)."""
 
     expression: str
     """The key, with its parts in angle brackets."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any, NamedTuple, Protocol
 
-from wire.admission import Admission
-from wire.codec import RejectedError, RejectedMessages, decode
-from wire.messages import AnyMessage, Measurement, State
+from gridpeers.wire.admission import Admission
+from gridpeers.wire.codec import RejectedError, RejectedMessages, decode
+from gridpeers.wire.messages import AnyMessage, Measurement, State
 
 REPORT_TICKS = 100
 """Ticks between two reports of a receiver on the links into it."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from wire.admission import Admission
-from wire.bounds import MOST_INVERTERS
-from wire.codec import RejectedError
-from wire.messages import Nameplate
+from gridpeers.wire.admission import Admission
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.codec import RejectedError
+from gridpeers.wire.messages import Nameplate
 
 MOST_PROCESSES = 8
 """Processes that may claim one name: two, while one replaces another, and some that are mistaken."""

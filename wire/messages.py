@@ -1,10 +1,11 @@
 """The messages of a run. Frozen, validated, SI units on the wire.
 
-The type of a field contains its bounds (`wire.bounds`), and fields of one message must agree (`__post_init__`). So
-a decoded message is safe to compute with, to print and to put into a key.
+The type of a field contains its bounds (`gridpeers.wire.bounds`), and fields of one message must agree
+(`__post_init__`). So a decoded message is safe to compute with, to print and to put into a key.
 
 Every message has its sender (`sender`), the sender's epoch (`epoch`, which identifies one process; see
-`wire.admission`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick k and
+`gridpeers.wire.admission`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick
+k and
 `t` is k T_c.
 """
 
@@ -15,7 +16,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from wire.bounds import (
+from gridpeers.wire.bounds import (
     LATEST,
     MOST_INVERTERS,
     Age,
@@ -224,7 +225,7 @@ class Journal(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_onl
     """A part of the sender's journal (agent -> plant -> recorders; plant -> recorders). `seq` counts the parts."""
 
     data: Data
-    """Entries, one after the other (`wire.journal`), for the record; no core reads them."""
+    """Entries, one after the other (`gridpeers.wire.journal`), for the record; no core reads them."""
 
 
 class LinkRequest(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_only=True):

@@ -1,7 +1,7 @@
 """A node: one participant of a run, on either side and under either kind of time. Messages in, actions out. Pure.
 
-A node is sans-IO. A driver (`wire.driver.drive` over Zenoh, `scenarios.drivers.inprocess` on a bus) owns it in one
-thread and does
+A node is sans-IO. A driver (`gridpeers.wire.driver.drive` over Zenoh, `gridpeers.scenarios.drivers.inprocess` on a bus)
+owns it in one thread and does
 
     node.appeared(key, now) | node.vanished(key, now)       for a liveliness token that appears or vanishes
     node.received(key, payload, now)                        for a message, or the answer to a `Fetch`
@@ -13,8 +13,8 @@ thread and does
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
 Every message takes one way. `received` decodes it, which checks its bounds; it checks sender and epoch
-(`wire.admission`), and the type; then the handler of the message's route gets it. A wrong message, or an error while it
-is handled, costs that message alone.
+(`gridpeers.wire.admission`), and the type; then the handler of the message's route gets it. A wrong message, or an
+error while it is handled, costs that message alone.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from wire.actions import Action, Fetch, Log, Publish
-from wire.admission import Admission
-from wire.backlog import Loss, is_marked
-from wire.codec import RejectedError, RejectedMessages, decode, encode
-from wire.journal import JournalBuffer
-from wire.keys import Keys
-from wire.links import Links
-from wire.membership import Membership
-from wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
-from wire.token_queue import TOKENS
-from wire.traffic import Traffic
+from gridpeers.wire.actions import Action, Fetch, Log, Publish
+from gridpeers.wire.admission import Admission
+from gridpeers.wire.backlog import Loss, is_marked
+from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode
+from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.links import Links
+from gridpeers.wire.membership import Membership
+from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
+from gridpeers.wire.token_queue import TOKENS
+from gridpeers.wire.traffic import Traffic
 
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
@@ -143,7 +143,7 @@ class Node:
             self.traffic.received(key, payload, now, rejected_as)
 
     def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of the sender of its key, in that sender's epoch; see `wire.backlog`.
+        """Whether a message looks like one of the sender of its key, in its epoch: `gridpeers.wire.backlog`.
 
         Any thread may ask.
         """
@@ -152,7 +152,7 @@ class Node:
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, so that its end must be known; see `wire.token_queue`.
+        """Whether the holder of a token is noted, so that its end must be known; see `gridpeers.wire.token_queue`.
 
         Any thread may ask.
         """

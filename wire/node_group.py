@@ -4,8 +4,8 @@ A group looks like one node to its driver. Messages between its nodes stay insid
 and goes to every node with a route for it. The nodes hold one token each, so the others see as many agents.
 
 **Queries.** A node queries a process for its nameplate after it has subscribed to that process: the answer proves that
-the subscription is known (`agents.lockstep_agent`). A query proves the same for every subscription that was declared
-before it, so nodes share a query, or its answer, unless the group has declared a subscription in between.
+the subscription is known (`gridpeers.agents.lockstep_agent`). A query proves the same for every subscription that was
+declared before it, so nodes share a query, or its answer, unless the group has declared a subscription in between.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
-from wire.backlog import Loss
-from wire.codec import RejectedMessages
+from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.codec import RejectedMessages
 
 
 class GroupedNode(Protocol):
-    """The part of an agent's node that its group uses, beside `wire.driver.drive.Core`."""
+    """The part of an agent's node that its group uses, beside `gridpeers.wire.driver.drive.Core`."""
 
     rejects: RejectedMessages
     routes: dict[str, Any]
@@ -69,7 +69,7 @@ class _Query(NamedTuple):
 
 
 class NodeGroup:
-    """Nodes behind one session, as one `wire.driver.drive.Core`.
+    """Nodes behind one session, as one `gridpeers.wire.driver.drive.Core`.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ DISTRIBUTIONS = {
 }
 """What pip calls a package, where it has another name there."""
 
-_OWN = ("agents", "gridpeers", "netem", "papers", "plant", "scenarios", "wire")
+_OWN = ("gridpeers",)
 
 
 def damaged(module: str, reason: str, user: str) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import inf
 
-from wire.backlog import is_marked
-from wire.keys import epoch_of
-from wire.messages import PLANT, AnyMessage
-from wire.node import Node, Route
+from gridpeers.wire.backlog import is_marked
+from gridpeers.wire.keys import epoch_of
+from gridpeers.wire.messages import PLANT, AnyMessage
+from gridpeers.wire.node import Node, Route
 
 MOST_PLANTS = 64
 """Plants of one run that may hold tokens: two, while one replaces another; those that a recorder has outlived; some
@@ -24,7 +24,7 @@ class PlantFollower(Node):
     run : str
         Name of the run.
     rate : float, optional
-        Most messages of one sender per s of run time; see `wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
     """
 
     def __init__(self, name: str, run: str, rate: float = inf) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from wire.bounds import UNPRINTABLE
+from gridpeers.wire.bounds import UNPRINTABLE
 
 _UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
 

@@ -46,7 +46,7 @@ def text_of(data: bytes) -> str:
     ('süd\n', 'a\nb')
     >>> text_of("a\nsüd".encode("latin-1"))
     Traceback (most recent call last):
-    wire.text_file.TextFileError: line 2 has byte 0xfc, which is not UTF-8 (Windows or Latin-1?); save it as UTF-8
+    gridpeers.wire.text_file.TextFileError: line 2 has byte 0xfc, which is not UTF-8 (Windows or Latin-1?); save it ...
     """
     encoding = _encoding(data)
     try:

@@ -8,8 +8,8 @@ Anybody may hold tokens, as many as he likes, and each costs the process that no
 - a token that vanishes comes in at once if its holder is noted, and is of no use if not; a waiting one is forgotten.
 
 So a noted holder is always seen to go, and to come back: the end and the return of its token are never lost and never
-change places. Noted holders are those that the process itself knows (`wire.node.Node.is_noted`). What has come in
-is noted only once the process has handled it, so until then it is remembered here.
+change places. Noted holders are those that the process itself knows (`gridpeers.wire.node.Node.is_noted`). What has
+come in is noted only once the process has handled it, so until then it is remembered here.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from itertools import count
 from math import inf
 from typing import Literal
 
-from wire.backlog import Loss
-from wire.bounds import MOST_INVERTERS
-from wire.membership import MOST_PROCESSES
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.membership import MOST_PROCESSES
 
 TokenEvent = Literal["appeared", "vanished"]
 

@@ -7,8 +7,8 @@ from typing import Any, Protocol
 
 from msgspec.structs import astuple
 
-from wire.codec import sound
-from wire.journal import (
+from gridpeers.wire.codec import sound
+from gridpeers.wire.journal import (
     AT_ONCE,
     Exchange,
     JournalBuffer,
@@ -20,10 +20,10 @@ from wire.journal import (
     Token,
     WakeUp,
 )
-from wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
-from wire.keys import Keys
-from wire.messages import Measurement, State
-from wire.rate_limit import RateLimit
+from gridpeers.wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Measurement, State
+from gridpeers.wire.rate_limit import RateLimit
 
 SHOWN_PAYLOAD = 4_000
 """Most bytes that are noted of a message that was rejected."""

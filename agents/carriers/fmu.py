@@ -1,7 +1,8 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
-Its variables are those of `agents.carriers.fmu_interface`. What is compiled cannot be interrupted, and may take its
-process with it: so an FMU runs in one of its own, `agents.carriers.fmu_host`, to which the lines of a law program go.
+Its variables are those of `gridpeers.agents.carriers.fmu_interface`. What is compiled cannot be interrupted, and may
+take its process with it: so an FMU runs in one of its own, `gridpeers.agents.carriers.fmu_host`, to which the lines of
+a law program go.
 """
 
 from __future__ import annotations
@@ -14,10 +15,10 @@ from tempfile import mkdtemp
 
 from msgspec.structs import replace
 
-from agents.agent_config import LawChoice
-from agents.carriers.program import ProgramLaw, ProgramReady
-from agents.laws.call import LawError
-from wire.printable import printable
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
+from gridpeers.agents.laws.call import LawError
+from gridpeers.wire.printable import printable
 
 LOADING = 10.0
 """Least time (s) that an FMU has to be loaded."""
@@ -43,7 +44,7 @@ class FmuLaw(ProgramLaw):
             self._unpacked = mkdtemp(prefix="gridpeers-fmu-")
         except OSError as error:
             raise ValueError(f"law {path.name}: there is nowhere to unpack it: {error.strerror}; set TMPDIR") from None
-        command = (sys.executable, "-P", "-m", "agents.carriers.fmu_host", str(path), self._unpacked)
+        command = (sys.executable, "-P", "-m", "gridpeers.agents.carriers.fmu_host", str(path), self._unpacked)
         try:
             super().__init__(replace(choice, command=command), path.name, self._unpacked)
         except ValueError:

@@ -1,4 +1,4 @@
-"""The process of an FMU that carries a law: `python -m agents.carriers.fmu_host PATH FOLDER`.
+"""The process of an FMU that carries a law: `python -m gridpeers.agents.carriers.fmu_host PATH FOLDER`.
 
 It reads and writes the lines of a law program (docs/law-programs.md). What the FMU prints goes to standard error.
 """
@@ -14,11 +14,11 @@ from typing import Any
 
 import msgspec
 
-from agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
-from agents.carriers.fmu_interface import named as variables
-from agents.laws.call import LawError, decide, start_law
-from agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints
-from wire.plugins.anybody import ANYTHING, named
+from gridpeers.agents.carriers.fmu_interface import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
+from gridpeers.agents.carriers.fmu_interface import named as variables
+from gridpeers.agents.laws.call import LawError, decide, start_law
+from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints
+from gridpeers.wire.plugins.anybody import ANYTHING, named
 
 
 class LoadedFmu(Law):

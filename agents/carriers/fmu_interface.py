@@ -15,10 +15,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from wire.printable import printable
-from wire.schema.suggestion import suggestion
-from wire.schema.table_reading import read_parameters
+from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import read_parameters
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 """Inputs of the own inverter."""

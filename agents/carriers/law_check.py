@@ -7,16 +7,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from agents.agent_config import LawChoice
-from agents.carriers.executable import executable_problem
-from agents.carriers.law_registry import CARRIERS, KEYS, LAWS
-from agents.carriers.time_limit import make_limited
-from agents.laws.law import Law, limits_in
-from wire.plugins.path_text import is_no_path
-from wire.plugins.plugin import scalar_objection
-from wire.plugins.registry import PluginError
-from wire.schema.table_reading import read_parameters, read_table
-from wire.schema.table_schema import Problem
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.carriers.executable import executable_problem
+from gridpeers.agents.carriers.law_registry import CARRIERS, KEYS, LAWS
+from gridpeers.agents.carriers.time_limit import make_limited
+from gridpeers.agents.laws.law import Law, limits_in
+from gridpeers.wire.plugins.path_text import is_no_path
+from gridpeers.wire.plugins.plugin import scalar_objection
+from gridpeers.wire.plugins.registry import PluginError
+from gridpeers.wire.schema.table_reading import read_parameters, read_table
+from gridpeers.wire.schema.table_schema import Problem
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[degraded_communication]`."""
@@ -92,8 +92,8 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
 
 
 def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
-    from agents.carriers.fmu import load_problem
-    from agents.carriers.fmu_interface import fmu_problems
+    from gridpeers.agents.carriers.fmu import load_problem
+    from gridpeers.agents.carriers.fmu_interface import fmu_problems
 
     path = Path(choice.folder) / choice.fmu
     found = [Problem(*problem) for problem in fmu_problems(path, parameters)]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from agents.laws.law import Law
-from wire.plugins.plugin import class_objection
-from wire.plugins.registry import Registry
+from gridpeers.agents.laws.law import Law
+from gridpeers.wire.plugins.plugin import class_objection
+from gridpeers.wire.plugins.registry import Registry
 
 CARRIERS = ("use", "command", "fmu")
 """Keys of a scenario's table `law`, one of which says what the law is."""
@@ -30,12 +30,12 @@ LAWS: Registry[type[Law]] = Registry(
     "laws",
     _objection,
     own={
-        "consensus": "agents.laws.consensus:Consensus",
-        "dapi": "agents.laws.dapi:Dapi",
-        "event-triggered": "agents.laws.event_triggered:EventTriggered",
-        "finite-time": "agents.laws.finite_time:FiniteTime",
-        "centralised": "agents.laws.centralised:Centralised",
-        "resilient": "agents.laws.resilient:Resilient",
+        "consensus": "gridpeers.agents.laws.consensus:Consensus",
+        "dapi": "gridpeers.agents.laws.dapi:Dapi",
+        "event-triggered": "gridpeers.agents.laws.event_triggered:EventTriggered",
+        "finite-time": "gridpeers.agents.laws.finite_time:FiniteTime",
+        "centralised": "gridpeers.agents.laws.centralised:Centralised",
+        "resilient": "gridpeers.agents.laws.resilient:Resilient",
     },
 )
 """Laws by name; those of gridpeers come first."""

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol, runtime_checkable
 
-from agents.agent_config import Control, LawChoice
-from agents.carriers.law_registry import LAWS
-from agents.carriers.time_limit import make_limited
-from agents.laws.in_force import law_in_force
-from agents.laws.law import Law
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.agents.carriers.law_registry import LAWS
+from gridpeers.agents.carriers.time_limit import make_limited
+from gridpeers.agents.laws.in_force import law_in_force
+from gridpeers.agents.laws.law import Law
 
 
 @runtime_checkable
@@ -31,11 +31,11 @@ def make_law(control: Control) -> Law:
     """
     choice = control.law
     if choice.command:
-        from agents.carriers.program import ProgramLaw
+        from gridpeers.agents.carriers.program import ProgramLaw
 
         return ProgramLaw(choice)
     if choice.fmu:
-        from agents.carriers.fmu import FmuLaw
+        from gridpeers.agents.carriers.fmu import FmuLaw
 
         return FmuLaw(choice)
     if choice.use == LawChoice().use:

@@ -15,13 +15,13 @@ from typing import Any, Literal
 
 import msgspec
 
-from agents.agent_config import LawChoice
-from agents.carriers.process_group import LEAVING, ProcessGroup
-from agents.carriers.time_limit import FIRST
-from agents.laws.call import LawError
-from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
-from wire.foreign_bytes import decode_foreign
-from wire.printable import printable
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.carriers.process_group import LEAVING, ProcessGroup
+from gridpeers.agents.carriers.time_limit import FIRST
+from gridpeers.agents.laws.call import LawError
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.printable import printable
 
 LONGEST_LINE = 100_000
 """Bytes of an answer beyond which it is none."""

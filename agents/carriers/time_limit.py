@@ -11,10 +11,10 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from agents.laws.call import LawError
-from agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
+from gridpeers.agents.laws.call import LawError
+from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
 
 _forks = threading.local()
 """Forks of this process by each of its threads: `number`."""

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
-from wire.bounds import MOST_SHARED, SHARED_LIMIT
-from wire.plugins.anybody import ANYTHING, line_of, named
-from wire.printable import printable
+from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
+from gridpeers.wire.bounds import MOST_SHARED, SHARED_LIMIT
+from gridpeers.wire.plugins.anybody import ANYTHING, line_of, named
+from gridpeers.wire.printable import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
 
@@ -76,7 +76,11 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
         Folder of the scenario: a file in it is named from there.
     """
     carried = getattr(law, "carried", law)
-    return "" if type(carried).__module__.startswith("agents.carriers.") else line_of(carried.step, error, folder)
+    return (
+        ""
+        if type(carried).__module__.startswith("gridpeers.agents.carriers.")
+        else line_of(carried.step, error, folder)
+    )
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:

@@ -21,8 +21,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated, Any
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 
 class Centralised(Law):

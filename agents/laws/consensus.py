@@ -55,8 +55,8 @@ where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To 
   `tests/unit/agents/test_law.py` repeats the searches, for the paper's weights and for degree-normalised ones.
 
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
-`agents.degraded_communication` has these and other options, and other weights c_ij than 1; the law itself stays the
-same.
+`gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1; the law itself
+stays the same.
 """
 
 from __future__ import annotations
@@ -65,9 +65,9 @@ from collections.abc import Sequence
 from math import exp, inf
 from typing import Annotated, Any
 
-from agents.agent_config import Gains
-from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.agent_config import Gains
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:

@@ -24,8 +24,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Annotated
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 
 class Dapi(Law):

@@ -21,9 +21,9 @@ from collections.abc import Sequence
 from math import exp
 from typing import Annotated, Any
 
-from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 
 class EventTriggered(Consensus):

@@ -26,8 +26,8 @@ from collections.abc import Sequence
 from math import copysign
 from typing import Annotated
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 
 class FiniteTime(Law):

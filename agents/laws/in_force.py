@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import msgspec
 
-from agents.agent_config import Control
-from agents.degraded_communication import gains_in_force
-from agents.laws.consensus import Consensus
+from gridpeers.agents.agent_config import Control
+from gridpeers.agents.degraded_communication import gains_in_force
+from gridpeers.agents.laws.consensus import Consensus
 
 
 def law_in_force(control: Control) -> Consensus:

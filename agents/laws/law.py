@@ -14,9 +14,9 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
-from wire.schema.plausible import Range, Unit
-from wire.schema.relations import Below
-from wire.schema.table_reading import parameter_values
+from gridpeers.wire.schema.plausible import Range, Unit
+from gridpeers.wire.schema.relations import Below
+from gridpeers.wire.schema.table_reading import parameter_values
 
 NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""
@@ -122,7 +122,7 @@ class Terms(NamedTuple):
 
 
 class Law:
-    """Base of all laws. Parameters are annotated attributes (`wire.schema.table_schema`).
+    """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`).
 
     Parameters
     ----------

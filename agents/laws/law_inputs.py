@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
-from agents.agent_config import AgentConfig
-from agents.laws.law import NOTHING_SHARED, Neighbour, Own
-from wire.messages import Measurement, Nameplate, State
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.laws.law import NOTHING_SHARED, Neighbour, Own
+from gridpeers.wire.messages import Measurement, Nameplate, State
 
 _converted: dict[str, tuple[State, Nameplate, float, float, Neighbour]] = {}
 """The last conversion of each sender: its neighbours in one process get the same state, one after the other."""

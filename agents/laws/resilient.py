@@ -24,9 +24,9 @@ from collections.abc import Callable, Sequence
 from math import exp
 from typing import Annotated, Any, NamedTuple
 
-from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
-from wire.schema.plausible import Range, Unit
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.law import Neighbour, Own, SetPoints, Term, Terms
+from gridpeers.wire.schema.plausible import Range, Unit
 
 SLOWER = 10.0
 """How much slower trust comes back than it goes."""

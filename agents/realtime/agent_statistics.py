@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import Literal
 
-from agents.agent_config import AgentConfig
-from agents.neighbour_states import NeighbourStates
-from wire.bounds import MOST_COUNT
-from wire.messages import AgentStatus
-from wire.printable import printable
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.neighbour_states import NeighbourStates
+from gridpeers.wire.bounds import MOST_COUNT
+from gridpeers.wire.messages import AgentStatus
+from gridpeers.wire.printable import printable
 
 Phase = Literal["seeking", "waiting", "running"]
 

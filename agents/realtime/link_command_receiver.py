@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from wire.links import Links
-from wire.messages import LinkAcknowledgement, LinkRequest
-from wire.printable import printable
+from gridpeers.wire.links import Links
+from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest
+from gridpeers.wire.printable import printable
 
 
 class LinkCommandReceiver:

@@ -22,22 +22,22 @@ from math import inf
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.agent_node import AgentNode
-from agents.decision_journal import DecisionJournal
-from agents.laws.law import Law
-from agents.realtime.agent_statistics import AgentStatistics, Phase
-from agents.realtime.link_command_receiver import LinkCommandReceiver
-from agents.realtime.session_health import SessionHealth
-from agents.realtime.tick_timer import TickTimer
-from wire.admission import FASTER
-from wire.codec import encode
-from wire.journal import JournalBuffer
-from wire.links import REPORT_TICKS, Links
-from wire.messages import PLANT, AnyMessage, Leave, LinkRequest, Measurement, Nameplate, State, Stop, Waiting
-from wire.node import CLOCK_ALONE, Route
-from wire.timing.timer import Timer
-from wire.traffic import TimedTraffic
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_node import AgentNode
+from gridpeers.agents.decision_journal import DecisionJournal
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.realtime.agent_statistics import AgentStatistics, Phase
+from gridpeers.agents.realtime.link_command_receiver import LinkCommandReceiver
+from gridpeers.agents.realtime.session_health import SessionHealth
+from gridpeers.agents.realtime.tick_timer import TickTimer
+from gridpeers.wire.admission import FASTER
+from gridpeers.wire.codec import encode
+from gridpeers.wire.journal import JournalBuffer
+from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.messages import PLANT, AnyMessage, Leave, LinkRequest, Measurement, Nameplate, State, Stop, Waiting
+from gridpeers.wire.node import CLOCK_ALONE, Route
+from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.traffic import TimedTraffic
 
 STATUS_PERIOD = 0.5
 """Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""

@@ -17,7 +17,7 @@ import typer
 from bench.harness import say
 from bench.peers.measured import PartRun, measure_in_turns, tables_text
 from bench.peers.parts import PARTS, SHORT, Extent
-from scenarios.results.run_files import write_whole
+from gridpeers.scenarios.results.run_files import write_whole
 
 
 def measure(

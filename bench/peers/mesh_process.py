@@ -22,7 +22,7 @@ import msgspec
 import zenoh
 
 from bench.peers.mesh import DEADLINE, HUB, WARM_UP, MeshMember
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """As ours (docs/protocol.md): with Zenoh's defaults the floor is higher."""

@@ -14,17 +14,17 @@ from typing import Any
 from unittest.mock import patch
 
 import gridpeers as gp
-from agents.lockstep_agent import LockstepAgent
 from bench.harness import DEADLINE, GRIDPEERS, checked, processor_time
-from plant.build import build_plant
-from plant.gridlabd.gridlabd_plant import GridlabdPlant
-from plant.gridlabd.process import delta_mode_process
-from plant.lockstep_plant import LockstepPlant
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.process_driver import run_processes
-from scenarios.results.record import PARTIAL, Recorder
-from scenarios.schema.configs import configs
-from wire.actions import Publish
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.gridlabd.gridlabd_plant import GridlabdPlant
+from gridpeers.plant.gridlabd.process import delta_mode_process
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.results.record import PARTIAL, Recorder
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.actions import Publish
 
 CASE = "IV"
 

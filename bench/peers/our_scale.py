@@ -22,14 +22,14 @@ from unittest.mock import patch
 
 import bench.harness  # noqa: F401  # one thread, before numpy is imported
 from gridpeers.feeder import Feeder
-from plant.build import build_plant
-from plant.equipment.joined_copies import copy_name, joined_copies
-from plant.feeder import Plant
-from plant.plant_config import PlantConfig
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.record import Recorder
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.equipment.joined_copies import copy_name, joined_copies
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 ISLAND, JOINT = 9, "450"
 """Inverters of the feeder `microgrid123`, and its bus at which copies are joined."""

@@ -40,9 +40,9 @@ from bench.soak.judging import (
 from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
-from scenarios.live.client.run_client import NobodyError
-from scenarios.schema import load_scenario
-from wire.messages import PLANT
+from gridpeers.scenarios.live.client.run_client import NobodyError
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.wire.messages import PLANT
 
 TOLD = 10
 """Actions after which progress is told."""

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 import pandas as pd
 
-from scenarios.checks.check_verdict import CheckVerdict, Violation, summary
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation, summary
 
 FLAT = 0.05
 """Growth of memory or files, as a part, that counts as none."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable
 
-from agents.agent_config import AgentConfig
-from plant.equipment import F_NOM
-from scenarios.results.metrics import F_BAND
-from wire.messages import VALUES, AgentStatus, Pacing, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.equipment import F_NOM
+from gridpeers.scenarios.results.metrics import F_BAND
+from gridpeers.wire.messages import VALUES, AgentStatus, Pacing, PlantEvent, Telemetry
 
 HOLD = 0.5
 """Run time (s) for which the frequency must stay in its band to count as restored."""

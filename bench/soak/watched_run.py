@@ -21,16 +21,16 @@ import gridpeers as gp
 from bench.harness import GRIDPEERS
 from bench.soak.judging import LAST_WORDS, ProcessSize
 from bench.soak.soak_monitor import HOLD, SoakMonitor
-from scenarios.checks.check_verdict import CheckVerdict, Violation
-from scenarios.checks.checks_file import FILE as CHECKS
-from scenarios.checks.checks_file import read_verdicts
-from scenarios.checks.communication.last_words_check import LastWords
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.live.client.run_address import RunAddress
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.show.watching import RunSubscriber
-from scenarios.record.record_info import FILE as RECORD
-from wire.messages import PLANT
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
+from gridpeers.scenarios.checks.checks_file import FILE as CHECKS
+from gridpeers.scenarios.checks.checks_file import read_verdicts
+from gridpeers.scenarios.checks.communication.last_words_check import LastWords
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.live.client.run_address import RunAddress
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.record.record_info import FILE as RECORD
+from gridpeers.wire.messages import PLANT
 
 BUILD = 300.0
 """Longest wait (s) for a run to begin: the plant may be compiled first."""

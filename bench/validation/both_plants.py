@@ -1,8 +1,8 @@
 """Part "gridlabd": our plant and GridLAB-D through the same run, step by step.
 
-GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `plant.gridlabd.model.glm` writes from the feeder's
-tables without the code of `plant.network`. Both plants start from their own equilibrium; in closed loop each has its
-own agents.
+GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `gridpeers.plant.gridlabd.model.glm` writes from the
+feeder's tables without the code of `gridpeers.plant.network`. Both plants start from their own equilibrium; in closed
+loop each has its own agents.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from agents.agent_config import AgentConfig
 from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, shortened
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
-from plant.equipment import Feeder, InverterRow
-from plant.feeder import Plant
-from plant.gridlabd.gridlabd_plant import GridlabdPlant
-from plant.gridlabd.model.export_glm import write_tables
-from plant.network import Network
-from plant.plant_config import PlantConfig, SwitchEvent
-from plant.plant_interface import PlantLike
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.gridlabd.gridlabd_plant import GridlabdPlant
+from gridpeers.plant.gridlabd.model.export_glm import write_tables
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 QUANTITIES = {"f": "Hz", "P": "pu", "Q": "pu", "V": "pu", "P_set": "pu", "V_set": "pu"}
 """Quantities of each inverter in a row, and their units of comparison: pu of rating and of nominal voltage."""

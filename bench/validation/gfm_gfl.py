@@ -11,11 +11,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from bench.validation.delta_mode import COMPLEX, REAL, Property, RecordedRun, delta_header, record
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.load_law import LoadLaw
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.gridlabd.model.glm_block import block
-from plant.gridlabd.model.glm_inverters import inverter_blocks
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.gridlabd.model.glm_block import block
+from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks
 
 H = 0.002
 """Step (s)."""

@@ -18,14 +18,14 @@ from numpy.typing import NDArray
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from bench.validation.write_opendss import LIMITS, write_opendss
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.phasors import aligned_sum
-from plant.equipment import Bus, Feeder, Source
-from plant.equipment.imported_equipment import LinearElement
-from plant.equipment.inverter_parameters import GfmParameters
-from plant.feeder.circuits import circuit_of
-from plant.network import Network, solve_power_flow
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.phasors import aligned_sum
+from gridpeers.plant.equipment import Bus, Feeder, Source
+from gridpeers.plant.equipment.imported_equipment import LinearElement
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.tables import read_feeder
 
 BUS, EMF = "gfm", "emf"
 """Bus of the storage, and behind its impedance."""

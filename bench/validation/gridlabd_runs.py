@@ -9,8 +9,8 @@ import msgspec
 from msgspec.structs import replace
 
 from bench.validation.validation_part import Kind
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.plant_config import PlantConfig, SwitchEvent
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
 
 SHORT = 0.2
 """Factor on all times of a run in the tests."""

@@ -17,16 +17,16 @@ from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.random_script import RandomFeeder, Shape, random_feeder
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
-from plant.dynamics import Dynamics, PlantError
-from plant.dynamics.reduction import reduce_network
-from plant.equipment import Feeder
-from plant.equipment.named_loads import with_powers
-from plant.feeder.circuits import circuit_of
-from plant.feeder.installed_inverters import installed_inverters
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
-from plant.plant_config import PlantSettings
-from plant.tables import FeederError
+from gridpeers.plant.dynamics import Dynamics, PlantError
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError
 
 STEPS = 10
 """Steps of 2 ms from an event to the state that is compared."""

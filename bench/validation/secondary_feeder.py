@@ -15,8 +15,8 @@ from pathlib import Path
 import pandas as pd
 from msgspec.structs import replace
 
-import plant
-from plant.equipment import Bus, Feeder, Line, LineConfig
+import gridpeers.plant
+from gridpeers.plant.equipment import Bus, Feeder, Line, LineConfig
 
 V_NOM = 2401.7
 """Nominal voltage (V, line-to-neutral)."""
@@ -24,7 +24,7 @@ V_NOM = 2401.7
 Row = dict[str, str]
 Tables = dict[str, list[Row]]
 
-TABLES = Path(plant.__file__).parent / "data" / "standard123"
+TABLES = Path(gridpeers.plant.__file__).parent / "data" / "standard123"
 
 WITHOUT_LOAD = {"50", "66", "99", "102", "103", "104", "106", "107", "109", "111", "114"}
 

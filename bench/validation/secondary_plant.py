@@ -44,14 +44,14 @@ from bench.validation.secondary_gridlabd import (
     SecondarySettings,
 )
 from bench.validation.validation_part import inverter_row
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
-from plant.dynamics.kernel.current_limit import solve_within_limits
-from plant.dynamics.live_network import TOLERANCE
-from plant.equipment.imported_equipment import LinearElement
-from plant.feeder.circuits import circuit_of
-from plant.network import Network
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
+from gridpeers.plant.dynamics.kernel.current_limit import solve_within_limits
+from gridpeers.plant.dynamics.live_network import TOLERANCE
+from gridpeers.plant.equipment.imported_equipment import LinearElement
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.network import Network
+from gridpeers.plant.tables import read_feeder
 
 
 class Participant(NamedTuple):

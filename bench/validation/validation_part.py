@@ -7,7 +7,7 @@ from importlib.metadata import PackageNotFoundError, version
 from math import floor, log10
 from typing import Any, Literal, NamedTuple
 
-from plant.equipment import InverterRow
+from gridpeers.plant.equipment import InverterRow
 
 Kind = Literal["GFM", "GFL"]
 

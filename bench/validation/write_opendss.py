@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from math import pi, sqrt
 
-from plant.equipment import Feeder, LineConfig, Load
+from gridpeers.plant.equipment import Feeder, LineConfig, Load
 
 NUMBER = {"A": "1", "B": "2", "C": "3"}
 MODEL = {"P": 1, "Z": 2, "I": 5}

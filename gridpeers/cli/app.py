@@ -13,9 +13,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from wire.driver.leftover import leave
-from wire.driver.open_files import raise_limit, too_few_files
-from wire.driver.output import speaking
+from gridpeers.wire.driver.leftover import leave
+from gridpeers.wire.driver.open_files import raise_limit, too_few_files
+from gridpeers.wire.driver.output import speaking
 
 
 def main() -> None:
@@ -28,7 +28,7 @@ def main() -> None:
         _tell("interrupted before anything had begun")
         sys.exit(INTERRUPTED)
     except ImportError as error:
-        from wire.packages import not_importable
+        from gridpeers.wire.packages import not_importable
 
         _tell(not_importable(error))
         sys.exit(2)  # as BAD_INPUT, whose module may be what cannot be imported
@@ -74,11 +74,11 @@ def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:
     """Start the servers of a run; where that fails, the run starts them when it needs them, and says what is wrong."""
     with suppress(OSError):
         if driver == "processes":
-            from scenarios.drivers.warm_servers import prepare
+            from gridpeers.scenarios.drivers.warm_servers import prepare
 
             prepare()
         elif driver == "inprocess":
-            from scenarios.results.figure_processes import prepare_figures
+            from gridpeers.scenarios.results.figure_processes import prepare_figures
 
             prepare_figures()
 

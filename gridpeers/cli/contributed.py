@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from gridpeers.cli.own_commands import OWN_COMMANDS
-from wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import PluginError, Registry
 
 Command = Callable[..., None]
 

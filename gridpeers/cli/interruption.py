@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
-from scenarios.results.broken_folder import TerminatedError
-from wire.driver.stop_signal import StopSignal, ctrl_c_or
+from gridpeers.scenarios.results.broken_folder import TerminatedError
+from gridpeers.wire.driver.stop_signal import StopSignal, ctrl_c_or
 
 
 @contextmanager

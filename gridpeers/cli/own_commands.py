@@ -17,7 +17,7 @@ class OwnCommand(NamedTuple):
 _HERE = "gridpeers.cli.commands"
 
 OWN_COMMANDS = {
-    name: OwnCommand(reference if reference.startswith("papers.") else f"{_HERE}.{reference}", summary)
+    name: OwnCommand(reference if reference.startswith("gridpeers.papers.") else f"{_HERE}.{reference}", summary)
     for name, reference, summary in (
         ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
         ("list", "show:list_", "List the scenarios that come with gridpeers."),
@@ -34,12 +34,12 @@ OWN_COMMANDS = {
         ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
         (
             "reproduce",
-            "papers.singhal2022.reproduce.reproduce_command:reproduce",
+            "gridpeers.papers.singhal2022.reproduce.reproduce_command:reproduce",
             "Run all experiments of the paper, and write one report.",
         ),
         (
             "experiment",
-            "papers.singhal2022.experiments.experiment_command:experiment",
+            "gridpeers.papers.singhal2022.experiments.experiment_command:experiment",
             "Run an experiment on late, lossy or broken links.",
         ),
         ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),

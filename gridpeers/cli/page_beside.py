@@ -21,8 +21,8 @@ HERE, PORT = "127.0.0.1", 8123
 def page_socket(port: int | None) -> socket.socket:
     """Return a socket for the page; or end with a clear line, before anything is started."""
     require_page()
-    from scenarios.live.client.run_address import UsageError
-    from scenarios.view.page_address import listen
+    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.view.page_address import listen
 
     try:
         return listen(HERE, PORT if port is None else port)
@@ -37,8 +37,8 @@ def page_beside(folder: Path, listening: socket.socket | None, name: str) -> Ite
         yield
         return
     from gridpeers.cli.interruption import interruptible
-    from scenarios.view.page_address import url_of
-    from scenarios.view.recorded.page_process import PageProcess
+    from gridpeers.scenarios.view.page_address import url_of
+    from gridpeers.scenarios.view.recorded.page_process import PageProcess
 
     url = url_of(listening, HERE)
     with PageProcess(folder, listening) as page:

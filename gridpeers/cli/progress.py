@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from scenarios.run_request import Progress as Tell
+from gridpeers.scenarios.run_request import Progress as Tell
 
 PATIENCE = 4.0
 """A start that takes longer than this (s) is explained; usually it takes about 1 s."""

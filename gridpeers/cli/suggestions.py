@@ -11,8 +11,8 @@ from typer import BadParameter
 from typer.core import TyperGroup
 
 from gridpeers.cli.usage import BAD_INPUT, fail
-from wire.driver.command_line import command_line
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.schema.suggestion import suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]
 """Base of all problems on a command line; releases of typer keep it in different modules."""

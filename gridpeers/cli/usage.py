@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
 import typer
 
-from scenarios.console import terminal as terminal
+from gridpeers.scenarios.console import terminal as terminal
 
 if TYPE_CHECKING:
-    from plant.equipment import Feeder
-    from plant.tables import FeederError
-    from scenarios.schema import ScenarioError, ScenarioModel
+    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.tables import FeederError
+    from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
 
 Dask = Annotated[
     str,
@@ -44,8 +44,8 @@ OPTIONS = {
 def load(name: str, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[ScenarioModel, Feeder]:
     """Read and check a scenario, with keys changed by the command line, and its feeder; or end with every problem."""
     from gridpeers.scenario import load as load_face
-    from scenarios.schema import ScenarioError
-    from wire.driver.command_line import command_line
+    from gridpeers.scenarios.schema import ScenarioError
+    from gridpeers.wire.driver.command_line import command_line
 
     if not name:
         fail([f"no scenario was named; `{command_line('list')}` shows those of the catalogue"], BAD_INPUT)
@@ -70,7 +70,7 @@ def refuse(error: ScenarioError | FeederError) -> NoReturn:
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
     """End with the nearest word if a value is none of those that an option takes."""
-    from wire.schema.suggestion import suggestion
+    from gridpeers.wire.schema.suggestion import suggestion
 
     if value not in known:
         fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
@@ -81,7 +81,7 @@ def chosen(spec: ScenarioModel, case: str | None, seed: int | None) -> ScenarioM
     import msgspec
 
     from gridpeers.runs.choices import with_cases
-    from scenarios.schema import ScenarioError
+    from gridpeers.scenarios.schema import ScenarioError
 
     if case is not None:
         names = [name.strip() for name in case.split(",") if name.strip()]
@@ -104,7 +104,7 @@ def require(modules: dict[str, str], install: str = "") -> None:
     """End with a clear line, and with advice, if a package that is needed is missing, or ZENOH_RUNTIME is wrong."""
     from importlib.util import find_spec
 
-    from wire.packages import DISTRIBUTIONS, requirement
+    from gridpeers.wire.packages import DISTRIBUTIONS, requirement
 
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
@@ -113,7 +113,7 @@ def require(modules: dict[str, str], install: str = "") -> None:
         again = f"install what is missing: pip install {' '.join(map(requirement, missing))}"
         fail([*lines, install or again], BAD_INPUT)
     if "zenoh" in modules:
-        from wire.driver.zenoh_settings import RUNTIME, runtime_objection
+        from gridpeers.wire.driver.zenoh_settings import RUNTIME, runtime_objection
 
         if objection := runtime_objection(os.environ.get("ZENOH_RUNTIME", RUNTIME)):
             fail([objection], BAD_INPUT)
@@ -123,7 +123,7 @@ def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
     import subprocess
 
-    from wire.packages import damaged
+    from gridpeers.wire.packages import damaged
 
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
@@ -134,7 +134,7 @@ def require_loadable(module: str, user: str) -> None:
 
 def fail(lines: list[str], code: int) -> NoReturn:
     """End the command with lines on standard error; characters that cannot be printed are escaped."""
-    from wire.printable import printable
+    from gridpeers.wire.printable import printable
 
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)

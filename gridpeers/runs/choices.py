@@ -8,12 +8,12 @@ from typing import TypedDict, get_args
 
 import msgspec
 
-from scenarios.results.metrics_file import Clock
-from scenarios.run_request import Driver
-from scenarios.run_speed import SPEEDS
-from scenarios.schema import ScenarioError
-from scenarios.schema import scenario_model as model
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.results.metrics_file import Clock
+from gridpeers.scenarios.run_request import Driver
+from gridpeers.scenarios.run_speed import SPEEDS
+from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option: str = "") -> model.ScenarioModel:
@@ -28,7 +28,7 @@ def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> list(with_cases(load_scenario("islanding")[0], ["IV", "I"]).cases)
     ['I', 'IV']
     """

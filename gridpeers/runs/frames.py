@@ -9,10 +9,10 @@ from typing import Any
 
 import pandas as pd
 
-from scenarios.checks.check_verdict import CheckVerdict, Violation
-from scenarios.results.law_failures import LawFailure
-from scenarios.results.link_record import COLUMNS
-from scenarios.sweep.column_labels import unit_of
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
+from gridpeers.scenarios.results.law_failures import LawFailure
+from gridpeers.scenarios.results.link_record import COLUMNS
+from gridpeers.scenarios.sweep.column_labels import unit_of
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

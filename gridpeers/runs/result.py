@@ -11,34 +11,34 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 import pandas as pd
 
+from gridpeers.plant.equipment import Feeder
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import draw
-from plant.equipment import Feeder
-from scenarios.checks import checks_file
-from scenarios.checks.check_verdict import CheckVerdict
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judging import judge_case
-from scenarios.live.numbers.departures import compare
-from scenarios.live.numbers.live_figures import live_drawing
-from scenarios.record.record_info import LIVE
-from scenarios.results.evaluation.benchmark_registry import benchmark_of
-from scenarios.results.evaluation.claims import Verdict, judge, judged
-from scenarios.results.event_windows import CaseRecord, as_they_came, windows
-from scenarios.results.findings import Findings, find
-from scenarios.results.history import History, read_history
-from scenarios.results.law_failures import law_failures
-from scenarios.results.plots.drawing import Drawing, drawing_of
-from scenarios.schema import scenario_model as model
-from scenarios.schema.plugin_keys import claims_of
-from wire.messages import PlantEvent
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.checks import checks_file
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.judging import judge_case
+from gridpeers.scenarios.live.numbers.departures import compare
+from gridpeers.scenarios.live.numbers.live_figures import live_drawing
+from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.results.evaluation.benchmark_registry import benchmark_of
+from gridpeers.scenarios.results.evaluation.claims import Verdict, judge, judged
+from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, windows
+from gridpeers.scenarios.results.findings import Findings, find
+from gridpeers.scenarios.results.history import History, read_history
+from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
+from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.scenarios.schema.plugin_keys import claims_of
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from scenarios.explanation.explanation import Explanation
-    from scenarios.record.record_reader import RunRecord
+    from gridpeers.scenarios.explanation.explanation import Explanation
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
 
 class _FromFolder:
@@ -160,7 +160,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         FolderError
             If there is something in it, or it cannot be written.
         """
-        from scenarios.results.plots.run_figures import draw_all
+        from gridpeers.scenarios.results.plots.run_figures import draw_all
 
         return self._folder.save(folder, lambda plots: draw_all(self.drawing(self._results), plots))
 
@@ -186,7 +186,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         return (*judge(self.findings, claims), *judged(self.findings, claims_of(self._spec)))
 
     def drawing(self, cases: Mapping[str, Result]) -> Drawing:
-        """Return the data of the figures of some cases (`scenarios.results.plots`)."""
+        """Return the data of the figures of some cases (`gridpeers.scenarios.results.plots`)."""
         spec = msgspec.structs.replace(self._spec, cases={case: self._spec.cases[case] for case in cases})
         recorded = {case: _plant_events(result) for case, result in cases.items()}
         *_, (case, last) = cases.items()  # in wall-clock time each case has its own events
@@ -261,7 +261,7 @@ class Result(_FromFolder):
         RecordFileError
             If the run was not recorded, or the file cannot be read.
         """
-        from scenarios.record.record_reader import RunRecord
+        from gridpeers.scenarios.record.record_reader import RunRecord
 
         return RunRecord.open(self.folder / self.case)
 
@@ -273,7 +273,7 @@ class Result(_FromFolder):
         RecordFileError
             If the run was not recorded, there was no such agent, or it had not decided by then.
         """
-        from scenarios.explanation.explanation import explain
+        from gridpeers.scenarios.explanation.explanation import explain
 
         return explain(self.run_record, agent, t)
 
@@ -328,7 +328,7 @@ class Result(_FromFolder):
         return draw(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
-        """Return the data of the figures of the case (`scenarios.results.plots`)."""
+        """Return the data of the figures of the case (`gridpeers.scenarios.results.plots`)."""
         return self._run.drawing({self.case: self})
 
     def save(self, folder: str | Path) -> Path:

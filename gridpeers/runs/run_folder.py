@@ -12,9 +12,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
-from wire.plugins.path_text import is_no_path
-from wire.printable import printable
+from gridpeers.scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
+from gridpeers.wire.plugins.path_text import is_no_path
+from gridpeers.wire.printable import printable
 
 T = TypeVar("T")
 

@@ -8,21 +8,21 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from gridpeers.plant.tables import read_feeder
 from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
-from plant.tables import read_feeder
-from scenarios.results.file_sizes import file_sizes, require_room
-from scenarios.results.law_failures import first_of
-from scenarios.results.run_files import FolderError, is_complete
-from scenarios.run import run as run_request
-from scenarios.run_request import BrokenRunError, Driver, Progress, Request
-from scenarios.schema import ScenarioError
-from scenarios.schema.configs import as_in
-from scenarios.schema.loading import read_tables, read_toml
-from scenarios.schema.plugin_keys import check_portable
-from scenarios.schema.scenario_errors import Problems
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
+from gridpeers.scenarios.results.law_failures import first_of
+from gridpeers.scenarios.results.run_files import FolderError, is_complete
+from gridpeers.scenarios.run import run as run_request
+from gridpeers.scenarios.run_request import BrokenRunError, Driver, Progress, Request
+from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.schema.configs import as_in
+from gridpeers.scenarios.schema.loading import read_tables, read_toml
+from gridpeers.scenarios.schema.plugin_keys import check_portable
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.wire.schema.suggestion import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario

@@ -6,7 +6,7 @@ import sys
 from io import BytesIO
 from typing import TYPE_CHECKING
 
-from scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.drawing import Drawing
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -20,7 +20,7 @@ def draw(drawing: Drawing, name: str) -> Figure:
     ValueError
         If the run has no figure of this name.
     """
-    from scenarios.results.plots import run_figures  # imports matplotlib
+    from gridpeers.scenarios.results.plots import run_figures  # imports matplotlib
 
     shown_in_notebooks()
     return run_figures.draw(drawing, name)

@@ -13,12 +13,12 @@ import pandas as pd
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.running import read
 from gridpeers.runs.showing import shown_in_notebooks
-from scenarios.results.metrics import SHARING_OF_ISLANDS
-from scenarios.schema.scenario_errors import ScenarioError
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.sweep.file.paths import flatten
-from wire.counted import counted
-from wire.driver.command_line import command_line
+from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS
+from gridpeers.scenarios.schema.scenario_errors import ScenarioError
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.sweep.file.paths import flatten
+from gridpeers.wire.counted import counted
+from gridpeers.wire.driver.command_line import command_line
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -119,7 +119,7 @@ class Comparison:
 
     def plot(self) -> Figure:
         """Draw f, MPSI, V and MQSI of both, case by case."""
-        from scenarios.results.plots.comparison_figure import comparison
+        from gridpeers.scenarios.results.plots.comparison_figure import comparison
 
         shown_in_notebooks()
         return comparison(

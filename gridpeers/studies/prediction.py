@@ -8,18 +8,18 @@ from pathlib import Path
 
 import pandas as pd
 
-from agents.carriers.law_check import PAPER
+from gridpeers.agents.carriers.law_check import PAPER
+from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
-from plant.equipment import Feeder
-from scenarios.predict.case_prediction import CasePrediction, predict_cases
-from scenarios.predict.closed_form import DelayKind
-from scenarios.predict.load_steps import LoadError
-from scenarios.predict.prediction_table import case_text
-from scenarios.run_request import BrokenRunError
-from scenarios.schema import ScenarioError
-from scenarios.schema import scenario_model as model
-from scenarios.schema.plugin_keys import law_of
+from gridpeers.scenarios.predict.case_prediction import CasePrediction, predict_cases
+from gridpeers.scenarios.predict.closed_form import DelayKind
+from gridpeers.scenarios.predict.load_steps import LoadError
+from gridpeers.scenarios.predict.prediction_table import case_text
+from gridpeers.scenarios.run_request import BrokenRunError
+from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.scenarios.schema.plugin_keys import law_of
 
 _LIMITS: dict[DelayKind, str] = {
     "neighbours": "agent to agent",

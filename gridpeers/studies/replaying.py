@@ -14,19 +14,19 @@ from gridpeers.runs.result import Result
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.runs.showing import shown_in_notebooks
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.changes import ChangedRule, Changes, changed_rule
+from gridpeers.scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
+from gridpeers.scenarios.replay.replay import Replay
+from gridpeers.scenarios.replay.replay import replay as replay_record
+from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.studies.comparison import Comparison
 from gridpeers.values import plain
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changes import ChangedRule, Changes, changed_rule
-from scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
-from scenarios.replay.replay import Replay
-from scenarios.replay.replay import replay as replay_record
-from scenarios.replay.replay_error import ReplayError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from scenarios.run_request import Progress
+    from gridpeers.scenarios.run_request import Progress
 
 RecordSource = Result | RunRecord | str | Path
 """A result, its record, or the folder of a case or its run.mcap."""
@@ -175,7 +175,7 @@ class Counterfactual:
 
     def plot(self) -> Figure:
         """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
-        from scenarios.results.plots.counterfactual_figure import counterfactual_figure
+        from gridpeers.scenarios.results.plots.counterfactual_figure import counterfactual_figure
 
         shown_in_notebooks()
         since = self.changes.since if self.changes else 0.0

@@ -12,21 +12,21 @@ import pandas as pd
 
 from gridpeers.runs.running import warn_of_laws
 from gridpeers.scenario import Scenario, as_scenario
+from gridpeers.scenarios.results.evaluation.metric import METRICS
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.plugin_keys import check_portable, metrics_of
+from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
+from gridpeers.scenarios.sweep.column_labels import unit_of
+from gridpeers.scenarios.sweep.file.plan import Plan
+from gridpeers.scenarios.sweep.file.samples import BaseScenario
+from gridpeers.scenarios.sweep.file.sweep_model import Sweep
+from gridpeers.scenarios.sweep.file.sweep_reading import plan_of
+from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
+from gridpeers.scenarios.sweep.sweep_table import results_frame
+from gridpeers.scenarios.sweep.workers import cores, on_workers
 from gridpeers.values import plain
-from scenarios.results.evaluation.metric import METRICS
-from scenarios.results.history import History
-from scenarios.schema import ScenarioModel
-from scenarios.schema.plugin_keys import check_portable, metrics_of
-from scenarios.schema.scenario_errors import Problems, ScenarioError
-from scenarios.sweep.column_labels import unit_of
-from scenarios.sweep.file.plan import Plan
-from scenarios.sweep.file.samples import BaseScenario
-from scenarios.sweep.file.sweep_model import Sweep
-from scenarios.sweep.file.sweep_reading import plan_of
-from scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
-from scenarios.sweep.sweep_table import results_frame
-from scenarios.sweep.workers import cores, on_workers
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.suggestion import suggestion
 
 Values = Mapping[str, Iterable[Any]]
 """Values by the dotted path of a key."""

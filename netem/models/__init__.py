@@ -1,7 +1,7 @@
 """The faults: frozen structs with units in their keys, and their effect on a message. Pure; a file for each family.
 
 A model has the ranges of its keys (annotations, `relations`), its law, and its draws (`sampler`, from a `Stream`).
-The draws of a random model depend on the message's number alone; see `netem.draws`.
+The draws of a random model depend on the message's number alone; see `gridpeers.netem.draws`.
 """
 
 INSTANT = 1e-9

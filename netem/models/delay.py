@@ -22,9 +22,9 @@ from typing import Annotated
 
 import msgspec
 
-from netem.draws import Chain, Stream
-from wire.schema.plausible import Plausible, Unit, in_percent
-from wire.schema.table_schema import Problem
+from gridpeers.netem.draws import Chain, Stream
+from gridpeers.wire.schema.plausible import Plausible, Unit, in_percent
+from gridpeers.wire.schema.table_schema import Problem
 
 LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
@@ -170,8 +170,8 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
 class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
     """Message n has delay number (n + start) mod length of the trace.
 
-    In a scenario `file` names a CSV file with a column `delay_s`; `netem.schema.trace_file` reads it into `delays_s`,
-    so that an agent's configuration needs no file.
+    In a scenario `file` names a CSV file with a column `delay_s`; `gridpeers.netem.schema.trace_file` reads it into
+    `delays_s`, so that an agent's configuration needs no file.
     """
 
     file: str = ""

@@ -12,12 +12,12 @@ from typing import Annotated, Any, Literal, get_args
 import msgspec
 from msgspec.structs import replace
 
-from netem.draws import Stream
-from netem.models import INSTANT
-from wire.bounds import Power, Voltage
-from wire.messages import State
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.table_schema import Example, Problem
+from gridpeers.netem.draws import Stream
+from gridpeers.netem.models import INSTANT
+from gridpeers.wire.bounds import Power, Voltage
+from gridpeers.wire.messages import State
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Example, Problem
 
 LONGEST_REPLAY = 60.0
 """Longest time (s) by which a replay is old; each receiver keeps the states of that time."""

@@ -12,9 +12,9 @@ from typing import Annotated
 
 import msgspec
 
-from netem.draws import Chain, Stream
-from wire.schema.plausible import Probability
-from wire.schema.table_schema import Problem
+from gridpeers.netem.draws import Chain, Stream
+from gridpeers.wire.schema.plausible import Probability
+from gridpeers.wire.schema.table_schema import Problem
 
 Lost = Callable[[int], bool]
 """From a message number to whether that message is lost."""

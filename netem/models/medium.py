@@ -8,11 +8,11 @@ from typing import Annotated
 
 import msgspec
 
-from netem.draws import Stream
-from netem.models import INSTANT
-from netem.models.delay import DELAY
-from wire.schema.plausible import Plausible, Probability, Unit
-from wire.schema.table_schema import Problem
+from gridpeers.netem.draws import Stream
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.delay import DELAY
+from gridpeers.wire.schema.plausible import Plausible, Probability, Unit
+from gridpeers.wire.schema.table_schema import Problem
 
 LONGEST_FLAP = 600.0
 """Longest plausible up or down time (s)."""

@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from netem.draws import Stream
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import Plugin, class_objection, made
-from wire.plugins.registry import Registry
-from wire.printable import printable
-from wire.schema.table_reading import parameter_values
+from gridpeers.netem.draws import Stream
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import Plugin, class_objection, made
+from gridpeers.wire.plugins.registry import Registry
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.table_reading import parameter_values
 
 LONGEST = 3600.0
 """Longest delay (s) that a fault may add."""
@@ -80,7 +80,7 @@ class LinkFault:
 
 
 def _objection(it: Any) -> str:
-    if isinstance(it, type) and issubclass(it, msgspec.Struct) and it.__module__.startswith("netem.models."):
+    if isinstance(it, type) and issubclass(it, msgspec.Struct) and it.__module__.startswith("gridpeers.netem.models."):
         return ""
     return class_objection(it, LinkFault, "judge", ("message", "draws"))
 
@@ -90,14 +90,14 @@ FAULTS: Registry[Any] = Registry(
     "link faults",
     _objection,
     own={
-        "cut": "netem.models.medium:Cut",
-        "flap": "netem.models.medium:Flap",
-        "loss": "netem.models.loss:Bernoulli",
-        "rate": "netem.models.medium:Rate",
-        "slots": "netem.models.medium:Slots",
-        "delay": "netem.models.delay:Constant",
-        "duplicate": "netem.models.medium:Duplicate",
-        "corrupt": "netem.models.medium:Corrupt",
+        "cut": "gridpeers.netem.models.medium:Cut",
+        "flap": "gridpeers.netem.models.medium:Flap",
+        "loss": "gridpeers.netem.models.loss:Bernoulli",
+        "rate": "gridpeers.netem.models.medium:Rate",
+        "slots": "gridpeers.netem.models.medium:Slots",
+        "delay": "gridpeers.netem.models.delay:Constant",
+        "duplicate": "gridpeers.netem.models.medium:Duplicate",
+        "corrupt": "gridpeers.netem.models.medium:Corrupt",
     },
 )
 """Faults by name; those of gridpeers come first, each by the model that a bare number means."""

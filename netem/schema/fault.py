@@ -12,18 +12,18 @@ from typing import Annotated, Any, NamedTuple
 
 import msgspec
 
-from netem.models.delay import AnyDelay, Constant, Lognormal, Normal, Uniform
-from netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
-from netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
-from netem.models.own_fault import FAULTS
-from netem.schema.pattern import parse
-from wire.plugins.path_text import is_no_path
-from wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.relations import After, problems_of
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
-from wire.schema.type_words import shown
+from gridpeers.netem.models.delay import AnyDelay, Constant, Lognormal, Normal, Uniform
+from gridpeers.netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
+from gridpeers.netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
+from gridpeers.netem.models.own_fault import FAULTS
+from gridpeers.netem.schema.pattern import parse
+from gridpeers.wire.plugins.path_text import is_no_path
+from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.relations import After, problems_of
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
+from gridpeers.wire.schema.type_words import shown
 
 
 class Profile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -118,7 +118,7 @@ class Span(NamedTuple):
     to_s: float
     """Until when (s), that instant not included; infinity is the whole run."""
     model: Any
-    """The struct of `netem.models`, or the `Plugin` of somebody's own fault."""
+    """The struct of `gridpeers.netem.models`, or the `Plugin` of somebody's own fault."""
 
 
 def _is_own(key: str) -> bool:
@@ -151,7 +151,7 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     """Faults of some links for a time. A message is judged by the entries that hold at the time it was sent."""
 
     on: Annotated[str, Label("which links"), Example('"inv4 <-> inv7"')]
-    """Which links, e.g. "inv4 <-> inv7"; see `netem.schema.pattern`."""
+    """Which links, e.g. "inv4 <-> inv7"; see `gridpeers.netem.schema.pattern`."""
     from_s: Annotated[RunTime, Label("faults begin at")] = 0.0
     """From when (s of run time)."""
     to_s: Annotated[EndTime, Label("faults end at")] = None

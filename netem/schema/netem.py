@@ -8,15 +8,15 @@ from typing import Annotated
 
 import msgspec
 
-from netem.models.delay import LONGEST_DELAY
-from netem.models.lie import AnyLie
-from netem.schema.fault import EndTime, Fault, RunTime, Span
-from netem.schema.partition import Partition
-from netem.schema.pattern import Link, links_among, objections
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.relations import problems_of
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import NO_KEY, Example, Problem, below
+from gridpeers.netem.models.delay import LONGEST_DELAY
+from gridpeers.netem.models.lie import AnyLie
+from gridpeers.netem.schema.fault import EndTime, Fault, RunTime, Span
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.netem.schema.pattern import Link, links_among, objections
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import NO_KEY, Example, Problem, below
 
 
 def _in_ppm(factor: float) -> str:

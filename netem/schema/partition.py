@@ -9,12 +9,12 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from netem.models.medium import Cut
-from netem.schema.fault import EndTime, RunTime, Span
-from wire.messages import PLANT
-from wire.schema.relations import problems_of
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import Example, Problem
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import EndTime, RunTime, Span
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import Example, Problem
 
 _REST = "the rest"
 

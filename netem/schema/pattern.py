@@ -7,8 +7,8 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
-from wire.messages import PLANT
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.schema.suggestion import suggestion
 
 ANY = "*"
 """All agents; the plant only where it is named."""

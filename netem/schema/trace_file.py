@@ -7,11 +7,11 @@ from pathlib import Path
 
 import msgspec
 
-from netem.models.delay import DELAY, LONGEST_DELAY, Trace
-from netem.schema.netem import Netem
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import Problem
-from wire.text_file import TextFileError, read_table_text
+from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Trace
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.text_file import TextFileError, read_table_text
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""

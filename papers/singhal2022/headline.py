@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from gridpeers.benchmarks import Findings
-from papers.singhal2022.tables import Cell, PaperTable
-from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
+from gridpeers.papers.singhal2022.tables import Cell, PaperTable
+from gridpeers.papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
 
 
 class ComparedNumber(NamedTuple):

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Benchmark
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.headline import headline, numbers
-from papers.singhal2022.tables import tables_of
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.headline import headline, numbers
+from gridpeers.papers.singhal2022.tables import tables_of
 
 
 def _benchmark(experiment: str) -> Benchmark:

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from gridpeers.benchmarks import DIGITS, Published, Quantity
-from papers.singhal2022.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, TableNumber, Tolerance
+from gridpeers.papers.singhal2022.tolerances import MQSI_FACTOR, TABLE, V_RELATIVE, TableNumber, Tolerance
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,9 +1,9 @@
 """Inverters on a network, stepped in time (`inverter-models.md` sections 2 to 7): the plant's numbers."""
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import PlantError
-from plant.dynamics.inverters import Inverter
-from plant.dynamics.simulation import Dynamics
-from plant.dynamics.switching import Trip
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.error import PlantError
+from gridpeers.plant.dynamics.inverters import Inverter
+from gridpeers.plant.dynamics.simulation import Dynamics
+from gridpeers.plant.dynamics.switching import Trip
 
 __all__ = ["Circuit", "Dynamics", "Inverter", "PlantError", "Trip"]

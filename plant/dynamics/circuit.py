@@ -1,6 +1,6 @@
 """The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals.
 
-`plant.feeder.circuits` makes one for every set of closed switches; tests make their own small ones.
+`gridpeers.plant.feeder.circuits` makes one for every set of closed switches; tests make their own small ones.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.phasors import PHASES
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.phasors import PHASES
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

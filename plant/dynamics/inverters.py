@@ -9,14 +9,14 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel import gfl as gfl_model
-from plant.dynamics.kernel import gfm as gfm_model
-from plant.dynamics.kernel.second_order_step import FeedForward
-from plant.dynamics.phasors import PHASES, aligned_sum
-from plant.dynamics.reduction.reduced import Complex, Real
-from plant.equipment import F_NOM
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.plant_config import Method
+from gridpeers.plant.dynamics.kernel import gfl as gfl_model
+from gridpeers.plant.dynamics.kernel import gfm as gfm_model
+from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
+from gridpeers.plant.dynamics.phasors import PHASES, aligned_sum
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
+from gridpeers.plant.equipment import F_NOM
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.plant_config import Method
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,13 +71,14 @@ class Inverters:
     forming : bool[n]
         Whether each is a GFM.
     gfm, gfm_at, gfm_state
-        Records of `plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
+        Records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
     gfl, gfl_at, gfl_state
-        The same for `plant.dynamics.kernel.gfl`.
+        The same for `gridpeers.plant.dynamics.kernel.gfl`.
     S_b, V_b, m_p, m_q : float64[n]
         Ratings (VA), nominal voltages (V) and droops (pu per pu).
     single : bool[n]
-        Single-phase inverters. To the models they have three equal phases (`plant.dynamics.circuit.Circuit.copies`).
+        Single-phase inverters. To the models they have three equal phases
+        (`gridpeers.plant.dynamics.circuit.Circuit.copies`).
     S_3 : float64[n]
         Base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter.
     phase : int64[n]

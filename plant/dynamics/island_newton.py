@@ -14,9 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction.blas import one_thread
-from plant.dynamics.reduction.reduced import Complex, Real
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
 
 ITERATIONS = 40
 """Of Newton's method; it takes 4 to 10."""

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import NoSolutionError
-from plant.dynamics.foreseen_cache import ForeseenCache
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.kernel.controller_pass import Units
-from plant.dynamics.kernel.solve import solve_network
-from plant.dynamics.reduction.island_parts import IslandParts, is_large
-from plant.dynamics.reduction.reduce_network import Reduction, reduce_network
-from plant.dynamics.reduction.reduced import Complex, Real, Reduced
-from plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.error import NoSolutionError
+from gridpeers.plant.dynamics.foreseen_cache import ForeseenCache
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.kernel.controller_pass import Units
+from gridpeers.plant.dynamics.kernel.solve import solve_network
+from gridpeers.plant.dynamics.reduction.island_parts import IslandParts, is_large
+from gridpeers.plant.dynamics.reduction.reduce_network import Reduction, reduce_network
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
@@ -50,7 +50,7 @@ class LiveNetwork:
         self._reductions: ForeseenCache[tuple[Circuit, bytes], Reduction] = ForeseenCache()
         self._unsourced: ForeseenCache[Circuit, Circuit] = ForeseenCache()
         self.substation_on = True
-        """Whether the ideal sources are connected; `plant.dynamics.switching` disconnects them."""
+        """Whether the ideal sources are connected; `gridpeers.plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self._noted: Complex = circuit.V_branch.astype(complex)

@@ -1,7 +1,7 @@
 r"""The currents that load branches draw, and their tangent.
 
 A branch has a constant power S and a constant current I_0, :math:`I = (S / V)^* + I_0 V / |V|`; or, for loads of
-feeders that come from other programs, the law of `plant.equipment.imported_equipment.LoadPart`.
+feeders that come from other programs, the law of `gridpeers.plant.equipment.imported_equipment.LoadPart`.
 
 References
 ----------
@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.limited_load import COLUMNS, limited_currents, limited_tangents
+from gridpeers.plant.dynamics.kernel.limited_load import COLUMNS, limited_currents, limited_tangents
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -32,7 +32,7 @@ class LoadLaw:
     limited_at: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Branches with a `LoadPart`'s law; their S and I0 are 0."""
     law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))
-    """Their rows of `plant.dynamics.kernel.limited_load.COLUMNS`."""
+    """Their rows of `gridpeers.plant.dynamics.kernel.limited_load.COLUMNS`."""
 
     def __add__(self, others: LoadLaw) -> LoadLaw:
         """Return the law of these branches and then of the others."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics.kernel.arithmetic import A120
-from plant.dynamics.reduction.reduced import Complex
+from gridpeers.plant.dynamics.kernel.arithmetic import A120
+from gridpeers.plant.dynamics.reduction.reduced import Complex
 
 PHASES = np.array([1.0, A120.conjugate(), A120])
 """Balanced set of phasors, phase A at 0."""

@@ -7,21 +7,21 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics import switching
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import NoSolutionError
-from plant.dynamics.inverters import Inverter, Inverters
-from plant.dynamics.kernel.controller_pass import READING, Units
-from plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
-from plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
-from plant.dynamics.live_network import TOLERANCE, LiveNetwork
-from plant.dynamics.phasors import PHASES
-from plant.dynamics.reduction.island_parts import is_large
-from plant.dynamics.reduction.reduced import Complex, Real
-from plant.dynamics.start.at_rest import set_equilibrium
-from plant.dynamics.start.operating_point import OperatingPoint, equilibrium
-from plant.dynamics.unsettled_island import unsettled_island
-from plant.plant_config import Method
+from gridpeers.plant.dynamics import switching
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.error import NoSolutionError
+from gridpeers.plant.dynamics.inverters import Inverter, Inverters
+from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
+from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
+from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
+from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork
+from gridpeers.plant.dynamics.phasors import PHASES
+from gridpeers.plant.dynamics.reduction.island_parts import is_large
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
+from gridpeers.plant.dynamics.start.at_rest import set_equilibrium
+from gridpeers.plant.dynamics.start.operating_point import OperatingPoint, equilibrium
+from gridpeers.plant.dynamics.unsettled_island import unsettled_island
+from gridpeers.plant.plant_config import Method
 
 MOST_RENEWALS = 20
 """Most tangents of one network solution, while its limited currents shrink; two or three are enough."""
@@ -101,7 +101,7 @@ class Dynamics:
         return point
 
     def connect(self, circuit: Circuit) -> None:
-        """Continue with another network; see `plant.dynamics.switching.connect`."""
+        """Continue with another network; see `gridpeers.plant.dynamics.switching.connect`."""
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
@@ -109,11 +109,11 @@ class Dynamics:
         self.switch_inverters((i,), on)
 
     def switch_inverters(self, which: Sequence[int], on: bool) -> None:
-        """Connect or disconnect inverters, all at once; see `plant.dynamics.switching.switch_inverters`."""
+        """Connect or disconnect inverters, all at once; see `gridpeers.plant.dynamics.switching.switch_inverters`."""
         self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
-        """Disconnect all sources of these islands; see `plant.dynamics.switching.deenergise`."""
+        """Disconnect all sources of these islands; see `gridpeers.plant.dynamics.switching.deenergise`."""
         self._trips += switching.deenergise(self.inverters, self.network, islands, step)
 
     def take_trips(self) -> list[switching.Trip]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from plant.dynamics.kernel.controller_pass import Units
-from plant.dynamics.kernel.current_limit import MAX_LIMITING, limit_currents
-from plant.dynamics.kernel.solve import solve_network
-from plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.controller_pass import Units
+from gridpeers.plant.dynamics.kernel.current_limit import MAX_LIMITING, limit_currents
+from gridpeers.plant.dynamics.kernel.solve import solve_network
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
 
 
 def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:

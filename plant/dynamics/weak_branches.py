@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.load_law import LoadLaw
 
 
 def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: NDArray[np.float64]) -> dict[int, float]:

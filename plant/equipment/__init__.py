@@ -1,6 +1,6 @@
 """A feeder's equipment: rows of its tables, parameters of its inverters, and the nodes that they connect."""
 
-from plant.equipment.equipment import (
+from gridpeers.plant.equipment.equipment import (
     F_NOM,
     NODES,
     PHASES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
+from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
 
 Node = tuple[str, str]
 """A bus and one of its phases."""
@@ -127,7 +127,7 @@ def buses_without_ground(
 
     Examples
     --------
-    >>> from plant.tables import read_feeder
+    >>> from gridpeers.plant.tables import read_feeder
     >>> feeder = read_feeder("microgrid123")
     >>> buses_without_ground(feeder.transformers, feeder.lines, feeder.switches)
     frozenset({'610'})

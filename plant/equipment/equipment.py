@@ -1,4 +1,4 @@
-"""The equipment of a feeder: frozen rows that `plant.tables` reads and `plant.network` uses."""
+"""The equipment of a feeder: frozen rows that `gridpeers.plant.tables` reads and `gridpeers.plant.network` uses."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")
@@ -226,7 +226,7 @@ class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Feeder(msgspec.Struct, frozen=True, kw_only=True):
-    """All tables of a feeder with one load set. `plant.tables.read_feeder` has checked their consistency."""
+    """All tables of a feeder with one load set. `gridpeers.plant.tables.read_feeder` has checked their consistency."""
 
     name: str
     """Name of the folder."""
@@ -271,7 +271,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
 
         Examples
         --------
-        >>> from plant.tables import read_feeder
+        >>> from gridpeers.plant.tables import read_feeder
         >>> feeder = read_feeder("microgrid123")
         >>> feeder.parameters_of(feeder.inverters[0], GfmParameters(P_max=1.2), GflParameters()).P_max
         1.2

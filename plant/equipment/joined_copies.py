@@ -8,9 +8,9 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment import Feeder, Line, Switch
-from plant.equipment.imported_equipment import LinearElement
-from wire.bounds import MOST_INVERTERS
+from gridpeers.plant.equipment import Feeder, Line, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement
+from gridpeers.wire.bounds import MOST_INVERTERS
 
 TIE_LENGTH = 0.3
 """Length (km) of the line of a tie."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from plant.equipment.equipment import Feeder
-from plant.equipment.named_loads import FACTOR, load_name, named_loads
-from wire.messages import LoadSetting
-from wire.schema.plausible import Plausible
+from gridpeers.plant.equipment.equipment import Feeder
+from gridpeers.plant.equipment.named_loads import FACTOR, load_name, named_loads
+from gridpeers.wire.messages import LoadSetting
+from gridpeers.wire.schema.plausible import Plausible
 
 MOST = 10.0
 """Greatest power of one load, as a multiple of all loads of the feeder, or of its inverters' ratings if more."""

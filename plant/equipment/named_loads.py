@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from plant.equipment.equipment import Feeder
-from wire.schema.plausible import Plausible
-from wire.schema.suggestion import first_of, suggestion
+from gridpeers.plant.equipment.equipment import Feeder
+from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.suggestion import first_of, suggestion
 
 FACTOR = Plausible("a factor on a load", 0.0, 10.0)
 """Factors on the power that a load has in the feeder's tables."""
@@ -33,7 +33,7 @@ def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
 
     Examples
     --------
-    >>> from plant.tables import read_feeder
+    >>> from gridpeers.plant.tables import read_feeder
     >>> named_loads(read_feeder("microgrid123"))["48"]
     NamedLoad(name='48', bus='48', S=(210000+150000j))
     """

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from plant.equipment.equipment import PHASES, Bus, Feeder, Switch
-from plant.equipment.imported_equipment import LinearElement, LoadPart
-from wire.schema.suggestion import first_of
+from gridpeers.plant.equipment.equipment import PHASES, Bus, Feeder, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
+from gridpeers.wire.schema.suggestion import first_of
 
 EARTH = "earth"
 """In place of a neutral: the inverter returns through earth, though its bus has a neutral."""

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
 
 import msgspec
 
-from plant.equipment.inverter_parameters import REGFM_A1, REGFM_A1_VFLAG0, GflParameters, GfmParameters
-from wire.schema.table_schema import fields_of
+from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, REGFM_A1_VFLAG0, GflParameters, GfmParameters
+from gridpeers.wire.schema.table_schema import fields_of
 
 Kind = Literal["GFM", "GFL"]
 """Grid-forming or grid-following."""

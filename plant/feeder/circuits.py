@@ -6,12 +6,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from plant.dynamics import Circuit, PlantError
-from plant.dynamics.foreseen_cache import ForeseenCache
-from plant.equipment.equipment import PHASES
-from plant.network import Network
-from plant.network.loads import LoadBranches
-from plant.network.merging import Merge
+from gridpeers.plant.dynamics import Circuit, PlantError
+from gridpeers.plant.dynamics.foreseen_cache import ForeseenCache
+from gridpeers.plant.equipment.equipment import PHASES
+from gridpeers.plant.network import Network
+from gridpeers.plant.network.loads import LoadBranches
+from gridpeers.plant.network.merging import Merge
 
 ROUNDING = 1e-14
 """Size of a sum of admittances relative to its terms below which the sum is 0 but for rounding."""

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from plant.feeder.switchboard import Switchboard
-from plant.feeder.synchronism import Difference, Synchronism
-from plant.feeder.trips import Closing
-from wire.messages import PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.feeder.synchronism import Difference, Synchronism
+from gridpeers.plant.feeder.trips import Closing
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 
 class _Pending(NamedTuple):

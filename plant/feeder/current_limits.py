@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 LIMITS = "limits its phase currents"
 """Words of these events alone; their kind, `limit`, is that of set-points, available power and loads, too."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 
 def hunting_event(name: str) -> PlantEvent:

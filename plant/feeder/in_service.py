@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics import Dynamics
-from plant.feeder.protection import ATTEMPTS, Recovery, Relays
-from plant.plant_config import Protection
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays
+from gridpeers.plant.plant_config import Protection
 
 Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]
 """Takes an event: step, kind, subject, text."""

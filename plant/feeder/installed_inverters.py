@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from plant.dynamics import Inverter
-from plant.network import Network
-from plant.plant_config import PlantSettings
+from gridpeers.plant.dynamics import Inverter
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
 
 
 def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inverter, ...]:

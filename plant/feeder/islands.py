@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.switch_state import SwitchState
-from plant.network import Network
-from wire.counted import counted
-from wire.messages import PlantEvent
+from gridpeers.plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.network import Network
+from gridpeers.wire.counted import counted
+from gridpeers.wire.messages import PlantEvent
 
 GRID = "grid"
 """Name of the island that the substation feeds."""

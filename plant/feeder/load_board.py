@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator
 
-from plant.equipment.load_powers import LoadPowers
-from plant.equipment.named_loads import with_powers
-from plant.network import Network
-from plant.plant_config import LoadEvent
-from wire.messages import LoadSetting, PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.equipment.load_powers import LoadPowers
+from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import LoadEvent
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 
 class LoadBoard:

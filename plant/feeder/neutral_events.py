@@ -6,11 +6,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from plant.dynamics import Dynamics
-from plant.equipment.imported_equipment import is_behind
-from plant.network import Network
-from wire.counted import counted
-from wire.messages import PlantEvent
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.equipment.imported_equipment import is_behind
+from gridpeers.plant.network import Network
+from gridpeers.wire.counted import counted
+from gridpeers.wire.messages import PlantEvent
 
 TOUCHABLE = 50.0
 """Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""

@@ -9,28 +9,28 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from plant.dynamics import Circuit, Dynamics, PlantError
-from plant.dynamics.error import NoPowerFlowError
-from plant.dynamics.foreseen_cache import ROOM
-from plant.dynamics.start.at_rest import require_within_limits
-from plant.feeder.circuits import Circuits
-from plant.feeder.closings import Closings
-from plant.feeder.current_limits import CurrentLimits
-from plant.feeder.hunting import hunting_event
-from plant.feeder.in_service import InService
-from plant.feeder.installed_inverters import installed_inverters
-from plant.feeder.islands import Islands
-from plant.feeder.load_board import LoadBoard
-from plant.feeder.load_limits import LoadLimits
-from plant.feeder.neutral_events import NeutralEvents
-from plant.feeder.set_points import SetPointLimits
-from plant.feeder.switchboard import Switchboard
-from plant.feeder.synchronism import Difference, Synchronism
-from plant.feeder.trips import trip_event
-from plant.network import Network
-from plant.plant_config import PlantSettings, PowerLimit
-from wire.messages import OFF, LoadSetting, PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
+from gridpeers.plant.dynamics.error import NoPowerFlowError
+from gridpeers.plant.dynamics.foreseen_cache import ROOM
+from gridpeers.plant.dynamics.start.at_rest import require_within_limits
+from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.feeder.closings import Closings
+from gridpeers.plant.feeder.current_limits import CurrentLimits
+from gridpeers.plant.feeder.hunting import hunting_event
+from gridpeers.plant.feeder.in_service import InService
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.feeder.islands import Islands
+from gridpeers.plant.feeder.load_board import LoadBoard
+from gridpeers.plant.feeder.load_limits import LoadLimits
+from gridpeers.plant.feeder.neutral_events import NeutralEvents
+from gridpeers.plant.feeder.set_points import SetPointLimits
+from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.feeder.synchronism import Difference, Synchronism
+from gridpeers.plant.feeder.trips import trip_event
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 
 class Reading(NamedTuple):

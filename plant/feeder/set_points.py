@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 SPELL = 1.0
 """Time (s) without a limited set-point after which a spell is over."""

@@ -6,11 +6,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from plant.equipment import Switch
-from plant.network import Network
-from plant.plant_config import SwitchEvent
-from wire.messages import PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.equipment import Switch
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import SwitchEvent
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 _PAST = {"open": "opened", "close": "closed"}
 

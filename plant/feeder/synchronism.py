@@ -14,10 +14,10 @@ from math import degrees
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics import Dynamics
-from plant.network import Network
-from plant.plant_config import SyncCheck
-from plant.trip_settings import F_BASE
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import SyncCheck
+from gridpeers.plant.trip_settings import F_BASE
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
 """Rating (VA) up to which these limits hold: frequency (Hz), voltage (pu), angle (deg)."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from plant.dynamics import PlantError, Trip
-from plant.network import Network
-from plant.trip_settings import SUBSTATION
-from wire.messages import PlantEvent
+from gridpeers.plant.dynamics import PlantError, Trip
+from gridpeers.plant.network import Network
+from gridpeers.plant.trip_settings import SUBSTATION
+from gridpeers.wire.messages import PlantEvent
 
 RECENT = 1.0
 """Time (s) after a closing out of phase within which a collapse counts as its effect."""

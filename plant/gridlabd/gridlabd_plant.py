@@ -1,4 +1,4 @@
-"""GridLAB-D as a plant: the interface of `plant.feeder.Plant` on GridLAB-D's own network and inverters."""
+"""GridLAB-D as a plant: the interface of `gridpeers.plant.feeder.Plant` on GridLAB-D's own network and inverters."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment.inverter_parameters import GflParameters
-from plant.feeder import Plant
-from plant.feeder.plant import Reading
-from plant.feeder.protection import Relays
-from plant.feeder.set_points import SetPointLimits
-from plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
-from plant.gridlabd.model.glm import write_glm
-from plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
-from plant.plant_config import PlantSettings
-from wire.messages import LoadSetting, PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.equipment.inverter_parameters import GflParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.plant import Reading
+from gridpeers.plant.feeder.protection import Relays
+from gridpeers.plant.feeder.set_points import SetPointLimits
+from gridpeers.plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
+from gridpeers.plant.gridlabd.model.glm import write_glm
+from gridpeers.plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 FEEDERS = Path(__file__).parents[1] / "data"
 
@@ -30,7 +30,7 @@ REST = 0.5
 
 
 class GridlabdPlant:
-    """A plant whose numbers are GridLAB-D's, to be controlled by the same agents (`plant.plant_interface.PlantLike`).
+    """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
 
     Parameters
     ----------

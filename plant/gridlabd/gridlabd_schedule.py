@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from plant.dynamics.switch_state import SwitchState
-from plant.equipment.inverter_parameters import GflParameters
-from plant.equipment.own_parameters import InverterParameters
-from plant.feeder.circuits import Circuits
-from plant.feeder.islands import Islands
-from plant.feeder.switchboard import Switchboard
-from plant.network import Network
-from plant.plant_config import PlantSettings, PowerLimit
-from wire.messages import PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.equipment.inverter_parameters import GflParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.feeder.islands import Islands
+from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 Write = tuple[str, str, Any]
 """A value for GridLAB-D: object, property, value."""

@@ -6,13 +6,13 @@ from contextlib import closing
 
 from msgspec.structs import replace
 
-from plant.equipment import Feeder
-from plant.feeder import Plant
-from plant.gridlabd.gridlabd_plant import GridlabdPlant
-from plant.gridlabd.model.export_glm import write_tables
-from plant.network import Network
-from plant.plant_config import FeederChanges, PlantConfig
-from plant.transient_folder import TransientFolder
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.gridlabd.gridlabd_plant import GridlabdPlant
+from gridpeers.plant.gridlabd.model.export_glm import write_tables
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import FeederChanges, PlantConfig
+from gridpeers.plant.transient_folder import TransientFolder
 
 
 def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:

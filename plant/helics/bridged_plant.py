@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import msgspec
 
-from plant.helics import topics
-from plant.helics.federate import HelicsError, HelicsFederate
-from plant.helics.topics import SENSORS, Value, number
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant, ReadingLike
-from wire.messages import LoadSetting, PlantEvent
-from wire.timing.clock import time_of
+from gridpeers.plant.helics import topics
+from gridpeers.plant.helics.federate import HelicsError, HelicsFederate
+from gridpeers.plant.helics.topics import SENSORS, Value, number
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant, ReadingLike
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.timing.clock import time_of
 
 _COLUMNS = len(SENSORS) + len(topics.HELD)
 

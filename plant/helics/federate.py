@@ -8,10 +8,10 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from plant.helics.helics_settings import HelicsSettings, endpoint
-from plant.helics.topics import Topic, Value
-from plant.request_process import ProcessEndedError, RequestProcess
-from wire.packages import damaged
+from gridpeers.plant.helics.helics_settings import HelicsSettings, endpoint
+from gridpeers.plant.helics.topics import Topic, Value
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
+from gridpeers.wire.packages import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
 

@@ -1,9 +1,9 @@
 """One HELICS federate, and its broker if asked for: the only file that knows the package `helics`.
 
 It is a process of its own, because HELICS writes to the terminal from its own threads, and because a wait inside its
-library cannot be ended from Python: a process can. `plant.helics.federate` starts it as a script, so it imports
-nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its answer;
-what HELICS prints goes to standard error.
+library cannot be ended from Python: a process can. `gridpeers.plant.helics.federate` starts it as a script, so it
+imports nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its
+answer; what HELICS prints goes to standard error.
 
     {"do": "join", "name", "host", "port", "federates", "wait"}
     {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}

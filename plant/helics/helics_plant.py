@@ -8,17 +8,17 @@ from collections.abc import Mapping
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.feeder.plant import Reading
-from plant.helics import topics
-from plant.helics.federate import HelicsError, HelicsFederate
-from plant.helics.topics import ACT, Value, number
-from plant.plant_config import PlantConfig
-from wire.bounds import NAME
-from wire.foreign_bytes import decode_foreign
-from wire.messages import LoadSetting, PlantEvent
-from wire.schema.suggestion import first_of
-from wire.timing.clock import time_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder.plant import Reading
+from gridpeers.plant.helics import topics
+from gridpeers.plant.helics.federate import HelicsError, HelicsFederate
+from gridpeers.plant.helics.topics import ACT, Value, number
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.wire.bounds import NAME
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.timing.clock import time_of
 
 SHOWN = 4
 """Topics that an error names."""

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import msgspec
 
-from wire.bounds import NAME
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.table_schema import Example
+from gridpeers.wire.bounds import NAME
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Example
 
 BROKER = "tcp://127.0.0.1:23404"
 """Address of a HELICS broker that was started without options on this machine."""

@@ -12,12 +12,12 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from plant.equipment import NODES, PHASES, Feeder
-from plant.equipment.connectivity import Connectivity, Node, by_bus
-from plant.equipment.imported_equipment import BEHIND, LoadPart
-from plant.tables.feeder_columns import PART_CURRENT, power_of
-from plant.tables.read import FeederError
-from wire.schema.suggestion import first_of
+from gridpeers.plant.equipment import NODES, PHASES, Feeder
+from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus
+from gridpeers.plant.equipment.imported_equipment import BEHIND, LoadPart
+from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.wire.schema.suggestion import first_of
 
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
@@ -72,7 +72,7 @@ def of_script(problem: str, folder: Path, script: str, places: Mapping[str, str]
     Parameters
     ----------
     problem
-        As `plant.tables.read_feeder` has it: "buses.csv row 3: ...".
+        As `gridpeers.plant.tables.read_feeder` has it: "buses.csv row 3: ...".
     folder
         Folder of the tables.
     script
@@ -263,7 +263,7 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
 
 def _report_undetermined(path: Path, feeder: Feeder, problems: list[str], remedy: str) -> None:
     """Add a problem for each bus whose voltage to ground nothing determines: without load it is beyond all bounds."""
-    from plant.network import Network  # a process that only reads loads no compiler of the plant's steps
+    from gridpeers.plant.network import Network  # a process that only reads loads no compiler of the plant's steps
 
     try:
         network = Network(feeder)

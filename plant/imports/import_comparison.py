@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
-from plant.equipment import Feeder
-from plant.equipment.connectivity import Node
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import Node
+from gridpeers.plant.network import Network, solve_power_flow
 
 MATCH = 1e-6
 """Largest difference (pu of nominal voltage) of voltages that count as equal."""

@@ -6,9 +6,9 @@ from collections.abc import Callable, Collection, Mapping
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.equipment.imported_equipment import BEHIND, bus_behind
-from wire.schema.suggestion import first_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.imported_equipment import BEHIND, bus_behind
+from gridpeers.wire.schema.suggestion import first_of
 
 SHOWN = 8
 """How many buses the note names."""

@@ -14,16 +14,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from plant.dynamics.load_law import LoadLaw
-from plant.equipment import PHASES, Feeder, InverterRow, Switch
-from plant.equipment.bus_islands import bus_islands, switch_name
-from plant.equipment.imported_equipment import LoadPart
-from plant.equipment.named_loads import named_loads
-from plant.equipment.neutrals import neutrals_of
-from plant.network.loads import LoadBranches, law_row
-from plant.network.merging import Merge, merge_nodes
-from plant.network.primitives import line_admittance, transformer_admittance
-from wire.schema.suggestion import first_of
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Switch
+from gridpeers.plant.equipment.bus_islands import bus_islands, switch_name
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.equipment.named_loads import named_loads
+from gridpeers.plant.equipment.neutrals import neutrals_of
+from gridpeers.plant.network.loads import LoadBranches, law_row
+from gridpeers.plant.network.merging import Merge, merge_nodes
+from gridpeers.plant.network.primitives import line_admittance, transformer_admittance
+from gridpeers.wire.schema.suggestion import first_of
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""
@@ -44,7 +44,7 @@ class Network:
     Parameters
     ----------
     feeder : Feeder
-        Tables from `plant.tables.read_feeder`.
+        Tables from `gridpeers.plant.tables.read_feeder`.
     line_charging : bool, optional
         Whether to include the lines' shunt capacitance. The published solution of the standard feeder has it.
     spares : iterable of str, optional
@@ -161,7 +161,7 @@ class Network:
         Parameters
         ----------
         weak
-            Branches of `loads`, and the short-circuit powers there (VA): see `plant.dynamics.weak_branches`.
+            Branches of `loads`, and the short-circuit powers there (VA): see `gridpeers.plant.dynamics.weak_branches`.
         """
         pairs = zip(self.feeder.loads, self._first.loads, strict=True)
         names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]

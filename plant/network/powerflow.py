@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
-from plant.dynamics.weak_branches import weak_branches
-from plant.network.loads import LoadBranches
-from plant.network.network import Network
+from gridpeers.plant.dynamics.weak_branches import weak_branches
+from gridpeers.plant.network.loads import LoadBranches
+from gridpeers.plant.network.network import Network
 
 Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
 """Function from the voltages of all nodes (V) to the currents fed into them (A)."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment import Line, LineConfig, Transformer
+from gridpeers.plant.equipment import Line, LineConfig, Transformer
 
 DELTA = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 """Voltages across A-B, B-C, C-A from those of A, B, C."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from wire.codec import encode
-from wire.keys import Keys
-from wire.links import Links
-from wire.messages import PLANT, LinkAcknowledgement, LinkRequest
+from gridpeers.wire.codec import encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.links import Links
+from gridpeers.wire.messages import PLANT, LinkAcknowledgement, LinkRequest
 
 NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
 """Error when a run has no emulated links."""

@@ -11,20 +11,20 @@ from __future__ import annotations
 from functools import partial
 from typing import Literal
 
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant
-from plant.plant_node import STAYS, PlantNode
-from plant.realtime.kept_telemetry import KEPT_BYTES, KEPT_BYTES_RECORDED
-from plant.realtime.link_command_sender import LinkCommandSender
-from plant.realtime.recorder_feed import RecorderFeed
-from plant.realtime.silence_detector import SilenceDetector
-from wire.admission import FASTER
-from wire.links import Links, is_usable
-from wire.messages import AgentStatus, Journal, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
-from wire.node import Route
-from wire.rate_limit import RateLimit
-from wire.timing.timer import Timer
-from wire.traffic import TimedTraffic
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_node import STAYS, PlantNode
+from gridpeers.plant.realtime.kept_telemetry import KEPT_BYTES, KEPT_BYTES_RECORDED
+from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
+from gridpeers.plant.realtime.recorder_feed import RecorderFeed
+from gridpeers.plant.realtime.silence_detector import SilenceDetector
+from gridpeers.wire.admission import FASTER
+from gridpeers.wire.links import Links, is_usable
+from gridpeers.wire.messages import AgentStatus, Journal, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
+from gridpeers.wire.node import Route
+from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.traffic import TimedTraffic
 
 Phase = Literal["gathering", "running", "closing", "over"]
 

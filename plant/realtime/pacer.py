@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from wire.messages import Pacing
+from gridpeers.wire.messages import Pacing
 
 TOLERATED = 0.01
 """Part of the steps that may be more than one control period late before it is said that pace is not kept."""

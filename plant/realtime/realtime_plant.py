@@ -13,20 +13,20 @@ from __future__ import annotations
 
 from math import inf
 
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant
-from plant.plant_node import CLOSING
-from plant.realtime.live_plant_node import AGAIN, LivePlantNode
-from plant.realtime.pacer import RealTimePacer
-from plant.realtime.run_commands import RunCommands
-from plant.telemetry_reporter import measurement_of
-from wire.codec import RejectedError, encode
-from wire.keys import READING
-from wire.links import REPORT_TICKS, Links
-from wire.messages import PLANT, Command, PlantEvent, Waiting
-from wire.node import ANYBODY, CLOCK_ALONE, Route
-from wire.rate_limit import RateLimit
-from wire.timing.timer import Timer
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.plant_node import CLOSING
+from gridpeers.plant.realtime.live_plant_node import AGAIN, LivePlantNode
+from gridpeers.plant.realtime.pacer import RealTimePacer
+from gridpeers.plant.realtime.run_commands import RunCommands
+from gridpeers.plant.telemetry_reporter import measurement_of
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.keys import READING
+from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.messages import PLANT, Command, PlantEvent, Waiting
+from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
+from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.timing.timer import Timer
 
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from plant.realtime.kept_telemetry import KEPT_BYTES, KeptTelemetry
+from gridpeers.plant.realtime.kept_telemetry import KEPT_BYTES, KeptTelemetry
 
 
 class RecorderFeed:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from wire.messages import PLANT, Answer, Command
-from wire.printable import printable
-from wire.timing.clock import time_of
+from gridpeers.wire.messages import PLANT, Answer, Command
+from gridpeers.wire.printable import printable
+from gridpeers.wire.timing.clock import time_of
 
 if TYPE_CHECKING:
-    from plant.realtime.realtime_plant import RealtimePlant
+    from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 
 
 MOST_SWITCHES = 500

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from wire.messages import AgentStatus
+from gridpeers.wire.messages import AgentStatus
 
 SETTLING = 0.1
 """Time (s, wall) for which a neighbour must be reported as not heard before that is an event: meanwhile the plant

@@ -6,10 +6,10 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
-from plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
-from plant.tables.buses import BusTable, is_imported
-from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.feeder_columns import (
+from gridpeers.plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
+from gridpeers.plant.tables.buses import BusTable, is_imported
+from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.feeder_columns import (
     MUTUAL,
     MUTUAL_B,
     RATED_CURRENT,
@@ -24,7 +24,7 @@ from plant.tables.feeder_columns import (
     TransformerColumns,
     power_of,
 )
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:

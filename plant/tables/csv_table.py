@@ -10,12 +10,12 @@ from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from plant.equipment import NODES, PHASES
-from wire.schema.plausible import Plausible
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import Field, Label, fields_of, named
-from wire.schema.type_words import shown
-from wire.text_file import TextFileError, read_table_text
+from gridpeers.plant.equipment import NODES, PHASES
+from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import Field, Label, fields_of, named
+from gridpeers.wire.schema.type_words import shown
+from gridpeers.wire.text_file import TextFileError, read_table_text
 
 C = TypeVar("C", bound=msgspec.Struct)
 
@@ -27,7 +27,7 @@ class PhaseLetters:
     stand_in: str = ""
     """Phases in place of wrong ones; no later check asks anything of no phase."""
     others: bool = False
-    """Whether letters of further nodes may stand behind them (`plant.equipment.NODES`)."""
+    """Whether letters of further nodes may stand behind them (`gridpeers.plant.equipment.NODES`)."""
 
 
 class CsvRow(Generic[C]):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from plant.equipment import Feeder, InverterRow
-from plant.equipment.own_parameters import OwnParameters
-from plant.plant_config import FeederChanges
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.plant_config import FeederChanges
 
 
 def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
@@ -25,7 +25,7 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
 
     Examples
     --------
-    >>> from plant.tables import read_feeder
+    >>> from gridpeers.plant.tables import read_feeder
     >>> feeder = read_feeder("microgrid123")
     >>> slower = changed(feeder, FeederChanges(f_nom=50.0, m_p_factor=2.0))
     >>> slower.f_nom, slower.inverters[0].m_p, round(slower.transformers[0].z.imag / feeder.transformers[0].z.imag, 6)

@@ -6,11 +6,11 @@ from cmath import isfinite
 from pathlib import Path
 from typing import Any
 
-from plant.equipment import Bus
-from plant.equipment.imported_equipment import LinearElement, LoadPart
-from plant.tables.buses import BusTable
-from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.feeder_columns import PART_CURRENT, ElementColumns, LoadPartColumns, power_of
+from gridpeers.plant.equipment import Bus
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
+from gridpeers.plant.tables.buses import BusTable
+from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.feeder_columns import PART_CURRENT, ElementColumns, LoadPartColumns, power_of
 
 Matrix = tuple[tuple[complex, ...], ...]
 

@@ -6,9 +6,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from plant.tables.feeder_columns import Manifest
-from wire.schema.table_reading import read_table
-from wire.text_file import TextFileError, text_of
+from gridpeers.plant.tables.feeder_columns import Manifest
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.text_file import TextFileError, text_of
 
 MANIFEST = "feeder.toml"
 """Name of the file."""

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign, with_published
-from plant.tables.csv_table import CsvTable
-from plant.tables.feeder_columns import ParameterColumns
-from wire.schema.relations import contradictions
-from wire.schema.suggestion import suggestion
-from wire.schema.table_reading import read_table
-from wire.schema.table_schema import fields_of
+from gridpeers.plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign, with_published
+from gridpeers.plant.tables.csv_table import CsvTable
+from gridpeers.plant.tables.feeder_columns import ParameterColumns
+from gridpeers.wire.schema.relations import contradictions
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.schema.table_schema import fields_of
 
 FILE = "inverter_parameters.csv"
 """Name of the file; a feeder without it has no such sets."""
@@ -21,7 +21,7 @@ FILE = "inverter_parameters.csv"
 def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParameters] | None:
     """Read inverter_parameters.csv, or return None if it is unreadable.
 
-    Which inverter has a set decides whether it can have its parameters: `plant.tables.shunts` asks.
+    Which inverter has a set decides whether it can have its parameters: `gridpeers.plant.tables.shunts` asks.
     """
     values: dict[str, dict[str, float | bool | str]] = {}
     table = CsvTable(folder, FILE, ParameterColumns, problems)

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from plant.equipment import Feeder
-from plant.equipment.connectivity import buses_without_ground
-from plant.equipment.neutrals import neutrals_by_bus
-from plant.tables.branches import read_line_configs, read_lines, read_regulators, read_switches, read_transformers
-from plant.tables.buses import BusTable, report_unconnected
-from plant.tables.csv_table import required_columns
-from plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
-from plant.tables.imported import read_elements, read_load_parts
-from plant.tables.manifest import MANIFEST, read_f_nom
-from plant.tables.parameter_sets import read_parameter_sets
-from plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
-from wire.schema.suggestion import suggestion
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import buses_without_ground
+from gridpeers.plant.equipment.neutrals import neutrals_by_bus
+from gridpeers.plant.tables.branches import (
+    read_line_configs,
+    read_lines,
+    read_regulators,
+    read_switches,
+    read_transformers,
+)
+from gridpeers.plant.tables.buses import BusTable, report_unconnected
+from gridpeers.plant.tables.csv_table import required_columns
+from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
+from gridpeers.plant.tables.imported import read_elements, read_load_parts
+from gridpeers.plant.tables.manifest import MANIFEST, read_f_nom
+from gridpeers.plant.tables.parameter_sets import read_parameter_sets
+from gridpeers.plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
+from gridpeers.wire.schema.suggestion import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""

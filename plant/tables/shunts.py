@@ -9,13 +9,13 @@ from math import radians
 from pathlib import Path
 from typing import Any
 
-from plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
-from plant.equipment.connectivity import buses_without_ground
-from plant.equipment.neutrals import neutral_for, neutrals_of
-from plant.equipment.own_parameters import OwnParameters, foreign, with_published
-from plant.tables.buses import GROUND_NEEDED, BusTable
-from plant.tables.csv_table import CsvRow, CsvTable
-from plant.tables.feeder_columns import (
+from gridpeers.plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
+from gridpeers.plant.equipment.connectivity import buses_without_ground
+from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.plant.equipment.own_parameters import OwnParameters, foreign, with_published
+from gridpeers.plant.tables.buses import GROUND_NEEDED, BusTable
+from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.feeder_columns import (
     BRANCH_CURRENT,
     RATED_CURRENT,
     TIMES_THE_LOAD,
@@ -25,11 +25,11 @@ from plant.tables.feeder_columns import (
     SourceColumns,
     power_of,
 )
-from wire.bounds import MOST_INVERTERS
-from wire.keys import check_name
-from wire.messages import OFF, PLANT
-from wire.schema.plausible import Plausible
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.keys import check_name
+from gridpeers.wire.messages import OFF, PLANT
+from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.suggestion import suggestion
 
 TAKEN = {
     PLANT: "the plant sends under it",

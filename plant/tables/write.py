@@ -10,12 +10,12 @@ from typing import Any
 
 import msgspec
 
-from plant.equipment import Feeder, LineConfig
-from plant.equipment.neutrals import EARTH, neutrals_of
-from plant.equipment.own_parameters import OwnParameters
-from plant.tables import feeder_columns as columns
-from plant.tables.parameter_sets import FILE
-from wire.schema.table_schema import fields_of
+from gridpeers.plant.equipment import Feeder, LineConfig
+from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
+from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.tables import feeder_columns as columns
+from gridpeers.plant.tables.parameter_sets import FILE
+from gridpeers.wire.schema.table_schema import fields_of
 
 TAP_STEP = 0.00625
 """Step (pu) in which the ratios of regulators are written."""

@@ -7,9 +7,9 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from plant.transient_folder import TransientFolder
-from scenarios.chaos.chaos_folder import ChaosFolder, again
-from scenarios.chaos.chaos_run import (
+from gridpeers.plant.transient_folder import TransientFolder
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, again
+from gridpeers.scenarios.chaos.chaos_run import (
     ASKED,
     REPEATS,
     SAME_IN_PROCESSES,
@@ -17,16 +17,16 @@ from scenarios.chaos.chaos_run import (
     compared,
     run_schedule,
 )
-from scenarios.chaos.disturbance import Schedule, counted_kinds
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
-from scenarios.chaos.schedule_report import effective, schedule_lines
-from scenarios.chaos.schedule_search import BATCH, drawn
-from scenarios.checks.check_registry import RETURNS, chosen_checks
-from scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
-from scenarios.run_request import Driver
-from scenarios.sweep.workers import on_workers
-from wire.counted import counted
+from gridpeers.scenarios.chaos.disturbance import Schedule, counted_kinds
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
+from gridpeers.scenarios.chaos.schedule_report import effective, schedule_lines
+from gridpeers.scenarios.chaos.schedule_search import BATCH, drawn
+from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
+from gridpeers.scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
+from gridpeers.scenarios.run_request import Driver
+from gridpeers.scenarios.sweep.workers import on_workers
+from gridpeers.wire.counted import counted
 
 REPEATED = 20
 """Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
-from wire.plugins.plugin import table_of
+from gridpeers.scenarios.checks.check_registry import ALWAYS, RETURNS, check_name
+from gridpeers.wire.plugins.plugin import table_of
 
 WITHIN_S = 4.0
 """Time (s) after the last change within which a run is to be restored. Set-points come back from their bounds at the

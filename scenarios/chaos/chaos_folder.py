@@ -12,17 +12,17 @@ from types import MappingProxyType
 
 import msgspec
 
-from scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.numbered_run import seed_of
-from scenarios.chaos.row_problem import row_problem
-from scenarios.chaos.schedule_report import schedule_lines
-from scenarios.results.run_files import FolderError, shown, write_whole
-from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
-from scenarios.run_request import Driver
-from scenarios.schema.relative_folders import with_relative_folders
-from scenarios.schema.scenario_writing import to_toml
-from wire.driver.command_line import command_line
+from gridpeers.scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.chaos.numbered_run import seed_of
+from gridpeers.scenarios.chaos.row_problem import row_problem
+from gridpeers.scenarios.chaos.schedule_report import schedule_lines
+from gridpeers.scenarios.results.run_files import FolderError, shown, write_whole
+from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
+from gridpeers.scenarios.run_request import Driver
+from gridpeers.scenarios.schema.relative_folders import with_relative_folders
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.wire.driver.command_line import command_line
 
 SCENARIO, SEED = "scenario.toml", "seed.txt"
 """Files from which a campaign goes on, beside its journal."""

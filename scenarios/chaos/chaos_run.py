@@ -10,24 +10,24 @@ from typing import NamedTuple
 
 import msgspec
 
-from scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
-from scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
-from scenarios.chaos.disturbance import Schedule
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
-from scenarios.checks.check_registry import LAW_FAILED
-from scenarios.checks.check_verdict import CheckVerdict
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judging import judge_case
-from scenarios.results.event_windows import CaseRecord
-from scenarios.results.record import Recorded
-from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
-from scenarios.run_case import run_case
-from scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
-from scenarios.schema.scenario_model import ScenarioModel
-from scenarios.sweep.sweep_case import plant_at_start
-from wire.messages import PlantEvent
-from wire.printable import utf8
+from gridpeers.scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
+from gridpeers.scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
+from gridpeers.scenarios.chaos.disturbance import Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
+from gridpeers.scenarios.checks.check_registry import LAW_FAILED
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.judging import judge_case
+from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.run_case import run_case
+from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.sweep.sweep_case import plant_at_start
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.printable import utf8
 
 ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "ends",

@@ -7,14 +7,14 @@ from typing import NamedTuple
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.equipment.bus_islands import bus_islands
-from scenarios.chaos.chaos_checks import RESTORED
-from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
-from scenarios.results.switch_positions import closed_switches
-from scenarios.results.tripped_inverters import tripped_by
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import bus_islands
+from gridpeers.scenarios.chaos.chaos_checks import RESTORED
+from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
+from gridpeers.scenarios.results.switch_positions import closed_switches
+from gridpeers.scenarios.results.tripped_inverters import tripped_by
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 PERIODS = 2
 """Control periods after a change within which trips are a collapse. The first measurement that shows the change is

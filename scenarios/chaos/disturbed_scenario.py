@@ -11,24 +11,24 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.partition import Partition
-from plant.equipment import Feeder
-from plant.tables import read_feeder
-from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
-from scenarios.chaos.disturbance import Disturbance, Schedule
-from scenarios.chaos.feasible_supply import FeasibleSupply
-from scenarios.schema.checks import check_switches
-from scenarios.schema.load_changes import check_loads
-from scenarios.schema.loading import check_tables, read_tables
-from scenarios.schema.netem_tables import check_netem, netem_of
-from scenarios.schema.participants import check_agentless, check_schedule
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.schema.time_checks import check_times
-from wire.timing.clock import rounded_up
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
+from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
+from gridpeers.scenarios.chaos.feasible_supply import FeasibleSupply
+from gridpeers.scenarios.schema.checks import check_switches
+from gridpeers.scenarios.schema.load_changes import check_loads
+from gridpeers.scenarios.schema.loading import check_tables, read_tables
+from gridpeers.scenarios.schema.netem_tables import check_netem, netem_of
+from gridpeers.scenarios.schema.participants import check_agentless, check_schedule
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.schema.time_checks import check_times
+from gridpeers.wire.timing.clock import rounded_up
 
 _LISTS = ("open", "close", "leave", "join")
 """Keys of an event that are lists of names."""

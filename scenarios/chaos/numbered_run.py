@@ -6,12 +6,12 @@ from pathlib import Path
 
 import msgspec
 
-from scenarios.chaos.chaos_run import REPEATS, ChaosRow, run_schedule
-from scenarios.chaos.disturbance import Schedule
-from scenarios.chaos.disturbed_scenario import base_of
-from scenarios.chaos.machine_error import MachineError
-from scenarios.chaos.schedule_search import shrunk
-from scenarios.run_request import Driver
+from gridpeers.scenarios.chaos.chaos_run import REPEATS, ChaosRow, run_schedule
+from gridpeers.scenarios.chaos.disturbance import Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import base_of
+from gridpeers.scenarios.chaos.machine_error import MachineError
+from gridpeers.scenarios.chaos.schedule_search import shrunk
+from gridpeers.scenarios.run_request import Driver
 
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""

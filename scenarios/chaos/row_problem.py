@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 
-from scenarios.chaos.chaos_run import ChaosRow
-from scenarios.chaos.disturbance import counted_kinds
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.schedule_report import schedule_lines
-from wire.printable import printable
+from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+from gridpeers.scenarios.chaos.disturbance import counted_kinds
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.chaos.schedule_report import schedule_lines
+from gridpeers.wire.printable import printable
 
 _CHECK = re.compile(r"\w{1,200}")
 """Form of a check's name: that of a class or of a key, and a file of `failures` is named by it."""

@@ -6,10 +6,10 @@ before. A scenario may say that, and nothing happens then.
 
 from __future__ import annotations
 
-from scenarios.chaos.disturbance import Disturbance, Schedule
-from scenarios.chaos.disturbed_scenario import ChaosBase, merged_events
-from scenarios.schema.absences import AgentEvent, why_away
-from scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase, merged_events
+from gridpeers.scenarios.schema.absences import AgentEvent, why_away
+from gridpeers.scenarios.schema.participants import inverters_of
 
 
 def schedule_lines(base: ChaosBase, schedule: Schedule) -> list[str]:

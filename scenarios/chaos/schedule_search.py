@@ -9,9 +9,9 @@ import hypothesis
 import msgspec
 from hypothesis import HealthCheck, Phase
 
-from scenarios.chaos.disturbance import Schedule
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.chaos.schedule_strategy import schedules
+from gridpeers.scenarios.chaos.disturbance import Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.chaos.schedule_strategy import schedules
 
 BATCH = 25
 """Schedules that are drawn together, from a seed of their own: so that the first runs of a seed are the same however

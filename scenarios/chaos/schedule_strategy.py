@@ -13,10 +13,10 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from plant.equipment.named_loads import named_loads
-from scenarios.chaos.disturbance import Disturbance, Schedule
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.schema.participants import with_agent
+from gridpeers.plant.equipment.named_loads import named_loads
+from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.schema.participants import with_agent
 
 MOST_DISTURBANCES = 10
 """Most disturbances of a schedule, of which some may not be possible together."""

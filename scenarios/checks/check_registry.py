@@ -22,8 +22,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from wire.plugins.plugin import KEYS, Plugin, callable_objection, plugin_of, table_of
-from wire.plugins.registry import Registry
+from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, plugin_of, table_of
+from gridpeers.wire.plugins.registry import Registry
 
 CHOICE_KEYS = (*KEYS, "name", "off")
 """Keys of an entry of `checks` that are no limits of the check."""
@@ -49,7 +49,7 @@ CHECKS: Registry[Any] = Registry(
     "check",
     "checks",
     lambda it: callable_objection(it, "case", CHOICE_KEYS),
-    own={name: f"scenarios.checks.{place}" for name, place in _PLACES.items()},
+    own={name: f"gridpeers.scenarios.checks.{place}" for name, place in _PLACES.items()},
 )
 """Checks by name; those of gridpeers come first."""
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 import msgspec
 
 if TYPE_CHECKING:
-    from scenarios.checks.checked_case import CheckedCase
+    from gridpeers.scenarios.checks.checked_case import CheckedCase
 
 CheckStatus = Literal["passed", "failed", "not judged", "off"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario

@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from plant.equipment import Feeder
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.results.event_windows import CaseRecord, Window
-from scenarios.results.history import Flags, History, Nameplates, read_only
-from scenarios.results.island_membership import island_intervals, islands_at_end, part_of
-from scenarios.results.switch_positions import switch_events
-from scenarios.schema.configs import limits_of
-from scenarios.schema.netem_tables import netem_of
-from scenarios.schema.participants import without_agent
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.results.event_windows import CaseRecord, Window
+from gridpeers.scenarios.results.history import Flags, History, Nameplates, read_only
+from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.switch_positions import switch_events
+from gridpeers.scenarios.schema.configs import limits_of
+from gridpeers.scenarios.schema.netem_tables import netem_of
+from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 if TYPE_CHECKING:
-    from scenarios.checks.communication.communication_summary import CommunicationSummary
-    from scenarios.checks.communication.record_content import RecordContent
+    from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
+    from gridpeers.scenarios.checks.communication.record_content import RecordContent
 
 Read = TypeVar("Read")
 
@@ -91,20 +91,20 @@ class CheckedCase:
     @cached_property
     def communication(self) -> CommunicationSummary:
         """What one pass over the record, of any size, finds of messages and decisions; `NotJudgedError` without one."""
-        from scenarios.checks.communication.communication_summary import summarise
+        from gridpeers.scenarios.checks.communication.communication_summary import summarise
 
         return self._of_record(summarise)
 
     @cached_property
     def content(self) -> RecordContent:
         """States, decisions and accounts of links from the record; `NotJudgedError` where the run has none."""
-        from scenarios.checks.communication.record_content import read_content
+        from gridpeers.scenarios.checks.communication.record_content import read_content
 
         return self._of_record(read_content)
 
     def _of_record(self, read: Callable[[Path], Read]) -> Read:
-        from scenarios.record.record_file import RecordFileError
-        from scenarios.record.record_info import FILE
+        from gridpeers.scenarios.record.record_file import RecordFileError
+        from gridpeers.scenarios.record.record_info import FILE
 
         if self.folder is None or not (self.folder / FILE).exists():
             raise NotJudgedError("the run has no record run.mcap")

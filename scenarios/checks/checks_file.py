@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 
 FILE = "checks.json"
 """Name of the file in the run folder."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.results.history import History
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.results.history import History
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 Since = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, 86_400.0)]
 """Run time (s) from which on a check judges: events open windows, the ends of faults of links and agents open none."""

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.checks.check_registry import CHECKS
-from scenarios.checks.check_verdict import (
+from gridpeers.scenarios.checks.check_registry import CHECKS
+from gridpeers.scenarios.checks.check_verdict import (
     INTERRUPTED,
     MOST_VIOLATIONS,
     SHOWN_VIOLATIONS,
@@ -22,13 +22,13 @@ from scenarios.checks.check_verdict import (
     NotJudgedError,
     Violation,
 )
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.schema.plugin_keys import checks_of, checks_off
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import Plugin, made
-from wire.plugins.registry import PluginError
-from wire.printable import printable
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.schema.plugin_keys import checks_of, checks_off
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import Plugin, made
+from gridpeers.wire.plugins.registry import PluginError
+from gridpeers.wire.printable import printable
 
 PATIENCE = 10.0
 """Time (s) after which a check that still judges is named: those of an hour of nine agents in wall-clock time take

@@ -1,7 +1,7 @@
 """Child processes: start them with a configuration on standard input, watch them, and always end them.
 
 Each child is its own process group, so Ctrl-C reaches the parent only, which then ends them in order. If the parent
-dies without a chance to do that, their standard input ends, and they leave (`wire.driver.process`).
+dies without a chance to do that, their standard input ends, and they leave (`gridpeers.wire.driver.process`).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import IO
 
 import msgspec
 
-from scenarios.drivers.forking import ForkedProcess, ForkServer, ForkServerError
-from wire.driver.process import BAD_CONFIG, BROKE, IN_ORDER, LEASH, OK
-from wire.messages import PLANT
+from gridpeers.scenarios.drivers.forking import ForkedProcess, ForkServer, ForkServerError
+from gridpeers.wire.driver.process import BAD_CONFIG, BROKE, IN_ORDER, LEASH, OK
+from gridpeers.wire.messages import PLANT
 
 LAST_LINES = 12
 """Last lines of a log in the report on a process that died."""

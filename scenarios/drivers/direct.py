@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from agents.agent_config import AgentConfig
-from agents.agent_group import AgentGroup
-from agents.laws.law import Law
-from plant.direct_plant import DirectPlant
-from plant.plant_config import PlantConfig
-from plant.plant_interface import PlantLike
-from wire.messages import Journal, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_group import AgentGroup
+from gridpeers.agents.laws.law import Law
+from gridpeers.plant.direct_plant import DirectPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.wire.messages import Journal, Telemetry
 
 
 def messages_decide(plant: PlantConfig, agents: Sequence[AgentConfig]) -> bool:

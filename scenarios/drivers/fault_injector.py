@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 from time import monotonic
 from typing import Any, NamedTuple
 
-from netem.schema.netem import NodeFault
-from scenarios.drivers.children import Children
-from scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.netem.schema.netem import NodeFault
+from gridpeers.scenarios.drivers.children import Children
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 
 
 class ProcessFault(NamedTuple):

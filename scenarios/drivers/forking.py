@@ -1,4 +1,4 @@
-"""Processes that are forked instead of started anew: the client of `wire.driver.fork_server`."""
+"""Processes that are forked instead of started anew: the client of `gridpeers.wire.driver.fork_server`."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class ForkServer:
         self._control.settimeout(PATIENCE)
         with served:
             self._server = subprocess.Popen(
-                [sys.executable, "-P", "-m", "wire.driver.fork_server", str(served.fileno()), *preload],
+                [sys.executable, "-P", "-m", "gridpeers.wire.driver.fork_server", str(served.fileno()), *preload],
                 stdin=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,  # what cannot be imported is in the log of the process that is started anew
                 pass_fds=(served.fileno(),),

@@ -8,7 +8,7 @@ import re
 import socket
 from typing import NamedTuple
 
-from wire.driver.command_line import command_line
+from gridpeers.wire.driver.command_line import command_line
 
 _FORM = re.compile(
     r"(?P<protocol>[a-z]+)/(?P<host>\[[0-9A-Fa-f:.%a-z]+\]|[^\s:/\[\]]+):(?P<port>[0-9]{1,5})(?P<rest>[?#]\S*)?"

@@ -2,7 +2,7 @@
 
 Every message is encoded and decoded, and discovery, roster and ticks are those of `LockstepAgent` and
 `LockstepPlant`; so the result is that of the processes, byte by byte, and is the reference for them. Where messages
-decide nothing, `scenarios.drivers.direct` gives the same result without them, in a fraction of the time.
+decide nothing, `gridpeers.scenarios.drivers.direct` gives the same result without them, in a fraction of the time.
 """
 
 from __future__ import annotations
@@ -16,20 +16,20 @@ from time import perf_counter
 
 import msgspec
 
-from agents.agent_config import AgentConfig, Control
-from agents.carriers.make import close_laws, make_law
-from agents.known_agents import KnownAgents
-from agents.laws.law import Law
-from agents.lockstep_agent import LockstepAgent
-from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
-from plant.plant_interface import PlantLike
-from scenarios.drivers.direct import messages_decide, run_direct
-from scenarios.drivers.outcome import Outcome
-from scenarios.emulation.emulated_links import links_of
-from wire.actions import Action, Fetch, Listen, Log, Publish
-from wire.codec import decode
-from wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.agents.carriers.make import close_laws, make_law
+from gridpeers.agents.known_agents import KnownAgents
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import PlantLike
+from gridpeers.scenarios.drivers.direct import messages_decide, run_direct
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish
+from gridpeers.wire.codec import decode
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
 
 SHOWN = 5
 """Missing messages that an error names."""
@@ -218,7 +218,7 @@ def run_inprocess(
     laws: list[Law] = []
     with ExitStack() as stack:
         if plant is None:
-            from plant.build import start_plant  # numba and scipy: only for who runs a plant
+            from gridpeers.plant.build import start_plant  # numba and scipy: only for who runs a plant
 
             try:
                 plant = start_plant(plant_config)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wire.messages import Pacing, PlantEvent
+from gridpeers.wire.messages import Pacing, PlantEvent
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,16 +12,16 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from plant.start_words import READY
-from scenarios.drivers.children import Child, Children
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import LOOK, RECORDER, TelemetryClient, with_recorder
-from scenarios.drivers.telemetry_stream import Recordable
-from wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.start_words import READY
+from gridpeers.scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.drivers.supervisor import Supervisor
+from gridpeers.scenarios.drivers.telemetry_client import LOOK, RECORDER, TelemetryClient, with_recorder
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""

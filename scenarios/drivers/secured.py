@@ -7,10 +7,10 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from wire.trust.certificate_files import KeysError
-from wire.trust.key_folder import open_credentials
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.wire.trust.certificate_files import KeysError
+from gridpeers.wire.trust.key_folder import open_credentials
 
 
 def secured(

@@ -10,12 +10,12 @@ from types import MappingProxyType, TracebackType
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.drivers.children import Child, Children
-from scenarios.drivers.fault_injector import FaultInjector
-from scenarios.drivers.warm_servers import agent_server, plant_server
-from wire.messages import PLANT
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.fault_injector import FaultInjector
+from gridpeers.scenarios.drivers.warm_servers import agent_server, plant_server
+from gridpeers.wire.messages import PLANT
 
 
 class Supervisor:
@@ -101,7 +101,7 @@ class Supervisor:
         life = len(self.children.lives(name)) + 1
         log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
         if name == PLANT:
-            usual = ("-m", "scenarios.emulation.emulated_plant" if self._plant.links else "plant")
+            usual = ("-m", "gridpeers.scenarios.emulation.emulated_plant" if self._plant.links else "gridpeers.plant")
             command = list(self._plant_command or usual)
             ours = not self._plant_command and self._plant.settings.simulator == "gridpeers"
             server = plant_server() if ours else None
@@ -119,7 +119,7 @@ class Supervisor:
 
     def _module(self, name: str) -> str:
         """Return the module of an agent's process."""
-        return "scenarios.emulation.emulated_agent" if self._agents[name].links else "agents"
+        return "gridpeers.scenarios.emulation.emulated_agent" if self._agents[name].links else "gridpeers.agents"
 
     def start_when_gone(self, names: Iterable[str]) -> None:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""

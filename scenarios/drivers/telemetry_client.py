@@ -7,14 +7,14 @@ from time import monotonic
 
 from msgspec.structs import replace
 
-from plant.plant_config import PlantConfig
-from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
-from wire.driver.inbox import Inbox
-from wire.driver.session import Session
-from wire.driver.zenoh_settings import Clock
-from wire.messages import Pacing, PlantEvent, Telemetry
-from wire.trust.credentials import Credentials
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.driver.zenoh_settings import Clock
+from gridpeers.wire.messages import Pacing, PlantEvent, Telemetry
+from gridpeers.wire.trust.credentials import Credentials
 
 RECORDER = "history"
 """Name of a driver's recorder in its run."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
-from wire.codec import RejectedError, encode
-from wire.keys import epoch_of
-from wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
-from wire.node import Route
-from wire.plant_follower import PlantFollower
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
+from gridpeers.wire.codec import RejectedError, encode
+from gridpeers.wire.keys import epoch_of
+from gridpeers.wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.node import Route
+from gridpeers.wire.plant_follower import PlantFollower
 
 
 class TelemetryEndpoint(PlantFollower):

@@ -1,14 +1,14 @@
 """The plant's telemetry in order and without gaps: the missing messages, and the time to ask for them again. Pure.
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
-keeps its latest messages (`plant.realtime.kept_telemetry`) and publishes them again when asked by a `Command`.
-In simulated time the same question acknowledges all before its number (`plant.unacknowledged_telemetry`): it is sent
-after each Telemetry, and again and again until the next.
+keeps its latest messages (`gridpeers.plant.realtime.kept_telemetry`) and publishes them again when asked by a
+`Command`. In simulated time the same question acknowledges all before its number
+(`gridpeers.plant.unacknowledged_telemetry`): it is sent after each Telemetry, and again and again until the next.
 """
 
 from __future__ import annotations
 
-from wire.messages import Answer, Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.messages import Answer, Journal, LinkReport, LinkRequest, Telemetry
 
 QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""

@@ -12,18 +12,22 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
+from gridpeers.scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
 
-_OF_AGENTS = ("wire.driver.session:load_zenoh", "agents.agent_process", "agents.laws.consensus")
+_OF_AGENTS = (
+    "gridpeers.wire.driver.session:load_zenoh",
+    "gridpeers.agents.agent_process",
+    "gridpeers.agents.laws.consensus",
+)
 """Modules, and a function to call, that the fork server loads once for all agents."""
 
 _OF_PLANTS = (
-    *("wire.driver.session:load_zenoh", "plant.plant_process"),
-    *("plant.build", "plant.loaded_kernels:load_kernels"),
+    *("gridpeers.wire.driver.session:load_zenoh", "gridpeers.plant.plant_process"),
+    *("gridpeers.plant.build", "gridpeers.plant.loaded_kernels:load_kernels"),
 )
 """The same for plants. Agents have another server, because they do not load numpy."""
 
-_OF_FIGURES = ("scenarios.results.plots.drawing_process",)
+_OF_FIGURES = ("gridpeers.scenarios.results.plots.drawing_process",)
 """The same for processes that draw."""
 
 _ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -47,7 +51,7 @@ _kept: dict[tuple[str, ...], tuple[_Surroundings, ForkServer]] = {}
 """The server of each set of modules."""
 
 
-def agent_server(module: str = "agents", *, start: bool = True) -> ForkServer | None:
+def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> ForkServer | None:
     """Return the server that forks agents, and start it if it is worth it; None where there is none."""
     preload = *_OF_AGENTS, module
     return _kept_server(preload) if start or preload in _kept else None

@@ -1,12 +1,12 @@
-"""One agent or several behind emulated links: ``python -m scenarios.emulation.emulated_agent < agent.json``."""
+"""One agent or several, links emulated: ``python -m gridpeers.scenarios.emulation.emulated_agent < agent.json``."""
 
 from __future__ import annotations
 
 import sys
 
-from agents.agent_process import AgentProcess, run_agents
-from scenarios.emulation.emulated_links import links_of
-from wire.driver.process import main
+from gridpeers.agents.agent_process import AgentProcess, run_agents
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.wire.driver.process import main
 
 
 def run(process: AgentProcess) -> str:
@@ -17,7 +17,7 @@ def run(process: AgentProcess) -> str:
 if __name__ == "__main__":
     sys.exit(
         main(
-            "scenarios.emulation.emulated_agent",
+            "gridpeers.scenarios.emulation.emulated_agent",
             "the agents of one inverter or several behind emulated links",
             AgentProcess,
             run,

@@ -9,20 +9,20 @@ from typing import Any, NamedTuple
 
 from msgspec.structs import replace
 
-from netem.fault_schedule import LinkSchedules
-from netem.ledger import LinkCounts
-from netem.liar import HeardFrom, LiveHearing, lies_about
-from netem.models import INSTANT
-from netem.models.lie import lie_in_words
-from netem.receiver import Receiver
-from netem.schema.netem import NodeFault
-from netem.schema.pattern import Link, links_among, parse
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_descriptions import words
-from scenarios.emulation.link_reports import LinkStatus, encode_statuses, report_data
-from wire.links import Arrival, CommandEffect
-from wire.messages import PLANT, Measurement, State
+from gridpeers.netem.fault_schedule import LinkSchedules
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.netem.liar import HeardFrom, LiveHearing, lies_about
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.lie import lie_in_words
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.netem import NodeFault
+from gridpeers.netem.schema.pattern import Link, links_among, parse
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.emulation.link_descriptions import words
+from gridpeers.scenarios.emulation.link_reports import LinkStatus, encode_statuses, report_data
+from gridpeers.wire.links import Arrival, CommandEffect
+from gridpeers.wire.messages import PLANT, Measurement, State
 
 
 class _Interval(NamedTuple):
@@ -38,7 +38,7 @@ class _Interval(NamedTuple):
 
 
 class EmulatedLinks:
-    """All links into one receiver, as `wire.links.Links` describes them, and the faults of the nodes at their ends.
+    """All links into one receiver, as `gridpeers.wire.links.Links` describes them, with the faults of their nodes.
 
     Parameters
     ----------

@@ -1,13 +1,13 @@
-"""The plant behind emulated links: ``python -m scenarios.emulation.emulated_plant < plant.json``; else as `plant`."""
+"""The plant, links emulated: ``python -m gridpeers.scenarios.emulation.emulated_plant < plant.json``; as `plant`."""
 
 from __future__ import annotations
 
 import sys
 
-from plant.plant_config import PlantConfig
-from plant.plant_process import run_plant
-from scenarios.emulation.emulated_links import links_of
-from wire.driver.process import main
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_process import run_plant
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.wire.driver.process import main
 
 
 def run(config: PlantConfig) -> str:
@@ -16,4 +16,4 @@ def run(config: PlantConfig) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main("scenarios.emulation.emulated_plant", "the plant behind emulated links", PlantConfig, run))
+    sys.exit(main("gridpeers.scenarios.emulation.emulated_plant", "the plant behind emulated links", PlantConfig, run))

@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from netem.schema.netem import Netem
+from gridpeers.netem.schema.netem import Netem
 
 
 class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -7,14 +7,14 @@ from typing import Any
 
 import msgspec
 
-from netem.fault_schedule import Change, Heal
-from netem.schema.fault import LONGEST_RUN, Fault
-from netem.schema.pattern import Link, objections
-from scenarios.emulation.link_descriptions import words
-from wire.printable import printable
-from wire.schema.plausible import Plausible
-from wire.schema.suggestion import first_of
-from wire.schema.table_schema import Problem
+from gridpeers.netem.fault_schedule import Change, Heal
+from gridpeers.netem.schema.fault import LONGEST_RUN, Fault
+from gridpeers.netem.schema.pattern import Link, objections
+from gridpeers.scenarios.emulation.link_descriptions import words
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.plausible import Plausible
+from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.schema.table_schema import Problem
 
 EVERYTHING = "{*, plant} <-> {*, plant}"
 """Pattern of all links there are."""

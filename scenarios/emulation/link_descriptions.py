@@ -6,11 +6,11 @@ from typing import Any
 
 import msgspec
 
-from netem.models.delay import Constant, Uniform
-from netem.models.loss import Bernoulli
-from netem.models.medium import Cut, Rate
-from netem.schema.fault import PROFILES
-from wire.plugins.plugin import Plugin
+from gridpeers.netem.models.delay import Constant, Uniform
+from gridpeers.netem.models.loss import Bernoulli
+from gridpeers.netem.models.medium import Cut, Rate
+from gridpeers.netem.schema.fault import PROFILES
+from gridpeers.wire.plugins.plugin import Plugin
 
 
 def words(kind: str, model: Any) -> str:
@@ -19,15 +19,15 @@ def words(kind: str, model: Any) -> str:
     Parameters
     ----------
     kind : str
-        Of `netem.schema.fault.KINDS`, or "partition".
+        Of `gridpeers.netem.schema.fault.KINDS`, or "partition".
     model : Any
-        The struct of `netem.models`.
+        The struct of `gridpeers.netem.models`.
 
     Examples
     --------
     >>> words("delay", Uniform(low_s=0.08, high_s=0.12))
     'delay 0.08 to 0.12 s'
-    >>> from netem.models.delay import Normal
+    >>> from gridpeers.netem.models.delay import Normal
     >>> words("delay", Normal(mean_s=0.05, std_s=0.02, correlation=0.5))
     'delay normal (correlation 0.5, mean_s 0.05, std_s 0.02)'
     >>> words("loss", PROFILES["lte"].loss)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
-from netem.ledger import LinkCounts, LinkTrace
-from wire.bounds import Name, Text
-from wire.foreign_bytes import decode_foreign
-from wire.messages import LinkReport
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.wire.bounds import Name, Text
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.messages import LinkReport
 
 
 class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

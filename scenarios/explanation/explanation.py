@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agents.laws.law import Neighbour
-from scenarios.explanation.last_decision import aftermath
-from scenarios.explanation.law_step import LawStep, law_step
-from scenarios.explanation.unheard import absence, missed, reason, rejections, verdicts
-from scenarios.record.record_reader import RecordFileError, RunRecord
-from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from scenarios.short_names import short
-from wire.messages import PlantEvent
+from gridpeers.agents.laws.law import Neighbour
+from gridpeers.scenarios.explanation.last_decision import aftermath
+from gridpeers.scenarios.explanation.law_step import LawStep, law_step
+from gridpeers.scenarios.explanation.unheard import absence, missed, reason, rejections, verdicts
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from gridpeers.scenarios.short_names import short
+from gridpeers.wire.messages import PlantEvent
 
 RECENT = 1.0
 """Time (s) before the decision whose events are told."""
@@ -71,7 +71,7 @@ class Explanation:
 
     def __str__(self) -> str:
         """Return it in words and numbers."""
-        from scenarios.explanation.explanation_text import text_of
+        from gridpeers.scenarios.explanation.explanation_text import text_of
 
         return text_of(self)
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import RecordedDecision
-from wire.messages import VALUES, PlantEvent
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.wire.messages import VALUES, PlantEvent
 
 SILENT = 10
 """Control periods without a decision after which the inverter is looked at, though nothing says that its agent left."""

@@ -7,11 +7,11 @@ from contextlib import closing
 from dataclasses import dataclass
 from math import isfinite
 
-from agents.carriers.make import make_law
-from agents.laws.law import Law, SetPoints, Term, Terms
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import RecordedDecision, limits_of
-from wire.plugins.anybody import ANYTHING, named
+from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.laws.law import Law, SetPoints, Term, Terms
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision, limits_of
+from gridpeers.wire.plugins.anybody import ANYTHING, named
 
 TOLERANCE = 1e-12
 """Largest difference (pu) between the step taken and the sum of its parts that rounding explains."""

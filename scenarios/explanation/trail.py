@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from agents.laws.law import Term
-from scenarios.explanation.law_step import LawStep, law_step
-from scenarios.record.record_reader import RecordFileError, RunRecord
-from scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.agents.laws.law import Term
+from gridpeers.scenarios.explanation.law_step import LawStep, law_step
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 
 Quantity = Literal["P_set", "V_set"]
 

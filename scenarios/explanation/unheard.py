@@ -6,14 +6,14 @@ from collections import Counter
 from collections.abc import Mapping
 from math import inf, isfinite
 
-from netem.ledger import Outcome, copies_of
-from scenarios.record.message_index import MessageOnWire
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from wire.counted import counted
-from wire.journal import MessageReference, ReceivedMessage, RejectedCount
-from wire.journal_keys import kind_of, name_of
-from wire.messages import OFF, PlantEvent, State
+from gridpeers.netem.ledger import Outcome, copies_of
+from gridpeers.scenarios.record.message_index import MessageOnWire
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from gridpeers.wire.counted import counted
+from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount
+from gridpeers.wire.journal_keys import kind_of, name_of
+from gridpeers.wire.messages import OFF, PlantEvent, State
 
 WORDS = {
     "cut": "cut off by a cut link",

@@ -5,15 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from plant.equipment import Feeder
-from scenarios.predict.closed_form import DelayKind, Modes, delay_limit_closed, modes
-from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from scenarios.predict.load_steps import IslandStep, load_steps
-from scenarios.predict.times import Times, predicted_times
-from scenarios.predict.var_response import VarResponse, var_response
-from scenarios.schema import ScenarioModel
-from scenarios.schema.netem_tables import is_calm, netem_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.predict.closed_form import DelayKind, Modes, delay_limit_closed, modes
+from gridpeers.scenarios.predict.delay_limits import delay_limit
+from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.scenarios.predict.load_steps import IslandStep, load_steps
+from gridpeers.scenarios.predict.times import Times, predicted_times
+from gridpeers.scenarios.predict.var_response import VarResponse, var_response
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.netem_tables import is_calm, netem_of
 
 KINDS: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
 """Delays with a limit."""

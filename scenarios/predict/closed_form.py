@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.results.history import Floats
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.results.history import Floats
 
 SETTLING = 4.0
 """Time constants after which a mode counts as settled to 2 %, as control texts have it (exactly: 1.8 %)."""
@@ -126,7 +126,7 @@ def modes(inverters: InverterGroup) -> Modes:
     --------
     Nine alike, three leaders, everybody hears everybody:
 
-    >>> from agents.agent_config import Gains
+    >>> from gridpeers.agents.agent_config import Gains
     >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
     >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
     >>> found = modes(nine)
@@ -169,7 +169,7 @@ def delay_limit_closed(inverters: InverterGroup, kind: DelayKind) -> float:
 
     Examples
     --------
-    >>> from agents.agent_config import Gains
+    >>> from gridpeers.agents.agent_config import Gains
     >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
     >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
     >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)

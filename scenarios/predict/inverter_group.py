@@ -8,15 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.agent_config import Control, Gains
-from agents.topology import adjacency
-from plant.equipment import F_NOM, Feeder, InverterRow
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters
-from scenarios.results.history import Flags, Floats
-from scenarios.schema import ScenarioModel
-from scenarios.schema.participants import inverters_of, without_agent
-from scenarios.schema.plugin_keys import graph_of
+from gridpeers.agents.agent_config import Control, Gains
+from gridpeers.agents.topology import adjacency
+from gridpeers.plant.equipment import F_NOM, Feeder, InverterRow
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.participants import inverters_of, without_agent
+from gridpeers.scenarios.schema.plugin_keys import graph_of
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class InverterGroup:
     GFM: Flags
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
-    """Adjacency c_ij (1), row = receiver, as `agents.topology.adjacency` gives it."""
+    """Adjacency c_ij (1), row = receiver, as `gridpeers.agents.topology.adjacency` gives it."""
     acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which run the secondary law; the others keep their set-points. All, if left out."""
     shares: Flags = field(default_factory=lambda: np.zeros(0, bool))
@@ -152,7 +152,7 @@ def inverter_group_of(
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> inverters = inverter_group_of(*load_scenario("islanding"), "IV")
     >>> inverters.n, inverters.A.sum(), inverters.leads.sum()
     (9, np.float64(72.0), np.int64(3))

@@ -1,7 +1,7 @@
 r"""The whole loop, law and plant, as one linear map from tick to tick, with delays in ticks and losses.
 
-The law is that of `agents.laws.consensus`, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c) and
-b_i = 1 - exp(-kappa_i T_c):
+The law is that of `gridpeers.agents.laws.consensus`, not the continuous one. With a_i = `towards`(kappa_i, d_i, T_c)
+and b_i = 1 - exp(-kappa_i T_c):
 
 .. math:: y_i(k) = y_i(k-1) + a_i \big(\bar y_i - y_i(k-1-o)\big) - g_i b_i e_i(k - m_i)
 
@@ -24,10 +24,10 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from agents.laws.consensus import towards
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.response import PlantModel, response
-from scenarios.results.history import Floats
+from gridpeers.agents.laws.consensus import towards
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.predict.response import PlantModel, response
+from gridpeers.scenarios.results.history import Floats
 
 LinkEnds = tuple[str, str]
 """(src, dst)."""

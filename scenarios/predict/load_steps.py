@@ -9,15 +9,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from plant.build import build_plant
-from plant.dynamics import PlantError
-from plant.equipment import Feeder
-from plant.feeder import GRID, Plant, raise_for_trip
-from plant.plant_config import PlantConfig
-from scenarios.predict.times import LoadStep
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder import GRID, Plant, raise_for_trip
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.predict.times import LoadStep
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -8,14 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from scenarios.predict.case_prediction import CasePrediction
-from scenarios.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.linear_model import Loop
-from scenarios.predict.load_steps import IslandStep
-from scenarios.predict.robustness import robustness
-from scenarios.predict.times import Times
-from scenarios.predict.var_response import var_delay_limit, var_spectral_radius
+from gridpeers.scenarios.predict.case_prediction import CasePrediction
+from gridpeers.scenarios.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.predict.linear_model import Loop
+from gridpeers.scenarios.predict.load_steps import IslandStep
+from gridpeers.scenarios.predict.robustness import robustness
+from gridpeers.scenarios.predict.times import Times
+from gridpeers.scenarios.predict.var_response import var_delay_limit, var_spectral_radius
 
 WIDTH = 100
 """Columns."""

@@ -23,9 +23,9 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
-from plant.equipment.inverter_parameters import GfmParameters
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.results.history import Floats
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.results.history import Floats
 
 PlantModel = Literal["lagged", "quasi-steady"]
 """With the inverters' filters, or as if they had none."""

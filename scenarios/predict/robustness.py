@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.results.history import Floats
+from gridpeers.scenarios.results.history import Floats
 
 EXACT = 16
 """Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets."""

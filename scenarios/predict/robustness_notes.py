@@ -9,12 +9,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from agents.laws.resilient import Resilient
-from plant.equipment import Feeder
-from scenarios.predict.inverter_group import inverter_group_of
-from scenarios.predict.robustness import robustness
-from scenarios.schema.plugin_keys import law_of
-from scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.agents.laws.resilient import Resilient
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.predict.inverter_group import inverter_group_of
+from gridpeers.scenarios.predict.robustness import robustness
+from gridpeers.scenarios.schema.plugin_keys import law_of
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 
 def robustness_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:

@@ -1,9 +1,9 @@
 """Times to restore the frequency and to share power after an event, by theory.
 
-All of it comes from `scenarios.predict.linear_model`, law and plant in discrete time, and is exact for that model.
-Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used from
-the first tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or after
-t_k + d.
+All of it comes from `gridpeers.scenarios.predict.linear_model`, law and plant in discrete time, and is exact for that
+model. Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used
+from the first tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or
+after t_k + d.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from scenarios.predict.closed_form import groups
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.linear_model import LinkEnds, Loop, Path, Ticks
-from scenarios.predict.response import PlantModel
-from scenarios.results.history import Flags, Floats
-from scenarios.results.metrics import F_BAND, MPSI_BAND
+from gridpeers.scenarios.predict.closed_form import groups
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.predict.linear_model import LinkEnds, Loop, Path, Ticks
+from gridpeers.scenarios.predict.response import PlantModel
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND
 
 Key = TypeVar("Key")
 
@@ -44,7 +44,7 @@ class LoadStep:
 
 @dataclass(frozen=True, kw_only=True)
 class Times:
-    """Times (s) after a step of the load, by the bands of `scenarios.results.metrics`; None: not within 120 s."""
+    """Times (s) after a step of load, by the bands of `gridpeers.scenarios.results.metrics`; None: above 120 s."""
 
     restore_s: float | None
     """Until abs(f - f_nom) < 0.01 Hz for good."""
@@ -85,7 +85,8 @@ def predicted_times(
     loss : float or Mapping[(src, dst), float], optional
         Probability that a state is lost; the last one is held.
     load : LoadStep, optional
-        The event; the paper's event 1 if left out. `scenarios.predict.load_steps.load_steps` has those of a scenario.
+        The event; the paper's event 1 if left out. `gridpeers.scenarios.predict.load_steps.load_steps` has those of a
+        scenario.
     plant : {"lagged", "quasi-steady"}, optional
         With the inverters' filters, or as docs/theory.md has it.
 

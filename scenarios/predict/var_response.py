@@ -1,7 +1,7 @@
 r"""Voltage and vars: the law (14), (15) on the plant's own response to V_set, with delays in ticks.
 
 The plant on droop alone is measured once: q and v of every inverter, tick by tick for 2 s, after a step of each V_set.
-With the factors a_i, b_i of `agents.laws.consensus.V_factors` two questions are asked of it.
+With the factors a_i, b_i of `gridpeers.agents.laws.consensus.V_factors` two questions are asked of it.
 
 **Modes**, as if the plant were at rest at once (`var_spectral_radius`, `var_delay_limit`). With q = S V_set and
 v = H V_set at the end of the response the law is
@@ -31,17 +31,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from agents.laws.consensus import V_factors
-from plant.build import build_plant
-from plant.dynamics import PlantError
-from plant.equipment import Feeder
-from plant.feeder import Plant, raise_for_trip
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.linear_model import AT_REST
-from scenarios.predict.load_steps import LoadError
-from scenarios.results.history import Floats
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
+from gridpeers.agents.laws.consensus import V_factors
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder import Plant, raise_for_trip
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.predict.linear_model import AT_REST
+from gridpeers.scenarios.predict.load_steps import LoadError
+from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
 
 STEP = 0.002
 """By how much a V_set is moved (pu): far above rounding, far below where loads and droops bend."""

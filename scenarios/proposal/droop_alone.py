@@ -7,13 +7,13 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from plant.build import build_plant
-from plant.equipment import Feeder
-from plant.feeder.current_limits import LIMITS
-from plant.plant_config import PlantSettings
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
-from wire.messages import OFF
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder.current_limits import LIMITS
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import OFF
 
 SETTLE = 1.2
 """Time (s) given to the transient after the last event; the swings after it are judged."""

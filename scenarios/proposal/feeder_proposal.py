@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from plant.equipment import Feeder, InverterRow
-from plant.equipment.connectivity import Connectivity, by_bus
-from plant.equipment.neutrals import neutral_for, neutrals_of
-from scenarios.proposal.feeder_walk import depth_first, neighbours
-from scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
-from scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
-from scenarios.proposal.islanding_switch import islanding_switch
-from scenarios.proposal.phase_loads import heaviest_phase, phase_powers
-from scenarios.proposal.proposal_errors import NoProposalError, TooLargeError
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment.connectivity import Connectivity, by_bus
+from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.scenarios.proposal.feeder_walk import depth_first, neighbours
+from gridpeers.scenarios.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
+from gridpeers.scenarios.proposal.inverter_places import most_rated, possible_places, spread, three_phase
+from gridpeers.scenarios.proposal.islanding_switch import islanding_switch
+from gridpeers.scenarios.proposal.phase_loads import heaviest_phase, phase_powers
+from gridpeers.scenarios.proposal.proposal_errors import NoProposalError, TooLargeError
 
 RATING = 1.3
 """Rating of all inverters of a section beside its load at nominal voltage, were all phases loaded as the heaviest."""

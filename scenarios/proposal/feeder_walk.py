@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from plant.equipment import Feeder
+from gridpeers.plant.equipment import Feeder
 
 
 def neighbours(feeder: Feeder) -> dict[str, list[str]]:

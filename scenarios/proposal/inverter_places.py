@@ -6,10 +6,10 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from itertools import accumulate
 
-from plant.equipment import Feeder
-from plant.equipment.connectivity import Connectivity
-from plant.equipment.imported_equipment import is_behind
-from plant.tables.feeder_columns import RATED_CURRENT, power_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.plant.equipment.imported_equipment import is_behind
+from gridpeers.plant.tables.feeder_columns import RATED_CURRENT, power_of
 
 
 def three_phase(feeder: Feeder) -> list[str]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-from plant.equipment import Feeder
-from plant.equipment.connectivity import Connectivity
-from scenarios.proposal.feeder_walk import cut_off_sums, depth_first, neighbours
-from scenarios.proposal.inverter_groups import GROUP
-from scenarios.proposal.inverter_places import three_phase
-from scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.scenarios.proposal.feeder_walk import cut_off_sums, depth_first, neighbours
+from gridpeers.scenarios.proposal.inverter_groups import GROUP
+from gridpeers.scenarios.proposal.inverter_places import three_phase
+from gridpeers.scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
 
 ENOUGH = 0.5
 """Part of the feeder's load that the switch must cut off, to be worth islanding."""

@@ -6,9 +6,9 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.equipment import PHASES, Feeder
-from plant.network import Network
-from plant.network.powerflow import solve_power_flow
+from gridpeers.plant.equipment import PHASES, Feeder
+from gridpeers.plant.network import Network
+from gridpeers.plant.network.powerflow import solve_power_flow
 
 
 def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex128]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil
 
-from plant.equipment import InverterRow
+from gridpeers.plant.equipment import InverterRow
 
 
 class NoProposalError(ValueError):

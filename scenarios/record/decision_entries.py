@@ -12,12 +12,12 @@ from collections import defaultdict
 from collections.abc import Sequence
 from functools import lru_cache, partial
 
-from scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage, inside
-from scenarios.record.message_index import MessageIndex
-from scenarios.record.record_info import RecordInfo
-from wire.journal import Decision, Exchange
-from wire.messages import PLANT, Journal
-from wire.timing.clock import time_of
+from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage, inside
+from gridpeers.scenarios.record.message_index import MessageIndex
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.wire.journal import Decision, Exchange
+from gridpeers.wire.messages import PLANT, Journal
+from gridpeers.wire.timing.clock import time_of
 
 
 class DecisionEntries:

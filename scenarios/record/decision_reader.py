@@ -9,18 +9,18 @@ from functools import lru_cache
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.graphs import GraphError
-from agents.own_nameplate import nameplate_of
-from agents.topology import in_neighbours, rule_of
-from netem.liar import HeardFrom
-from scenarios.record.decision_entries import DecisionEntries
-from scenarios.record.heard_lies import StatesInRecord, hearing_of
-from scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
-from scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
-from wire.journal import Decision, MessageReference, ReceivedMessage
-from wire.messages import OFF, PLANT, Measurement, Nameplate, State
-from wire.timing.clock import time_of
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.own_nameplate import nameplate_of
+from gridpeers.agents.topology import in_neighbours, rule_of
+from gridpeers.netem.liar import HeardFrom
+from gridpeers.scenarios.record.decision_entries import DecisionEntries
+from gridpeers.scenarios.record.heard_lies import StatesInRecord, hearing_of
+from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
+from gridpeers.scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
+from gridpeers.wire.journal import Decision, MessageReference, ReceivedMessage
+from gridpeers.wire.messages import OFF, PLANT, Measurement, Nameplate, State
+from gridpeers.wire.timing.clock import time_of
 
 _NOTHING = Decision(0, 0, [], [], [], [])
 

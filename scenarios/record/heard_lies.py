@@ -6,12 +6,12 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
-from netem.liar import HeardFrom, lies_about
-from netem.models import INSTANT
-from netem.models.lie import Before
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.message_index import MessageIndex
-from wire.messages import State
+from gridpeers.netem.liar import HeardFrom, lies_about
+from gridpeers.netem.models import INSTANT
+from gridpeers.netem.models.lie import Before
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.message_index import MessageIndex
+from gridpeers.wire.messages import State
 
 _REACH = 2.0
 """How far (s) a state may be from where its number says: in wall-clock time agents tick by their own clocks."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from math import inf
 
-from wire.messages import Journal
+from gridpeers.wire.messages import Journal
 
 Hole = tuple[float, float]
 """Run times (s) between which something is lost: the first one excluded, the last one included."""

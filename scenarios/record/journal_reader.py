@@ -8,11 +8,11 @@ from typing import Any
 import msgpack
 import msgspec
 
-from scenarios.record.record_info import RecordInfo
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import CRC, sound
-from wire.journal import ENTRIES, AnyEntry, Entry, Exchange
-from wire.messages import AnyMessage, Measurement, State
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import CRC, sound
+from gridpeers.wire.journal import ENTRIES, AnyEntry, Entry, Exchange
+from gridpeers.wire.messages import AnyMessage, Measurement, State
 
 _HEAD = b"\xdd"
 """Begins an array of msgpack, before the number of its values in four bytes."""

@@ -10,14 +10,14 @@ from functools import lru_cache
 from math import inf
 from typing import Any, TypeVar
 
-from scenarios.record.journal_reader import entries_of, message_of, values_of
-from scenarios.record.record_channels import Topic
-from scenarios.record.record_file import RecordFile, RecordMessage
-from wire.codec import encode, sound
-from wire.journal import Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
-from wire.journal_keys import kind_of, name_of, sender_of
-from wire.links import REPORT_TICKS
-from wire.messages import AnyMessage, Journal, Measurement, State
+from gridpeers.scenarios.record.journal_reader import entries_of, message_of, values_of
+from gridpeers.scenarios.record.record_channels import Topic
+from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
+from gridpeers.wire.codec import encode, sound
+from gridpeers.wire.journal import Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
+from gridpeers.wire.journal_keys import kind_of, name_of, sender_of
+from gridpeers.wire.links import REPORT_TICKS
+from gridpeers.wire.messages import AnyMessage, Journal, Measurement, State
 
 M = TypeVar("M", bound=AnyMessage)
 
@@ -47,7 +47,7 @@ class MessageOnWire:
     at: float | None
     """When it was sent, or heard, on the clock of that process (s, monotonic); None in simulated time."""
     rejected: str = ""
-    """Kind of its rejection by the receiver (`wire.codec.KINDS`); empty if it was used, or as it was sent."""
+    """Kind of its rejection by the receiver (`gridpeers.wire.codec.KINDS`); empty if it was used, or as it was sent."""
     message: AnyMessage | None = None
     """The message; None if the record does not have it, or no receiver of this version would take it."""
     payload: bytes = b""

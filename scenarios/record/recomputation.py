@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.carriers.make import make_law
-from agents.laws.law import Law
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import RecordedDecision
-from wire.codec import encode
-from wire.messages import State
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.laws.law import Law
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import State
 
 
 class Recomputed(NamedTuple):

@@ -7,8 +7,8 @@ from typing import Any, Literal, NamedTuple
 
 import msgspec
 
-from wire.journal import ENTRIES
-from wire.messages import AnyMessage, Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.journal import ENTRIES
+from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, LinkRequest, Telemetry
 
 Topic = Literal["telemetry", "journal", "link_reports", "link_requests", "physics", "events"]
 """Topics of a record."""

@@ -23,9 +23,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Message, Metadata
 from mcap.stream_reader import breakup_chunk
 
-from scenarios.record.record_channels import Topic
-from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo
-from wire.foreign_bytes import decode_foreign
+from gridpeers.scenarios.record.record_channels import Topic
+from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo
+from gridpeers.wire.foreign_bytes import decode_foreign
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")

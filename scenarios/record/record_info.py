@@ -6,10 +6,10 @@ from typing import Literal
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from wire.journal import RecordLevel
-from wire.messages import Measurement, State
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.messages import Measurement, State
 
 FILE = "run.mcap"
 """Name of a record in the folder of its case."""

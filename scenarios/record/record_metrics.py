@@ -8,23 +8,23 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.tables import FeederError, read_feeder
-from scenarios.live.numbers.departures import compare
-from scenarios.record.record_file import RecordFileError
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.event_windows import CaseRecord, Window, as_they_came, messages_saved, windows
-from scenarios.results.findings import find
-from scenarios.results.history import History
-from scenarios.results.island_membership import taken_part
-from scenarios.results.law_failures import law_failures
-from scenarios.results.report import RunReport
-from scenarios.results.steadiness import STEADY
-from scenarios.schema import ScenarioError, ScenarioModel
-from scenarios.schema.configs import as_in
-from scenarios.schema.loading import read_tables
-from scenarios.schema.participants import with_agent
-from scenarios.schema.scenario_errors import Problems
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.scenarios.live.numbers.departures import compare
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, messages_saved, windows
+from gridpeers.scenarios.results.findings import find
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.island_membership import taken_part
+from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.report import RunReport
+from gridpeers.scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
+from gridpeers.scenarios.schema.configs import as_in
+from gridpeers.scenarios.schema.loading import read_tables
+from gridpeers.scenarios.schema.participants import with_agent
+from gridpeers.scenarios.schema.scenario_errors import Problems
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scenarios.record.record_file import RecordFileError
-from scenarios.record.record_info import FILE
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 def record_path(path: str | Path, case: str = "") -> Path:

@@ -14,20 +14,20 @@ from numbers import Real
 from pathlib import Path
 from typing import TypeVar, get_args
 
-from netem.ledger import LinkCounts, LinkTrace
-from scenarios.emulation.link_reports import data_of
-from scenarios.record.decision_entries import DecisionEntries
-from scenarios.record.decision_reader import DecisionReader
-from scenarios.record.journal_coverage import Hole
-from scenarios.record.message_index import MessageIndex, MessageOnWire
-from scenarios.record.record_file import RecordFile, RecordFileError
-from scenarios.record.record_path import record_path
-from scenarios.record.recorded_decision import RecordedDecision
-from scenarios.results.history import History
-from scenarios.short_names import short
-from wire.journal import Entry
-from wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
-from wire.schema.suggestion import suggestion
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.emulation.link_reports import data_of
+from gridpeers.scenarios.record.decision_entries import DecisionEntries
+from gridpeers.scenarios.record.decision_reader import DecisionReader
+from gridpeers.scenarios.record.journal_coverage import Hole
+from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
+from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
+from gridpeers.scenarios.record.record_path import record_path
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.short_names import short
+from gridpeers.wire.journal import Entry
+from gridpeers.wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
+from gridpeers.wire.schema.suggestion import suggestion
 
 __all__ = ["RecordFileError", "RunRecord"]
 

@@ -6,12 +6,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
-from agents.agent_config import AgentConfig, Control, LawChoice
-from agents.carriers.law_registry import LAWS
-from agents.laws.in_force import law_in_force
-from agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from agents.laws.law_inputs import neighbour_of, own_of
-from wire.messages import Measurement, Nameplate, State
+from gridpeers.agents.agent_config import AgentConfig, Control, LawChoice
+from gridpeers.agents.carriers.law_registry import LAWS
+from gridpeers.agents.laws.in_force import law_in_force
+from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
+from gridpeers.agents.laws.law_inputs import neighbour_of, own_of
+from gridpeers.wire.messages import Measurement, Nameplate, State
 
 Action = Literal["law", "hold", "off", "idle"]
 """What an agent does at a tick: its law decides; secondary control is on hold, as the inverter is grid-connected or has
@@ -40,7 +40,7 @@ class NeighbourInput:
     weight: float
     """Weight from 0 to 1 of that state in the sums; 0 if it was left out."""
     unused: str
-    """Why it was left out: "silent", "stale" or "island" (`wire.journal.UNUSED`); empty if it was used."""
+    """Why it was left out: "silent", "stale" or "island" (`gridpeers.wire.journal.UNUSED`); empty if it was used."""
     lie: str = ""
     """The lie that `state` is, in words; empty if it is as its sender decided it."""
 
@@ -73,7 +73,7 @@ class RecordedDecision:
     restarted: bool
     """Whether the agent started, or started again after a pause, from the set-points of its measurement."""
     saturated: tuple[int, int]
-    """Saturated sides of P and V: 1, -1 or 0; see `agents.laws.law.Own`."""
+    """Saturated sides of P and V: 1, -1 or 0; see `gridpeers.agents.laws.law.Own`."""
     action: Action
     """What the agent did."""
     state: State

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenarios.record.record_channels import TOPICS, channels
-from scenarios.record.record_info import FILE, RecordInfo
-from scenarios.record.record_writer import RecordWriter
-from scenarios.record.viewer_messages import NANO, PhysicsTemplate, event_json, nanoseconds
-from wire.codec import payload_of
-from wire.messages import Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.scenarios.record.record_channels import TOPICS, channels
+from gridpeers.scenarios.record.record_info import FILE, RecordInfo
+from gridpeers.scenarios.record.record_writer import RecordWriter
+from gridpeers.scenarios.record.viewer_messages import NANO, PhysicsTemplate, event_json, nanoseconds
+from gridpeers.wire.codec import payload_of
+from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Telemetry
 
 VIEW_STEP, LIVE_VIEW_STEP = 0.2, 0.05
 """Least distance (s) of the rows that viewers get in simulated time, where each takes as long as a decision, and in

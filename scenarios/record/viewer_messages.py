@@ -7,7 +7,7 @@ from math import isfinite
 
 import msgspec
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 _encode = msgspec.json.encode
 

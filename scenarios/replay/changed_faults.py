@@ -6,9 +6,9 @@ from typing import TypeVar
 
 from msgspec.structs import replace
 
-from netem.schema.fault import KINDS, Fault
-from netem.schema.netem import Netem
-from netem.schema.partition import Partition
+from gridpeers.netem.schema.fault import KINDS, Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
 
 Entry = TypeVar("Entry", Fault, Partition)
 

@@ -6,23 +6,23 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.carriers.make import close_laws, make_law
-from agents.laws.law import Law
-from netem.fault_schedule import Heal
-from netem.schema.fault import Fault
-from plant.plant_interface import LivePlant
-from scenarios.emulation.emulated_links import links_of
-from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.record.record_info import RecordInfo
-from scenarios.replay.changed_faults import lossless
-from scenarios.replay.changes import ChangedRule
-from scenarios.replay.loop_process import LoopProcess
-from scenarios.replay.recorded_process import RecordedStep
-from scenarios.replay.replay_error import ReplayError
-from scenarios.replay.replayed_process import Message, agent_again, instance_of, plant_again, recorded_links
-from wire.codec import decode, encode
-from wire.links import Links
-from wire.messages import PLANT, Command, LinkRequest
+from gridpeers.agents.carriers.make import close_laws, make_law
+from gridpeers.agents.laws.law import Law
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.replay.changed_faults import lossless
+from gridpeers.scenarios.replay.changes import ChangedRule
+from gridpeers.scenarios.replay.loop_process import LoopProcess
+from gridpeers.scenarios.replay.recorded_process import RecordedStep
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.replay.replayed_process import Message, agent_again, instance_of, plant_again, recorded_links
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.links import Links
+from gridpeers.wire.messages import PLANT, Command, LinkRequest
 
 
 class ChangedProcesses:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
-from netem.schema.netem import Netem
-from scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 if TYPE_CHECKING:
-    from scenarios.record.record_reader import RunRecord
-    from scenarios.replay.changes import ChangedRule
+    from gridpeers.scenarios.record.record_reader import RunRecord
+    from gridpeers.scenarios.replay.changes import ChangedRule
 
 
 def with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioModel:

@@ -12,25 +12,25 @@ from typing import Any
 
 import msgspec
 
-from agents.agent_config import Control
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.pattern import objections
-from plant.equipment import Feeder
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changed_faults import spliced, without_loss
-from scenarios.replay.changed_scenario import with_links, with_title
-from scenarios.replay.recorded_process import require_arrivals
-from scenarios.replay.replay_error import ReplayError
-from scenarios.schema.configs import configs
-from scenarios.schema.loading import check_tables
-from scenarios.schema.netem_tables import netem_of, setup_of
-from scenarios.schema.scenario_errors import Problems, ScenarioError
-from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.sweep.file.paths import PathError, Tree, put, steps
-from wire.schema.suggestion import suggestion
+from gridpeers.agents.agent_config import Control
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import objections
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.changed_faults import spliced, without_loss
+from gridpeers.scenarios.replay.changed_scenario import with_links, with_title
+from gridpeers.scenarios.replay.recorded_process import require_arrivals
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.loading import check_tables
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
+from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.sweep.file.paths import PathError, Tree, put, steps
+from gridpeers.wire.schema.suggestion import suggestion
 
 OF_CASE = ("secondary", "graph", "links", "without")
 """Keys of a case that agents have."""

@@ -14,22 +14,22 @@ from heapq import heappop, heappush
 from itertools import count
 from math import inf
 
-from agents.graphs import GraphError
-from agents.own_nameplate import nameplate_of
-from agents.topology import in_neighbours, rule_of
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changed_processes import ChangedProcesses
-from scenarios.replay.changes import ChangedRule
-from scenarios.replay.link_delays import LinkDelays
-from scenarios.replay.loop_process import LoopProcess, is_arrival
-from scenarios.replay.recorded_process import RecordedStep, processes_of
-from scenarios.replay.replay_error import ReplayError
-from scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
-from scenarios.replay.sent_statuses import SentStatuses
-from wire.codec import decode
-from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, WakeUp
-from wire.journal_keys import EACH_TICK, TO_LINKS, kind_of, name_of, sender_of, stream_of
-from wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
+from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.own_nameplate import nameplate_of
+from gridpeers.agents.topology import in_neighbours, rule_of
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.changed_processes import ChangedProcesses
+from gridpeers.scenarios.replay.changes import ChangedRule
+from gridpeers.scenarios.replay.link_delays import LinkDelays
+from gridpeers.scenarios.replay.loop_process import LoopProcess, is_arrival
+from gridpeers.scenarios.replay.recorded_process import RecordedStep, processes_of
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
+from gridpeers.scenarios.replay.sent_statuses import SentStatuses
+from gridpeers.wire.codec import decode
+from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, WakeUp
+from gridpeers.wire.journal_keys import EACH_TICK, TO_LINKS, kind_of, name_of, sender_of, stream_of
+from gridpeers.wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
 
 MOST_SENT = 100_000
 """Messages that are kept for those that are yet to hear them: minutes of nine agents."""

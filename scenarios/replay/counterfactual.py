@@ -9,28 +9,28 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from plant.build import start_plant
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.live.numbers.live_report import write_report
-from scenarios.record.record_info import LIVE
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changed_scenario import unwritten
-from scenarios.replay.changes import ChangedRule
-from scenarios.replay.closed_loop import ClosedLoop
-from scenarios.replay.difference import Difference
-from scenarios.replay.no_difference import no_difference
-from scenarios.replay.replay import ComparedRows
-from scenarios.replay.replay_error import ReplayError
-from scenarios.replay.replayed_process import MakePlant, start_plant_of
-from scenarios.results.broken_folder import broken_if_ended
-from scenarios.results.metrics_file import RunMetrics
-from scenarios.results.record import Recorded, Recorder, RecordError
-from scenarios.results.run_files import set_status, write_whole
-from scenarios.run_request import Progress
-from scenarios.schema.scenario_model import ScenarioModel
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.versions import versions
-from wire.messages import LinkReport, Telemetry
+from gridpeers.plant.build import start_plant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.live.numbers.live_report import write_report
+from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.changed_scenario import unwritten
+from gridpeers.scenarios.replay.changes import ChangedRule
+from gridpeers.scenarios.replay.closed_loop import ClosedLoop
+from gridpeers.scenarios.replay.difference import Difference
+from gridpeers.scenarios.replay.no_difference import no_difference
+from gridpeers.scenarios.replay.replay import ComparedRows
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_of
+from gridpeers.scenarios.results.broken_folder import broken_if_ended
+from gridpeers.scenarios.results.metrics_file import RunMetrics
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.scenarios.results.run_files import set_status, write_whole
+from gridpeers.scenarios.run_request import Progress
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import versions
+from gridpeers.wire.messages import LinkReport, Telemetry
 
 
 @dataclass(frozen=True, kw_only=True)

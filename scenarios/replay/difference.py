@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from math import isnan
 from typing import Any, NamedTuple
 
-from scenarios.results.record import QUANTITIES
-from wire.messages import AnyMessage, Measurement
+from gridpeers.scenarios.results.record import QUANTITIES
+from gridpeers.wire.messages import AnyMessage, Measurement
 
 TOLERANCE = 1e-9
 """Largest difference of two numbers that count as the same, in their units: set-points in W and V."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from agents.agent_config import AgentConfig
-from agents.realtime.realtime_agent import RealtimeAgent
-from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.replay.recorded_process import RecordedProcess, RecordedStep
-from scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
-from wire.journal import MessageReference, ReceivedMessage
-from wire.journal_keys import stream_of
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep
+from gridpeers.scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
+from gridpeers.wire.journal import MessageReference, ReceivedMessage
+from gridpeers.wire.journal_keys import stream_of
 
 
 class LoopProcess:

@@ -7,11 +7,11 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
-from scenarios.record.message_index import MessageIndex
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.replay_error import ReplayError
-from wire.codec import sound
-from wire.journal import (
+from gridpeers.scenarios.record.message_index import MessageIndex
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.wire.codec import sound
+from gridpeers.wire.journal import (
     Entry,
     MessageReference,
     ProcessEvent,
@@ -21,8 +21,8 @@ from wire.journal import (
     Token,
     WakeUp,
 )
-from wire.journal_keys import EACH_TICK, kind_of
-from wire.messages import PLANT, AnyMessage, Journal
+from gridpeers.wire.journal_keys import EACH_TICK, kind_of
+from gridpeers.wire.messages import PLANT, AnyMessage, Journal
 
 CALLS = ("start", "session", "leave")
 """Kinds of process events that are calls of the node; the others say what it did."""

@@ -16,16 +16,16 @@ from math import inf
 
 from msgspec.structs import replace
 
-from agents.carriers.make import close_laws
-from agents.laws.law import Law
-from plant.build import start_plant
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.record.recomputation import recomputed
-from scenarios.record.record_reader import RecordFileError, RunRecord
-from scenarios.replay.difference import Difference, message_difference, row_difference
-from scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
-from scenarios.replay.replay_error import ReplayError
-from scenarios.replay.replayed_process import (
+from gridpeers.agents.carriers.make import close_laws
+from gridpeers.agents.laws.law import Law
+from gridpeers.plant.build import start_plant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.record.recomputation import recomputed
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
+from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.replay.replayed_process import (
     MakePlant,
     Message,
     ReplayedProcess,
@@ -37,10 +37,10 @@ from scenarios.replay.replayed_process import (
     start_plant_of,
     tick_message,
 )
-from scenarios.short_names import in_order
-from wire.codec import decode
-from wire.journal import MessageReference, ReceivedMessage
-from wire.messages import PLANT, AnyMessage, Telemetry
+from gridpeers.scenarios.short_names import in_order
+from gridpeers.wire.codec import decode
+from gridpeers.wire.journal import MessageReference, ReceivedMessage
+from gridpeers.wire.messages import PLANT, AnyMessage, Telemetry
 
 
 @dataclass(frozen=True, kw_only=True)

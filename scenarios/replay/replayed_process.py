@@ -8,21 +8,21 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.carriers.make import make_law
-from agents.laws.law import Law
-from agents.realtime.realtime_agent import RealtimeAgent
-from plant.plant_config import PlantConfig
-from plant.plant_interface import LivePlant
-from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers.telemetry_client import with_recorder
-from scenarios.emulation.emulated_links import links_of
-from scenarios.record.record_info import LIVE, RecordInfo
-from scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
-from scenarios.replay.replay_error import ReplayError
-from wire.backlog import Loss
-from wire.codec import KINDS, encode, sound
-from wire.journal import (
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.drivers.telemetry_client import with_recorder
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
+from gridpeers.scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.codec import KINDS, encode, sound
+from gridpeers.wire.journal import (
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
@@ -31,9 +31,9 @@ from wire.journal import (
     Token,
     WakeUp,
 )
-from wire.journal_keys import EACH_TICK, kind_of
-from wire.links import Links
-from wire.messages import PLANT, Measurement, State
+from gridpeers.wire.journal_keys import EACH_TICK, kind_of
+from gridpeers.wire.links import Links
+from gridpeers.wire.messages import PLANT, Measurement, State
 
 UNREAD = ("excess", "oversized")
 """Kinds of messages that are dropped unread: without bytes they are noted, and not rejected for having none."""
@@ -52,7 +52,7 @@ class Message(NamedTuple):
 
 
 class _Outbox:
-    """Takes what a node sends (`wire.traffic.Traffic`)."""
+    """Takes what a node sends (`gridpeers.wire.traffic.Traffic`)."""
 
     def __init__(self, cut: int) -> None:
         self._cut = cut

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from scenarios.results.run_files import refusal, set_broken
-from wire.driver.output import OutputLostError
+from gridpeers.scenarios.results.run_files import refusal, set_broken
+from gridpeers.wire.driver.output import OutputLostError
 
 
 class TerminatedError(KeyboardInterrupt):

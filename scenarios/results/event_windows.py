@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from plant.equipment import Feeder
-from scenarios.results.history import Flags, Floats, History, history_of
-from scenarios.results.record import Recorded
-from scenarios.schema.participants import with_agent
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.results.history import Flags, Floats, History, history_of
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.schema.participants import with_agent
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,14 +14,14 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenarios.drivers.forking import ForkedProcess, ForkServerError
-from scenarios.drivers.warm_servers import figure_server
-from wire.driver.cores import usable_cores
+from gridpeers.scenarios.drivers.forking import ForkedProcess, ForkServerError
+from gridpeers.scenarios.drivers.warm_servers import figure_server
+from gridpeers.wire.driver.cores import usable_cores
 
 if TYPE_CHECKING:
-    from scenarios.results.plots.drawing import Drawing
+    from gridpeers.scenarios.results.plots.drawing import Drawing
 
-MODULE = "scenarios.results.plots.drawing_process"
+MODULE = "gridpeers.scenarios.results.plots.drawing_process"
 
 MOST = 4
 """Processes, as far as there are cores: a run has eight figures or a few more."""
@@ -48,7 +48,9 @@ def drawn_on_all_cores(drawing: Drawing, folder: Path) -> Iterator[None]:
         _end(started)
         for unfinished in folder.glob(".*.png"):
             unfinished.unlink(missing_ok=True)
-    from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than a case to run
+    from gridpeers.scenarios.results.plots.run_figures import (
+        draw_all,  # matplotlib takes longer to import than a case to run
+    )
 
     draw_all(drawing, folder)
 

@@ -6,18 +6,18 @@ import shutil
 from pathlib import Path
 from typing import NamedTuple
 
-from agents.graphs import GraphError
-from agents.topology import in_neighbours
-from netem.schema.pattern import Link
-from plant.equipment import Feeder
-from scenarios.results.metrics_file import Clock
-from scenarios.results.record import QUANTITIES
-from scenarios.results.run_files import FolderError, shown
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import configs
-from scenarios.schema.netem_tables import netem_of, setup_of
-from scenarios.schema.participants import inverters_of, with_agent
-from wire.messages import PLANT
+from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.topology import in_neighbours
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.results.metrics_file import Clock
+from gridpeers.scenarios.results.record import QUANTITIES
+from gridpeers.scenarios.results.run_files import FolderError, shown
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.participants import inverters_of, with_agent
+from gridpeers.wire.messages import PLANT
 
 NUMBER = 18
 """Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding."""

@@ -5,18 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from plant.equipment import F_NOM, Feeder
-from scenarios.results.evaluation.benchmark_registry import Published
-from scenarios.results.evaluation.metric import Measured
-from scenarios.results.evaluation.quantities import label
-from scenarios.results.evaluation.window_metrics import own_measures
-from scenarios.results.event_windows import CaseRecord
-from scenarios.results.history import Nameplates
-from scenarios.results.island_membership import island_intervals, islands_at_end, part_of
-from scenarios.results.metrics import Settling, Steady, measure, settling
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import limits_of
-from scenarios.schema.participants import without_agent
+from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.scenarios.results.evaluation.benchmark_registry import Published
+from gridpeers.scenarios.results.evaluation.metric import Measured
+from gridpeers.scenarios.results.evaluation.quantities import label
+from gridpeers.scenarios.results.evaluation.window_metrics import own_measures
+from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.history import Nameplates
+from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.metrics import Settling, Steady, measure, settling
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import limits_of
+from gridpeers.scenarios.schema.participants import without_agent
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
 """Steady values by case and event."""

@@ -6,7 +6,7 @@ import fcntl
 import os
 from pathlib import Path
 
-from scenarios.results.run_files import FolderError, shown
+from gridpeers.scenarios.results.run_files import FolderError, shown
 
 LOCK = ".lock"
 

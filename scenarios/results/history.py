@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment import Feeder, InverterRow
-from scenarios.results.record import QUANTITIES, Recorded, Row, header
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.scenarios.results.record import QUANTITIES, Recorded, Row, header
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -132,7 +132,7 @@ class History:
 
     @classmethod
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Row] | Floats) -> History:
-        """Return the arrays of recorded rows, see `wire.messages.Telemetry.rows`.
+        """Return the arrays of recorded rows, see `gridpeers.wire.messages.Telemetry.rows`.
 
         Raises
         ------

@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from plant.equipment import Feeder
-from plant.equipment.bus_islands import bus_islands
-from scenarios.results.event_windows import Window
-from scenarios.results.history import Floats, History, Nameplates
-from scenarios.results.switch_positions import closed_switches, switch_events
-from scenarios.schema import ScenarioModel
-from scenarios.schema.participants import inverters_of
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import bus_islands
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.history import Floats, History, Nameplates
+from gridpeers.scenarios.results.switch_positions import closed_switches, switch_events
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.wire.messages import PlantEvent
 
 
 class Island(NamedTuple):
@@ -66,7 +66,7 @@ def island_intervals(
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> scenario, feeder = load_scenario("islanding")
     >>> opened = PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened", closed=False)
     >>> [(it.start, list(it.islands)) for it in island_intervals(scenario, feeder, ["inv1", "inv4"], [opened])]

@@ -6,10 +6,10 @@ import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from agents.graphs import natural_order
-from plant.plant_config import OnLawFailure
-from plant.plant_node import IDLE
-from wire.messages import PlantEvent
+from gridpeers.agents.graphs import natural_order
+from gridpeers.plant.plant_config import OnLawFailure
+from gridpeers.plant.plant_node import IDLE
+from gridpeers.wire.messages import PlantEvent
 
 _LINE = re.compile(r"(?:law|graph) (?:(?!: ).)*? \((?P<line>[^()]+:\d+)\)(?::| of )")
 """Beginning of the reason of a failure whose line is known: what follows a colon and a blank is the reason itself."""

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import msgspec
 
-from netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
-from scenarios.emulation.link_reports import data_of
-from scenarios.results.run_files import write_whole
-from wire.messages import LinkReport
+from gridpeers.netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
+from gridpeers.scenarios.emulation.link_reports import data_of
+from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.wire.messages import LinkReport
 
 COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 """Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
@@ -28,7 +28,7 @@ _SIZE = 4
 
 
 class LinkRecord:
-    """Record the link reports of one case; `scenarios.results.record.Recorder` has one, and writes its files.
+    """Record the link reports of one case; `gridpeers.scenarios.results.record.Recorder` has one, and writes its files.
 
     Parameters
     ----------

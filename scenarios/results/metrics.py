@@ -14,10 +14,10 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.results.event_windows import Window
-from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
-from scenarios.results.steadiness import Ends, ends_of, reason
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
+from gridpeers.scenarios.results.steadiness import Ends, ends_of, reason
 
 F_BAND, MPSI_BAND = 0.01, 0.01
 """Frequency (Hz) and MPSI below which a microgrid counts as restored."""
@@ -50,7 +50,7 @@ class Steady:
     """Time (s) from the event until the inverters' total real power is within 2 % of its steady value for good: until
     those that remain carry the load of one that left. None if never, and where nothing is fed."""
     reasons: Mapping[str, str] = field(default_factory=dict)
-    """Reason of each measure that is no steady value, by its name (`scenarios.results.steadiness`)."""
+    """Reason of each measure that is no steady value, by its name (`gridpeers.scenarios.results.steadiness`)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import msgspec
 
-from plant.equipment import Feeder
-from scenarios.results.evaluation.quantities import UNITS, Measure
-from scenarios.results.record import Recorded
-from scenarios.schema import ScenarioModel
-from wire.messages import Pacing
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.results.evaluation.quantities import UNITS, Measure
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.wire.messages import Pacing
 
 if TYPE_CHECKING:
-    from scenarios.results.findings import Findings
+    from gridpeers.scenarios.results.findings import Findings
 
 Clock = Literal["simulated", "wall"]
 """Lock-step of plant and agents, or real time."""
@@ -68,7 +68,7 @@ def metrics_json(
     live : Mapping[str, Any], optional
         The table on a live run; see docs/results.md.
     """
-    from scenarios.results.metrics import SHARING_OF_ISLANDS  # numpy, which a run starts without
+    from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS  # numpy, which a run starts without
 
     cases: dict[str, dict[str, Any]] = {}
     for case, steady in findings.results.items():

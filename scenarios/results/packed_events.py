@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 _encoder = msgspec.json.Encoder()
 _decoder = msgspec.json.Decoder(dict[str, Any])

@@ -18,25 +18,25 @@ from typing import TYPE_CHECKING, BinaryIO
 
 import msgspec
 
-from scenarios.results.link_record import LinkRecord
-from scenarios.results.packed_events import PackedEvents
-from scenarios.results.run_files import write_whole
-from wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
-from wire.packages import not_importable
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.results.packed_events import PackedEvents
+from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
+from gridpeers.wire.packages import not_importable
 
 if TYPE_CHECKING:
-    from scenarios.record.record_info import RecordInfo
-    from scenarios.record.recording import Recording
+    from gridpeers.scenarios.record.record_info import RecordInfo
+    from gridpeers.scenarios.record.recording import Recording
 
 QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
-"""Columns of each inverter, in the order of `wire.messages.Telemetry.rows`, with their units."""
+"""Columns of each inverter, in the order of `gridpeers.wire.messages.Telemetry.rows`, with their units."""
 
 PARTIAL = "history.partial.csv"
 """Name of the history while it is incomplete."""
 
 
 Row = tuple[float, ...]
-"""As in `wire.messages.Telemetry.rows`."""
+"""As in `gridpeers.wire.messages.Telemetry.rows`."""
 
 _encoder = msgspec.json.Encoder()
 
@@ -157,7 +157,7 @@ class Recorder:
         """Why there is no run.mcap though one was asked for."""
         if folder is not None and record is not None:
             try:
-                from scenarios.record.recording import Recording  # mcap: only for runs with a record
+                from gridpeers.scenarios.record.recording import Recording  # mcap: only for runs with a record
 
                 self._recording = Recording(folder, record, QUANTITIES)
             except ImportError as error:

@@ -10,16 +10,16 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.checks.check_verdict import CheckVerdict, summary
-from scenarios.console import text_of
-from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
-from scenarios.results.evaluation.claims import Verdict
-from scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
-from scenarios.results.findings import Findings
-from scenarios.results.law_failures import LawFailure, first_of
-from scenarios.results.metrics import SHARING, Steady
-from scenarios.results.report_table import GAP, Grid, folded
-from scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, summary
+from gridpeers.scenarios.console import text_of
+from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, Benchmark
+from gridpeers.scenarios.results.evaluation.claims import Verdict
+from gridpeers.scenarios.results.evaluation.quantities import DIGITS, UNITS, Quantity, heading, label
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.law_failures import LawFailure, first_of
+from gridpeers.scenarios.results.metrics import SHARING, Steady
+from gridpeers.scenarios.results.report_table import GAP, Grid, folded
+from gridpeers.scenarios.results.steadiness import STEADY
 
 _TABLE = 140
 """Characters of a table in a file: with four events it would have 200 and more."""

@@ -11,8 +11,8 @@ from typing import BinaryIO, Protocol, TypeVar
 
 import msgspec
 
-from scenarios.results.run_files import FolderError, shown
-from wire.foreign_bytes import decode_foreign
+from gridpeers.scenarios.results.run_files import FolderError, shown
+from gridpeers.wire.foreign_bytes import decode_foreign
 
 JOURNAL = "runs.jsonl"
 """Name of its file."""

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 
-from plant.equipment import Feeder
-from plant.equipment.bus_islands import switch_name, switch_names
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import switch_name, switch_names
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 
 def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[PlantEvent]) -> tuple[PlantEvent, ...]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from plant.trip_settings import SUBSTATION
-from wire.messages import PlantEvent
+from gridpeers.plant.trip_settings import SUBSTATION
+from gridpeers.wire.messages import PlantEvent
 
 _NAMES = r"(?P<names>[^\s,:]+(?:, [^\s,:]+)*)"
 _TRIPS = re.compile(f"{_NAMES} tripped")

@@ -7,19 +7,19 @@ import re
 import unicodedata
 from collections.abc import Mapping
 
-from plant.equipment import Feeder, InverterRow
-from plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given, with_published
-from plant.trip_settings import DEFAULTS, defaults
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import InverterTable, ScenarioModel
-from wire.plugins.plugin import plugin_of
-from wire.schema.relations import contradictions
-from wire.schema.suggestion import suggestion
-from wire.schema.type_words import keys_of
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given, with_published
+from gridpeers.plant.trip_settings import DEFAULTS, defaults
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
+from gridpeers.wire.plugins.plugin import plugin_of
+from gridpeers.wire.schema.relations import contradictions
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.type_words import keys_of
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
-"""Names become folders and, two of them joined, a part of every key, which `wire.keys` bounds at 64 letters."""
+"""Names become folders and, two of them joined, a part of a key, which `gridpeers.wire.keys` bounds at 64 letters."""
 
 TRIPS = "protection.trips"
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from agents.agent_config import MAX_AGE, AgentConfig, Control
-from plant.equipment import Feeder
-from plant.plant_config import FeederChanges, InverterChange, PlantConfig, PlantSettings, PowerLimit, SwitchEvent
-from plant.tables.feeder_changes import changed
-from scenarios.schema.load_changes import load_events
-from scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
-from scenarios.schema.participants import inverters_of, schedule_of, with_agent
-from scenarios.schema.plugin_keys import graph_of, law_of
-from scenarios.schema.scenario_model import InverterTable, ScenarioModel
+from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.plant_config import (
+    FeederChanges,
+    InverterChange,
+    PlantConfig,
+    PlantSettings,
+    PowerLimit,
+    SwitchEvent,
+)
+from gridpeers.plant.tables.feeder_changes import changed
+from gridpeers.scenarios.schema.load_changes import load_events
+from gridpeers.scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
+from gridpeers.scenarios.schema.participants import inverters_of, schedule_of, with_agent
+from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of
+from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
 
 
 def configs(
@@ -33,7 +40,7 @@ def configs(
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> plant, agents = configs(*load_scenario("islanding"), "IV")
     >>> plant.end, agents[0].name, agents[0].control.graph
     (7.0, 'inv1', 'full')
@@ -116,7 +123,7 @@ def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> limits_of(load_scenario("intermittency")[0], "225kW")[0]
     PowerLimit(t=2.5, inverter='inv2', P_max=225000.0)
     """
@@ -133,7 +140,7 @@ def changes_of(scenario: ScenarioModel) -> FeederChanges:
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> changes_of(load_scenario("islanding")[0]) == FeederChanges()
     True
     """

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from plant.equipment import Feeder
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
-from scenarios.schema.supply import supply_states
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.schema.supply import supply_states
 
 _SHOWN = 4
 """So many buses of a part are named."""

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import inf
 
-from netem.models.lie import lie_in_words
-from plant.equipment import Feeder
-from scenarios.schema.absences import AgentEvent, why_away
-from scenarios.schema.netem_tables import netem_of
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.netem.models.lie import lie_in_words
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.schema.absences import AgentEvent, why_away
+from gridpeers.scenarios.schema.netem_tables import netem_of
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 
 def liar_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:

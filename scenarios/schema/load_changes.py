@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from plant.equipment import Feeder
-from plant.equipment.load_powers import LoadPowers
-from plant.plant_config import LoadEvent
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Event, LoadChange, ScenarioModel
-from wire.messages import LoadSetting
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.load_powers import LoadPowers
+from gridpeers.plant.plant_config import LoadEvent
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import Event, LoadChange, ScenarioModel
+from gridpeers.wire.messages import LoadSetting
 
 
 def load_events(scenario: ScenarioModel) -> tuple[LoadEvent, ...]:
@@ -18,7 +18,7 @@ def load_events(scenario: ScenarioModel) -> tuple[LoadEvent, ...]:
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> load_events(load_scenario("islanding")[0])
     ()
     """

@@ -10,10 +10,10 @@ from typing import Any
 
 import msgspec
 
-from plant.equipment import F_NOM, Feeder
-from plant.tables import FeederError, feeders, is_folder, read_feeder
-from scenarios.catalogue_files import CATALOGUE, names_in
-from scenarios.schema.checks import (
+from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
+from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
+from gridpeers.scenarios.schema.checks import (
     check_cases,
     check_changes,
     check_events,
@@ -24,18 +24,24 @@ from scenarios.schema.checks import (
     check_switches,
     name_of,
 )
-from scenarios.schema.configs import as_in
-from scenarios.schema.gridlabd_checks import check_gridlabd
-from scenarios.schema.load_changes import check_loads
-from scenarios.schema.netem_tables import check_netem, with_delays
-from scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
-from scenarios.schema.plugin_keys import check_benchmark, check_graphs, check_laws, check_measures, with_folders
-from scenarios.schema.scenario_errors import Problems, ScenarioError
-from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from scenarios.schema.supply import check_supply
-from scenarios.schema.time_checks import check_step, check_times
-from wire.schema.suggestion import suggestion
-from wire.text_file import TextFileError, text_of
+from gridpeers.scenarios.schema.configs import as_in
+from gridpeers.scenarios.schema.gridlabd_checks import check_gridlabd
+from gridpeers.scenarios.schema.load_changes import check_loads
+from gridpeers.scenarios.schema.netem_tables import check_netem, with_delays
+from gridpeers.scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
+from gridpeers.scenarios.schema.plugin_keys import (
+    check_benchmark,
+    check_graphs,
+    check_laws,
+    check_measures,
+    with_folders,
+)
+from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
+from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
+from gridpeers.scenarios.schema.supply import check_supply
+from gridpeers.scenarios.schema.time_checks import check_step, check_times
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.text_file import TextFileError, text_of
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""
@@ -76,13 +82,13 @@ def find_file(name: str, folder: Path, what: str) -> Path:
 
     Examples
     --------
-    >>> from scenarios.catalogue_files import CATALOGUE, SWEEPS
+    >>> from gridpeers.scenarios.catalogue_files import CATALOGUE, SWEEPS
     >>> find_file("islanding", CATALOGUE, "scenario").name
     'islanding.toml'
     >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
         ...
-    scenarios.schema.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? ...
+    gridpeers.scenarios.schema.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? ...
     """
     names = names_in(folder)
     if name in names:

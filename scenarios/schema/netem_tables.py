@@ -7,16 +7,16 @@ from pathlib import Path
 
 import msgspec
 
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.trace_file import with_traces
-from plant.equipment import Feeder
-from plant.equipment.bus_islands import SwitchOperations, islands_after
-from plant.plant_config import ScheduledAction
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.schema.table_schema import NO_KEY, Problem, fields_of
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.trace_file import with_traces
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import SwitchOperations, islands_after
+from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.schema.table_schema import NO_KEY, Problem, fields_of
 
 LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
 """Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from plant.equipment import Feeder, InverterRow
-from plant.helics.helics_settings import settings_problems
-from plant.plant_config import ScheduledAction
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
-from scenarios.schema.time_checks import multiple
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.helics.helics_settings import settings_problems
+from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.schema.time_checks import multiple
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
@@ -37,7 +37,7 @@ def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[Inve
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> len(with_agent(*load_scenario("islanding"), "IV"))
     9
     """

@@ -11,25 +11,25 @@ from typing import Any, get_args
 
 from msgspec.structs import replace
 
-from agents.agent_config import Gains, GraphRule, LawChoice
-from agents.carriers.law_check import PAPER, law_problems
-from agents.carriers.law_registry import KEYS, LAWS
-from agents.graphs import GRAPHS, make_graph, neighbours_by
-from netem.models.own_fault import FAULTS
-from netem.schema.netem import Netem
-from plant.equipment import Feeder, InverterRow
-from scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
-from scenarios.checks.check_registry import CHECKS, check_name, chosen_checks, switched_off
-from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
-from scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
-from scenarios.schema.participants import with_agent
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel
-from wire.plugins.module_folder import folder_of
-from wire.plugins.path_text import is_no_path
-from wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
-from wire.plugins.registry import PluginError, Registry
-from wire.schema.table_reading import read_table
+from gridpeers.agents.agent_config import Gains, GraphRule, LawChoice
+from gridpeers.agents.carriers.law_check import PAPER, law_problems
+from gridpeers.agents.carriers.law_registry import KEYS, LAWS
+from gridpeers.agents.graphs import GRAPHS, make_graph, neighbours_by
+from gridpeers.netem.models.own_fault import FAULTS
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
+from gridpeers.scenarios.checks.check_registry import CHECKS, check_name, chosen_checks, switched_off
+from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
+from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
+from gridpeers.scenarios.schema.participants import with_agent
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel
+from gridpeers.wire.plugins.module_folder import folder_of
+from gridpeers.wire.plugins.path_text import is_no_path
+from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.schema.table_reading import read_table
 
 OUR_GRAPHS = get_args(GraphRule)
 """Rules of gridpeers, which need no module."""
@@ -40,7 +40,7 @@ def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> law_of(load_scenario("islanding")[0], "IV").use
     'consensus'
     """

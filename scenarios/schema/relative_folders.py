@@ -8,10 +8,10 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from scenarios.schema.plugin_keys import with_keys
-from scenarios.schema.scenario_model import PluginKey, ScenarioModel
-from wire.plugins.plugin import table_of
-from wire.plugins.registry import Registry
+from gridpeers.scenarios.schema.plugin_keys import with_keys
+from gridpeers.scenarios.schema.scenario_model import PluginKey, ScenarioModel
+from gridpeers.wire.plugins.plugin import table_of
+from gridpeers.wire.plugins.registry import Registry
 
 
 def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:

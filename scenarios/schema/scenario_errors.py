@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from wire.printable import printable
-from wire.schema.suggestion import suggestion
-from wire.schema.table_reading import read_table
-from wire.schema.table_schema import Problem
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.schema.table_schema import Problem
 
 T = TypeVar("T", bound=msgspec.Struct)
 

@@ -10,18 +10,18 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from agents.agent_config import DegradedCommunication, Gains, Secondary
-from netem.schema.netem import Netem
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.named_loads import FACTOR
-from plant.equipment.own_parameters import OwnParameters
-from plant.helics.helics_settings import HelicsSettings
-from plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
-from plant.simulator import Simulator
-from wire.journal import RecordLevel
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.relations import Divides, MultipleOf
-from wire.schema.table_schema import INHERITED, INLINE, Example, Label
+from gridpeers.agents.agent_config import DegradedCommunication, Gains, Secondary
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.named_loads import FACTOR
+from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
+from gridpeers.plant.simulator import Simulator
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.relations import Divides, MultipleOf
+from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Example, Label
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""

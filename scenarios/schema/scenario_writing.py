@@ -9,9 +9,9 @@ from typing import Any
 
 import msgspec
 
-from netem.schema.fault import Fault
-from scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
+from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
 
 
 def to_toml(

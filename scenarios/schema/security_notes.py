@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from plant.equipment import Feeder
-from scenarios.schema.participants import inverters_of, without_agent
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.driver.command_line import command_line
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.schema.participants import inverters_of, without_agent
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.driver.command_line import command_line
 
 
 def security_notes(scenario: ScenarioModel, feeder: Feeder, file: str) -> Iterator[str]:

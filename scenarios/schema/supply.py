@@ -6,13 +6,13 @@ from collections.abc import Collection, Iterator
 from itertools import chain
 from typing import NamedTuple
 
-from plant.equipment import Feeder
-from plant.equipment.connectivity import Connectivity, Node
-from plant.equipment.named_loads import with_powers
-from scenarios.schema.load_changes import powers_after
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import Event, ScenarioModel
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.connectivity import Connectivity, Node
+from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.scenarios.schema.load_changes import powers_after
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import Event, ScenarioModel
 
 _SHOWN = 6
 """So many buses of a dead part are named."""

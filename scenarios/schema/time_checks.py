@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-from plant.equipment import Feeder
-from plant.equipment.inverter_parameters import GfmParameters
-from plant.equipment.own_parameters import InverterParameters, given
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.schema.relations import MultipleOf
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters, given
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.schema.relations import MultipleOf
 
 PART_OF_T = {"first-order": 0.3, "second-order": 1.0}
 """Longest integration step of a method, as a part of the inverters' shortest time constant: at 0.4 of it the first

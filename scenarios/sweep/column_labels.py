@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from scenarios.schema.scenario_model import ScenarioModel
-from wire.schema.table_schema import INLINE, Field, Label, fields_of
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.schema.table_schema import INLINE, Field, Label, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 

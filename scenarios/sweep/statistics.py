@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from pandas.api.types import is_bool_dtype, is_numeric_dtype
 
-from scenarios.sweep.sweep_case import FATE
+from gridpeers.scenarios.sweep.sweep_case import FATE
 
 MOST_VALUES = 40
 """A number with more values than this was drawn at random, and is grouped."""

@@ -8,12 +8,12 @@ from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
-from scenarios.results.run_files import refusal, set_broken, set_status
-from scenarios.sweep.file import Plan
-from scenarios.sweep.sweep_case import run_one
-from scenarios.sweep.sweep_folder import SweepFolder
-from scenarios.sweep.sweep_table import as_written, results_frame, write_table
-from scenarios.sweep.workers import on_workers
+from gridpeers.scenarios.results.run_files import refusal, set_broken, set_status
+from gridpeers.scenarios.sweep.file import Plan
+from gridpeers.scenarios.sweep.sweep_case import run_one
+from gridpeers.scenarios.sweep.sweep_folder import SweepFolder
+from gridpeers.scenarios.sweep.sweep_table import as_written, results_frame, write_table
+from gridpeers.scenarios.sweep.workers import on_workers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -59,7 +59,7 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
                 for row in results:
                     folder.add(row)
                     tell(len(folder.done))
-        from scenarios.sweep import sweep_plots  # matplotlib takes longer to import than a run
+        from gridpeers.scenarios.sweep import sweep_plots  # matplotlib takes longer to import than a run
 
         frame = as_written(results_frame(plan, folder.done), plan)
         path = write_table(frame, plan, folder.path)

@@ -16,23 +16,23 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from plant.build import build_plant
-from plant.feeder import Plant
-from plant.plant_config import PlantConfig
-from plant.tables import read_feeder
-from scenarios.checks.check_registry import LAW_FAILED
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.event_windows import CaseRecord
-from scenarios.results.findings import Findings, find
-from scenarios.results.history import History
-from scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
-from scenarios.results.link_record import LinkRecord
-from scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
-from scenarios.results.record import Recorder
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import as_in, configs
-from scenarios.schema.plugin_keys import checks_off
-from wire.printable import utf8
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.checks.check_registry import LAW_FAILED
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.findings import Findings, find
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import as_in, configs
+from gridpeers.scenarios.schema.plugin_keys import checks_off
+from gridpeers.wire.printable import utf8
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""

@@ -12,13 +12,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-from scenarios.results.folder_lock import LOCK, locked
-from scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
-from scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.sweep.file import Plan
-from scenarios.sweep.sweep_case import SweepRow
-from scenarios.versions import versions
+from gridpeers.scenarios.results.folder_lock import LOCK, locked
+from gridpeers.scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
+from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.sweep.file import Plan
+from gridpeers.scenarios.sweep.sweep_case import SweepRow
+from gridpeers.scenarios.versions import versions
 
 MANIFEST = "sweep.json"
 

@@ -21,9 +21,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from scenarios.results.plots.style import PAGE, case_style, save
-from scenarios.sweep.column_labels import INDEXES, label_of
-from scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, is_number, spread_of, values_of
+from gridpeers.scenarios.results.plots.style import PAGE, case_style, save
+from gridpeers.scenarios.sweep.column_labels import INDEXES, label_of
+from gridpeers.scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, is_number, spread_of, values_of
 
 MOST_LETTERS = 24
 """Letters of a value at an axis: a table of faults, as JSON, is longer than the figure."""

@@ -12,11 +12,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.sweep.column_labels import unit_of
-from scenarios.sweep.file import Plan
-from scenarios.sweep.sweep_case import FATE, SweepRow
-from scenarios.versions import versions
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.sweep.column_labels import unit_of
+from gridpeers.scenarios.sweep.file import Plan
+from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
+from gridpeers.scenarios.versions import versions
 
 FILE = "results.parquet"
 

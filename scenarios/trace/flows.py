@@ -6,12 +6,12 @@ from collections.abc import Iterator
 from math import inf, isfinite
 from typing import NamedTuple
 
-from netem.ledger import Outcome, copies_of
-from scenarios.record.record_reader import RunRecord
-from wire.codec import sound
-from wire.journal import SentMessage
-from wire.journal_keys import EACH_TICK, kind_of
-from wire.messages import PLANT, Measurement, State
+from gridpeers.netem.ledger import Outcome, copies_of
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.codec import sound
+from gridpeers.wire.journal import SentMessage
+from gridpeers.wire.journal_keys import EACH_TICK, kind_of
+from gridpeers.wire.messages import PLANT, Measurement, State
 
 
 class Flow(NamedTuple):

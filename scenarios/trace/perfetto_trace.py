@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.history import Nameplates
-from scenarios.results.metrics import MPSI
-from scenarios.results.run_files import write_whole
-from scenarios.short_names import in_order
-from scenarios.trace.flows import Flow, flows
-from wire.messages import PLANT
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.history import Nameplates
+from gridpeers.scenarios.results.metrics import MPSI
+from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.scenarios.short_names import in_order
+from gridpeers.scenarios.trace.flows import Flow, flows
+from gridpeers.wire.messages import PLANT
 
 CUTS = ("cut", "partition", "flap")
 """Fates that are drawn as a slice too: nothing passes for a time."""

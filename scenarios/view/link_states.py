@@ -7,8 +7,8 @@ from typing import Literal
 
 import msgspec
 
-from scenarios.emulation.link_reports import LinkStatus
-from wire.messages import AgentStatus
+from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.wire.messages import AgentStatus
 
 State = Literal["used", "old", "apart", "unused"]
 """In the receiver's sums; older than it uses; of another island; left out for another reason."""

@@ -10,15 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from scenarios.live.client.run_address import RunAddress
-from scenarios.view.own_agents import OwnAgents
-from scenarios.view.page_actions import ActionClient, PageAction, command_line
-from scenarios.view.page_rights import looks_only
-from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
-from scenarios.view.run_follower import RunFollower
-from scenarios.view.run_view import Cursor
-from scenarios.view.scenario_form import scenario_form
-from wire.foreign_bytes import decode_foreign
+from gridpeers.scenarios.live.client.run_address import RunAddress
+from gridpeers.scenarios.view.own_agents import OwnAgents
+from gridpeers.scenarios.view.page_actions import ActionClient, PageAction, command_line
+from gridpeers.scenarios.view.page_rights import looks_only
+from gridpeers.scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
+from gridpeers.scenarios.view.run_follower import RunFollower
+from gridpeers.scenarios.view.run_view import Cursor
+from gridpeers.scenarios.view.scenario_form import scenario_form
+from gridpeers.wire.foreign_bytes import decode_foreign
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket

@@ -7,19 +7,19 @@ from typing import Literal
 
 import msgspec
 
-from netem.fault_schedule import Heal
-from netem.models.delay import Constant
-from netem.models.loss import Bernoulli
-from netem.models.medium import Cut
-from netem.schema.fault import Fault
-from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.live.client.run_address import RunAddress, UsageError, check_name
-from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
-from scenarios.live.requests.load_request import load_setting
-from scenarios.live.requests.run_requests import ask
-from wire.bounds import Text
-from wire.driver.command_line import command_line as typed_command
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.models.delay import Constant
+from gridpeers.netem.models.loss import Bernoulli
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError, check_name
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
+from gridpeers.scenarios.live.requests.load_request import load_setting
+from gridpeers.scenarios.live.requests.run_requests import ask
+from gridpeers.wire.bounds import Text
+from gridpeers.wire.driver.command_line import command_line as typed_command
 
 ActionKind = Literal[
     "open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wire.trust.credentials import Credentials
-from wire.trust.key_folder import COMMANDING
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.key_folder import COMMANDING
 
 
 def looks_only(credentials: Credentials | None) -> str:

@@ -18,7 +18,7 @@ from urllib.parse import parse_qs
 
 import msgspec
 
-from wire.driver.drive import StoppedError
+from gridpeers.wire.driver.drive import StoppedError
 
 if TYPE_CHECKING:  # the extra view has them; who does not open a page needs neither
     from starlette.applications import Starlette

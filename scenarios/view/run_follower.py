@@ -9,15 +9,15 @@ from time import monotonic
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from scenarios.emulation.link_reports import decode_statuses
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.feeder_map import read_feeder_map
-from scenarios.live.show.watching import RunSubscriber
-from scenarios.view.run_view import Cursor, Frame, RunView
-from wire.codec import encode
-from wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.emulation.link_reports import decode_statuses
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.view.run_view import Cursor, Frame, RunView
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry
 
 PAUSE = 0.1
 """Longest wait (s) for a message; then the page is looked after."""

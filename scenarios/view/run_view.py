@@ -11,16 +11,16 @@ from collections.abc import Collection, Mapping
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from scenarios.emulation.link_reports import LinkStatus
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.feeder_map import FeederMap
-from scenarios.live.show.run_monitor import SILENT, RunMonitor
-from scenarios.live.show.snapshot import InverterStatus
-from scenarios.view.link_states import AGE_STEP, LinkStates, LinkView
-from scenarios.view.liveness import Liveness, LivenessView
-from scenarios.view.strips import Point, Strips
-from wire.messages import AgentStatus, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.feeder_map import FeederMap
+from gridpeers.scenarios.live.show.run_monitor import SILENT, RunMonitor
+from gridpeers.scenarios.live.show.snapshot import InverterStatus
+from gridpeers.scenarios.view.link_states import AGE_STEP, LinkStates, LinkView
+from gridpeers.scenarios.view.liveness import Liveness, LivenessView
+from gridpeers.scenarios.view.strips import Point, Strips
+from gridpeers.wire.messages import AgentStatus, PlantEvent, Telemetry
 
 KEPT = 200
 """Most events that are kept for a page that comes later."""

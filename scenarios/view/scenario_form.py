@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from scenarios.schema.scenario_writing import inline
-from scenarios.view.page_actions import PageAction
+from gridpeers.scenarios.schema.scenario_writing import inline
+from gridpeers.scenarios.view.page_actions import PageAction
 
 
 def scenario_form(action: PageAction) -> str:

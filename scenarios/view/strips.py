@@ -8,9 +8,9 @@ from math import isfinite
 
 import numpy as np
 
-from agents.agent_config import AgentConfig
-from scenarios.results.sharing_index import sharing_index
-from wire.messages import VALUES
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.results.sharing_index import sharing_index
+from gridpeers.wire.messages import VALUES
 
 LENGTH = 30.0
 """Length of the strips (s of run time)."""

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import msgspec
 
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.schema import load_scenario
 
 NAMES = ("islanding", "plug-n-play", "microgrid-switching")
 

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
-from plant.tables.read import DATA
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.chaos import schedule_search
-from scenarios.chaos.campaign import Campaign, run_campaign
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import ChaosRow, run_scenario
-from scenarios.chaos.disturbance import counted_kinds
-from scenarios.checks.check_registry import ALWAYS
-from scenarios.schema import load_scenario
+from gridpeers.plant.tables.read import DATA
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.chaos import schedule_search
+from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+from gridpeers.scenarios.chaos.chaos_run import ChaosRow, run_scenario
+from gridpeers.scenarios.chaos.disturbance import counted_kinds
+from gridpeers.scenarios.checks.check_registry import ALWAYS
+from gridpeers.scenarios.schema import load_scenario
 from tests.chaos.bases import base_in, base_named
 from tests.chaos.small_campaign import SMALL, rows_of, small
 from tests.command_line import invoke
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.usefixtures("elsewhere")
 
 BREAKS = '''
 """The paper's law, with a bug: who has once used an old value keeps its set-points for ever."""
-from agents.laws.consensus import Consensus
+from gridpeers.agents.laws.consensus import Consensus
 import gridpeers as gp
 
 

@@ -12,14 +12,14 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from scenarios.chaos import campaign as campaigns
-from scenarios.chaos import chaos_run
-from scenarios.chaos.campaign import Campaign, run_campaign
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import run_scenario
-from scenarios.chaos.machine_error import MachineError
-from scenarios.chaos.numbered_run import shrink_number
-from scenarios.run_case import run_case
+from gridpeers.scenarios.chaos import campaign as campaigns
+from gridpeers.scenarios.chaos import chaos_run
+from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+from gridpeers.scenarios.chaos.chaos_run import run_scenario
+from gridpeers.scenarios.chaos.machine_error import MachineError
+from gridpeers.scenarios.chaos.numbered_run import shrink_number
+from gridpeers.scenarios.run_case import run_case
 from tests.chaos.bases import base_in
 from tests.chaos.small_campaign import rows_of, small
 from tests.command_line import invoke

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from scenarios.chaos.chaos_checks import chaos_checks
-from scenarios.checks.check_registry import ALWAYS, CHECKS, check_name
-from wire.plugins.plugin import table_of
-from wire.schema.table_schema import fields_of
+from gridpeers.scenarios.chaos.chaos_checks import chaos_checks
+from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS, check_name
+from gridpeers.wire.plugins.plugin import table_of
+from gridpeers.wire.schema.table_schema import fields_of
 
 
 def test_every_check_with_a_first_time_gets_one_of_the_schedule() -> None:

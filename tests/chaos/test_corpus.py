@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.chaos.chaos_run import run_scenario
+from gridpeers.scenarios.chaos.chaos_run import run_scenario
 from tests.chaos.bases import base_in
 
 CORPUS = Path(__file__).parent / "corpus"

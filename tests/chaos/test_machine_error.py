@@ -9,13 +9,13 @@ from typing import Any
 
 import pytest
 
-from scenarios.chaos import campaign as campaigns
-from scenarios.chaos import chaos_run
-from scenarios.chaos.chaos_run import run_scenario
-from scenarios.chaos.disturbance import Disturbance
-from scenarios.chaos.machine_error import MachineError
-from scenarios.drivers.children import Child
-from scenarios.run_request import BrokenRunError
+from gridpeers.scenarios.chaos import campaign as campaigns
+from gridpeers.scenarios.chaos import chaos_run
+from gridpeers.scenarios.chaos.chaos_run import run_scenario
+from gridpeers.scenarios.chaos.disturbance import Disturbance
+from gridpeers.scenarios.chaos.machine_error import MachineError
+from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.run_request import BrokenRunError
 from tests.chaos.bases import base_in
 from tests.chaos.small_campaign import SMALL
 from tests.command_line import invoke
@@ -35,7 +35,7 @@ DISK = "the files of a run cannot be written in "
 LAW = '''
 """The paper's law, which fails in one agent once it has begun."""
 import os, signal, sys
-from agents.laws.consensus import Consensus
+from gridpeers.agents.laws.consensus import Consensus
 
 
 class Fails(Consensus):

@@ -8,15 +8,15 @@ from typing import Any
 
 import pytest
 
-from scenarios.chaos import campaign as campaigns
-from scenarios.chaos import chaos_run
-from scenarios.chaos.campaign import Campaign, run_campaign
-from scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
-from scenarios.chaos.chaos_run import ChaosRow
-from scenarios.chaos.disturbance import Disturbance
-from scenarios.results.folder_lock import LOCK, locked
-from scenarios.results.run_journal import journal_line
-from scenarios.run_request import BrokenRunError
+from gridpeers.scenarios.chaos import campaign as campaigns
+from gridpeers.scenarios.chaos import chaos_run
+from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
+from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+from gridpeers.scenarios.chaos.disturbance import Disturbance
+from gridpeers.scenarios.results.folder_lock import LOCK, locked
+from gridpeers.scenarios.results.run_journal import journal_line
+from gridpeers.scenarios.run_request import BrokenRunError
 from tests.chaos.bases import base_in
 from tests.chaos.small_campaign import rows_of, small
 from tests.command_line import invoke

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from scenarios.chaos.campaign import Campaign, Summary
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import ChaosRow, run_schedule
-from scenarios.chaos.disturbance import Disturbance, Schedule
-from scenarios.chaos.schedule_report import effective, schedule_lines
+from gridpeers.scenarios.chaos.campaign import Campaign, Summary
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+from gridpeers.scenarios.chaos.chaos_run import ChaosRow, run_schedule
+from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
+from gridpeers.scenarios.chaos.schedule_report import effective, schedule_lines
 from tests.chaos.bases import base_in
 from tests.chaos.small_campaign import SMALL
 

@@ -10,14 +10,14 @@ import pytest
 from hypothesis import given, settings
 from msgspec import json
 
-from scenarios.chaos import schedule_search
-from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
-from scenarios.chaos.disturbance import KINDS, Disturbance, Schedule
-from scenarios.chaos.disturbed_scenario import base_of
-from scenarios.chaos.schedule_search import BATCH, drawn, shrunk
-from scenarios.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
-from scenarios.schema import load_scenario
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.chaos import schedule_search
+from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
+from gridpeers.scenarios.chaos.disturbance import KINDS, Disturbance, Schedule
+from gridpeers.scenarios.chaos.disturbed_scenario import base_of
+from gridpeers.scenarios.chaos.schedule_search import BATCH, drawn, shrunk
+from gridpeers.scenarios.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 from tests.chaos.bases import NAMES, base_named
 from tests.scenario_files import written
 

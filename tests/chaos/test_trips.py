@@ -7,19 +7,26 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.chaos import chaos_run
-from scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import LONGER_RUNS, ChaosRow, JudgedRun, restored_from, run_scenario, run_schedule
-from scenarios.chaos.collapse import Collapse, collapses_at_changes, unexcused
-from scenarios.chaos.disturbance import Disturbance
-from scenarios.chaos.disturbed_scenario import ChaosBase
-from scenarios.checks.check_verdict import CheckVerdict, Violation
-from scenarios.schema import load_scenario
-from scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.scenarios.chaos import chaos_run
+from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+from gridpeers.scenarios.chaos.chaos_run import (
+    LONGER_RUNS,
+    ChaosRow,
+    JudgedRun,
+    restored_from,
+    run_scenario,
+    run_schedule,
+)
+from gridpeers.scenarios.chaos.collapse import Collapse, collapses_at_changes, unexcused
+from gridpeers.scenarios.chaos.disturbance import Disturbance
+from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 from tests.chaos.bases import base_in, base_named
 from tests.chaos.small_campaign import SMALL
-from wire.messages import PlantEvent
 
 TRIPS = """[protection]
 enter_service_s = 1.0

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.results.event_windows import as_they_came, windows
-from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import measure
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_writing import to_toml
-from wire.messages import Telemetry
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.results.event_windows import as_they_came, windows
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.metrics import measure
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.wire.messages import Telemetry
 
 
 @pytest.fixture(scope="module")

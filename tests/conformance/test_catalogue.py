@@ -5,12 +5,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.free_endpoint import local_endpoint
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.process_driver import run_processes
-from scenarios.schema import Event, load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_model import LoadChange
+from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.schema import Event, load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.scenario_model import LoadChange
 from tests.toy.toy_runs import Rows, first_difference
 
 

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.agent_config import Control
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.event_windows import CaseRecord
-from scenarios.results.findings import find
-from scenarios.results.history import Nameplates, history_of
-from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.record import Recorded, Recorder
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import Control
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.event_windows import CaseRecord
+from gridpeers.scenarios.results.findings import find
+from gridpeers.scenarios.results.history import Nameplates, history_of
+from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
+from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 from tests.conformance.test_drivers import in_one_process
 from tests.scenario_files import written
 from tests.toy.toy_configs import toy_configs
@@ -50,7 +50,7 @@ def test_a_feeder_says_its_own_nominal_frequency(tmp_path: Path) -> None:
     """`feeder.toml` of the feeder's folder; the scenario need not repeat it, and may override it."""
     import shutil
 
-    from plant.tables.read import DATA
+    from gridpeers.plant.tables.read import DATA
 
     folder = tmp_path / "european"
     shutil.copytree(DATA / "microgrid123", folder)

@@ -7,16 +7,16 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig, Control, DegradedCommunication, GraphRule, LawChoice
-from plant.plant_config import PlantConfig
-from scenarios.drivers.direct import messages_decide
-from scenarios.drivers.inprocess import InprocessBus, run_inprocess
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import AgentConfig, Control, DegradedCommunication, GraphRule, LawChoice
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.direct import messages_decide
+from gridpeers.scenarios.drivers.inprocess import InprocessBus, run_inprocess
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import PlantEvent, Telemetry
+from gridpeers.wire.plugins.plugin import Plugin
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.messages import PlantEvent, Telemetry
-from wire.plugins.plugin import Plugin
 
 Told = tuple[list[Telemetry], str, bool, tuple[PlantEvent, ...], tuple[str, ...], int]
 

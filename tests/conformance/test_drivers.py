@@ -10,12 +10,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.agent_config import AgentConfig, Control, GraphRule
-from plant.plant_config import PlantConfig, SwitchEvent
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
+from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.toy.toy_runs import ProcessRun, Rows, first_difference
@@ -33,7 +33,7 @@ Driver = Callable[[PlantConfig, tuple[AgentConfig, ...]], Ran]
 
 
 def in_one_process(plant: PlantConfig, agents: tuple[AgentConfig, ...]) -> Ran:
-    """Run the toy, or the feeder if the configuration names one, by `scenarios.drivers.inprocess`."""
+    """Run the toy, or the feeder if the configuration names one, by `gridpeers.scenarios.drivers.inprocess`."""
     rows: Rows = []
     toy = ToyPlant(plant) if plant.settings.feeder.startswith("toy") else None
     return Ran(run_inprocess(plant, agents, lambda telemetry: rows.extend(telemetry.rows), plant=toy), rows)
@@ -138,7 +138,7 @@ def test_plug_n_play_gives_the_same_history_with_processes(tmp_path: Path) -> No
     )
     expected = in_one_process(plant, agents)
     run = ProcessRun(plant, agents, tmp_path)
-    outcome = run(plant_command=("-m", "plant"))
+    outcome = run(plant_command=("-m", "gridpeers.plant"))
 
     assert outcome.broke == ""
     assert outcome.reproducible

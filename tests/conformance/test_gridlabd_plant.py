@@ -9,13 +9,13 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
+from gridpeers.papers.singhal2022.tolerances import TABLE
+from gridpeers.plant.build import start_plant
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
 from gridpeers.runs.result import Result
-from papers.singhal2022.tolerances import TABLE
-from plant.build import start_plant
-from plant.feeder import Plant
-from plant.network import Network
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.schema.configs import configs
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
 

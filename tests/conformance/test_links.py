@@ -7,13 +7,13 @@ from typing import NamedTuple
 
 import pytest
 
-from netem.ledger import LinkCounts
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.process_driver import run_processes
-from scenarios.results.link_record import LinkRecord
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 STORM = """
 seed = 7

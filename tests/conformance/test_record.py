@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from agents.laws.consensus import Consensus
-from scenarios.record.recomputation import recomputed
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.history import read_history
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.scenarios.record.recomputation import recomputed
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.history import read_history
 from tests.conformance.test_links import STORM
 from tests.record.recorded_runs import recorded_run
 

@@ -13,19 +13,19 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.tables import read_feeder
 from gridpeers.runs.result import Result
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantConfig
-from plant.tables import read_feeder
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.replay import replay
-from scenarios.replay.replay_error import ReplayError
-from scenarios.results.record import QUANTITIES
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.replay import replay
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.results.record import QUANTITIES
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.messages import Telemetry
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
-from wire.journal import RecordLevel
-from wire.messages import Telemetry
 
 SHORT = """
 seed = 7

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from plant.tables.write import write_feeder
+from gridpeers.plant.tables.write import write_feeder
 from tests.unit.plant.feeder.test_single_phase_inverters import small, unit
 
 INVERTERS = (

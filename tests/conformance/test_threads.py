@@ -7,10 +7,10 @@ import hashlib
 import pytest
 from threadpoolctl import threadpool_limits
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 
 
 def digest(threads: int) -> str:

@@ -6,10 +6,10 @@ from functools import lru_cache
 
 import pytest
 
-from agents.agent_config import AgentConfig
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 EVENT, END = 4.0, 9.0
 """When the microgrid falls into three islands, and when it is looked at (s)."""

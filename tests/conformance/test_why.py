@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.explanation.explanation import Explanation, NeighbourAccount, explain
-from scenarios.explanation.law_step import LawStep
-from scenarios.explanation.trail import trail
-from scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.explanation.explanation import Explanation, NeighbourAccount, explain
+from gridpeers.scenarios.explanation.law_step import LawStep
+from gridpeers.scenarios.explanation.trail import trail
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 

@@ -14,10 +14,10 @@ from typing import Literal
 
 from msgspec.structs import replace
 
-import plant.data
-from plant.equipment import Feeder, InverterRow
-from plant.imports.opendss import read_opendss
-from plant.tables.write import write_feeder
+import gridpeers.plant.data
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.tables.write import write_feeder
 
 SCRIPT = Path(__file__).parent / "ieee34.dss"
 
@@ -102,4 +102,4 @@ def ieee34_microgrids() -> Feeder:
 
 
 if __name__ == "__main__":
-    write_feeder(ieee34_microgrids(), Path(plant.data.__path__[0]) / "ieee34")
+    write_feeder(ieee34_microgrids(), Path(gridpeers.plant.data.__path__[0]) / "ieee34")

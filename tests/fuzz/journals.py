@@ -9,17 +9,17 @@ from typing import Any, cast
 import msgspec
 from msgspec.structs import replace
 
-from netem.ledger import LinkTrace
-from scenarios.checks.communication.communication_summary import SummaryPass
-from scenarios.checks.communication.record_pass import read_into
-from scenarios.emulation.link_reports import report_data
-from scenarios.record.record_file import RecordFile, RecordMessage
-from scenarios.record.record_info import RecordInfo
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
+from gridpeers.scenarios.checks.communication.record_pass import read_into
+from gridpeers.scenarios.emulation.link_reports import report_data
+from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.wire.bounds import LATEST, MOST_COUNT
+from gridpeers.wire.codec import CRC, encode
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
 from tests.fuzz.mutation import NUMBERS, TEXTS
 from tests.toy.toy_configs import toy_configs
-from wire.bounds import LATEST, MOST_COUNT
-from wire.codec import CRC, encode
-from wire.messages import PLANT, Journal, LinkReport, State
 
 T_END = 1.0
 """End of the run (s)."""

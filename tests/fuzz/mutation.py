@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from gridpeers.wire.codec import CRC
+from gridpeers.wire.messages import MESSAGES
 from tests.hostile.cases import cases, packed, sealed, sound
-from wire.codec import CRC
-from wire.messages import MESSAGES
 
 EPOCH = 7
 """Epoch in which everybody really lives."""

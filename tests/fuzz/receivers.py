@@ -17,23 +17,28 @@ from typing import Any, Protocol
 import msgspec
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.realtime.realtime_agent import RealtimeAgent
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from plant.plant_config import PlantConfig
-from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from scenarios.drivers.telemetry_stream import TelemetryStream
-from scenarios.emulation.emulated_links import links_of
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_reports import data_of, decode_statuses
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.feeder_map import read_feeder_map
-from scenarios.live.show.link_table import links_text
-from scenarios.record.journal_reader import entries_of, values_of
-from scenarios.results.record import Recorder, RecordError
-from scenarios.view.run_view import Cursor, RunView
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
+from gridpeers.scenarios.drivers.telemetry_stream import TelemetryStream
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_reports import data_of, decode_statuses
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.show.link_table import links_text
+from gridpeers.scenarios.record.journal_reader import entries_of, values_of
+from gridpeers.scenarios.results.record import Recorder, RecordError
+from gridpeers.scenarios.view.run_view import Cursor, RunView
+from gridpeers.wire.codec import CRC, RejectedError, decode, encode
+from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
+from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
+from gridpeers.wire.trust.certificate_files import KeysError
+from gridpeers.wire.trust.key_folder import open_credentials
 from tests.fuzz.journals import Journals
 from tests.hostile.scenes import (
     EPOCH,
@@ -48,11 +53,6 @@ from tests.hostile.scenes import (
     plate,
 )
 from tests.toy.toy_configs import agent_config
-from wire.codec import CRC, RejectedError, decode, encode
-from wire.keys import Keys, epoch_of, run_of_plant
-from wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
-from wire.trust.certificate_files import KeysError
-from wire.trust.key_folder import open_credentials
 
 LIFE = 2_000
 """Messages after which a core is made anew: a false one may have ended what it does."""
@@ -273,7 +273,7 @@ class Keyring:
     FILES = ("members.json", "ca.pem", "inv1.pem", "inv1.key")
 
     def __init__(self, home: Path) -> None:
-        from wire.trust.site_authority import issue, make_site
+        from gridpeers.wire.trust.site_authority import issue, make_site
 
         self._folder = home / "lab"
         make_site(self._folder)

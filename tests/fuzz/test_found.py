@@ -10,22 +10,22 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from netem.ledger import LinkTrace
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_reports import data_of, decode_statuses
-from scenarios.live.requests.agent_configs import read_config
-from scenarios.live.show.feeder_map import read_feeder_map
-from scenarios.record.journal_reader import entries_of, values_of
-from scenarios.results.run_files import FolderError
-from scenarios.results.run_journal import JOURNAL, rows_in
-from scenarios.sweep.sweep_case import SweepRow
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.emulation.link_reports import data_of, decode_statuses
+from gridpeers.scenarios.live.requests.agent_configs import read_config
+from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
+from gridpeers.scenarios.record.journal_reader import entries_of, values_of
+from gridpeers.scenarios.results.run_files import FolderError
+from gridpeers.scenarios.results.run_journal import JOURNAL, rows_in
+from gridpeers.scenarios.sweep.sweep_case import SweepRow
+from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_COUNT
+from gridpeers.wire.messages import LinkReport
+from gridpeers.wire.trust.certificate_files import KeysError
+from gridpeers.wire.trust.member_list import read_list
+from gridpeers.wire.trust.site_authority import issue, make_site
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
-from wire.bounds import LONGEST_MESSAGE, MOST_COUNT
-from wire.messages import LinkReport
-from wire.trust.certificate_files import KeysError
-from wire.trust.member_list import read_list
-from wire.trust.site_authority import issue, make_site
 
 NO_UTF8 = b"\x81\xa4typ\xe5\x01"
 """A map with a key whose text ends within a character."""
@@ -76,9 +76,9 @@ def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -
     from cryptography.hazmat.primitives import serialization
     from cryptography.x509 import load_pem_x509_certificate
 
-    from wire.trust.certificate_files import KeysError
-    from wire.trust.key_folder import open_credentials
-    from wire.trust.site_authority import issue, make_site
+    from gridpeers.wire.trust.certificate_files import KeysError
+    from gridpeers.wire.trust.key_folder import open_credentials
+    from gridpeers.wire.trust.site_authority import issue, make_site
 
     folder = tmp_path / "lab"
     make_site(folder)
@@ -129,5 +129,5 @@ def test_brackets_a_thousand_deep_are_refused_like_anything_else(tmp_path: Path)
         rows_in(tmp_path, SweepRow, lambda row: "")
     assert read_config(DEEP) is None
     assert read_feeder_map(DEEP) is None
-    done = subprocess.run([sys.executable, "-m", "agents"], input=DEEP, capture_output=True, check=False)
+    done = subprocess.run([sys.executable, "-m", "gridpeers.agents"], input=DEEP, capture_output=True, check=False)
     assert (done.returncode, b"Traceback" in done.stderr) == (2, False), done.stderr

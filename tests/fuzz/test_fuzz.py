@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.wire.codec import KINDS
 from tests.fuzz import fuzzing
 from tests.fuzz.fuzzing import FuzzError, fuzz
 from tests.fuzz.mutation import Mutation
 from tests.fuzz.receivers import receivers
-from wire.codec import KINDS
 
 
 def test_no_bytes_raise_an_error_that_nobody_expects(tmp_path: Path) -> None:

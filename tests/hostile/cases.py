@@ -12,8 +12,8 @@ from zlib import crc32
 import msgspec
 from msgspec import inspect
 
-from wire.codec import CRC, RejectedError, decode
-from wire.messages import MESSAGES, Message, Nameplate
+from gridpeers.wire.codec import CRC, RejectedError, decode
+from gridpeers.wire.messages import MESSAGES, Message, Nameplate
 
 BODIES: dict[str, dict[str, Any]] = {
     "Nameplate": dict(kind="GFM", microgrid="mg 1", P_rated=1e5, V_nom=277.0, f_nom=60.0, m_p=0.01, m_q=0.05),

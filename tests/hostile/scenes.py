@@ -6,17 +6,17 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.lockstep_agent import LockstepAgent
-from agents.realtime.realtime_agent import RealtimeAgent
-from plant.lockstep_plant import LockstepPlant
-from plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.wire.actions import Fetch, Listen, Log, Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Listen, Log, Publish
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
 
 KEYS = Keys("toy")
 T_C = 0.02

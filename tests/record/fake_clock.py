@@ -1,7 +1,7 @@
 """A recorded run in wall-clock time whose clock is fake: one thread, no session, the same bytes every time.
 
-The nodes are those of real processes, and are called as `wire.driver.drive` calls them. So what depends on lost and
-late messages, frozen agents and commands of people can be tested without a race.
+The nodes are those of real processes, and are called as `gridpeers.wire.driver.drive` calls them. So what depends on
+lost and late messages, frozen agents and commands of people can be tested without a race.
 """
 
 from __future__ import annotations
@@ -16,26 +16,26 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig, Control
-from agents.carriers.make import make_law
-from agents.realtime.realtime_agent import RealtimeAgent
-from netem.schema.netem import Netem
-from plant.plant_config import PlantConfig
-from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers.telemetry_client import RECORDER
-from scenarios.emulation.emulated_links import links_of
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_info import RecordInfo
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import Recorder
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.drivers.telemetry_client import RECORDER
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.wire.actions import Fetch, Listen, Log, Publish
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Listen, Log, Publish
-from wire.backlog import Loss
-from wire.codec import decode, encode
-from wire.journal import RecordLevel
-from wire.keys import Keys
-from wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
 
 Node = RealtimePlant | RealtimeAgent
 
@@ -308,7 +308,7 @@ def fake_clock_record(
         agents=agents,
     )
     with pytest.MonkeyPatch.context() as patch, Recorder(folder, gaps=True, record=info) as recorder:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 20_000)
+        patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", 20_000)
         run = FakeClockRun(plant, agents, recorder, delay)
         happens(run)
         run.run()

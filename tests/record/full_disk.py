@@ -15,10 +15,10 @@ import tempfile
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.record.record_file import RecordFileError
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import PARTIAL
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import PARTIAL
 from tests.record.killed_commands import wait_for_rows
 from tests.record.reader_commands import assert_commands_read
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Literal, NamedTuple
 
-from scenarios.record.recomputation import recomputed
-from scenarios.record.record_info import FILE
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import PARTIAL
+from gridpeers.scenarios.record.recomputation import recomputed
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import PARTIAL
 from tests.record.reader_commands import assert_commands_read
 
 LONG = """

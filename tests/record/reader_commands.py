@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gridpeers.cli.own_commands import OWN_COMMANDS
-from scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.process_driver import run_processes
-from scenarios.record.record_info import RecordInfo
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import Recorder
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of
-from wire.journal import RecordLevel
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.wire.journal import RecordLevel
 
 
 def recorded_run(
@@ -60,5 +60,5 @@ def recorded_in_chunks(text: str, folder: Path, case: str = "case", *, chunk: in
     file = folder / "scenario.toml"
     file.write_text(text, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", chunk)
+        patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", chunk)
         return recorded_run(file, case, folder / case)

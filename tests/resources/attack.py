@@ -14,10 +14,10 @@ from time import monotonic, sleep
 
 import msgspec
 
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Command, Measurement, State, Stop
 from tests.hostile.cases import packed, sound
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.messages import Command, Measurement, State, Stop
 
 LINKED = "linked"
 

@@ -22,8 +22,8 @@ SETTLED = 6.0
 
 READER = """
 import os, signal, sys
-from wire.driver.session import Session
-from wire.keys import Keys
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
 session = Session("reader", listen=("tcp/127.0.0.1:0",), connect=(sys.argv[1],), clock="wall")
 keys = Keys(sys.argv[2])
 for name in sys.argv[3:]:

@@ -13,14 +13,14 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.process_driver import run_processes
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import Telemetry
 from tests.resources.attack import Attack
 from tests.resources.trial import attacking
 from tests.resources.usage import log_bytes
-from wire.messages import Telemetry
 
 
 class Flooded(NamedTuple):

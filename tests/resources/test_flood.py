@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.driver.session import Session
 from tests.resources.trial import Trial, Watch, attack_on, attacking
 from tests.toy.town import Town
-from wire.bounds import LONGEST_MESSAGE
-from wire.driver.session import Session
 
 TWO = ("inv1", "inv2")
 

@@ -8,10 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.toy import toy_plant
-from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import ProcessRun
-from wire.driver.open_files import (
+from gridpeers.wire.driver.open_files import (
     BESIDE_LINKS,
     MOST_FILES,
     OpenFilesError,
@@ -20,6 +17,9 @@ from wire.driver.open_files import (
     raise_limit,
     too_few_files,
 )
+from tests.toy import toy_plant
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import ProcessRun
 
 FEW = 14
 

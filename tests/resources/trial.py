@@ -13,13 +13,13 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.schema import load_scenario
 from tests.resources.attack import LINKED, Attack
 from tests.resources.usage import Memory, MemoryWatch, log_bytes
 from tests.toy.town import Town
 
-PLANT_COMMAND = ("-m", "scenarios.emulation.emulated_plant")
+PLANT_COMMAND = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 
 DROP = re.compile(r": dropped a message on (\S+): (\w+) \(")
 """Key and kind in a line of a log."""

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from plant.build import build_plant
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.results.record import QUANTITIES
-from scenarios.schema import load_scenario
+from gridpeers.plant.build import build_plant
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.results.record import QUANTITIES
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.wire.messages import PLANT
 from tests.schedules.schedule import HEAL, Action, draw
 from tests.toy.town import Town
-from wire.messages import PLANT
 
-PLANT_COMMAND = ("-m", "scenarios.emulation.emulated_plant")
+PLANT_COMMAND = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 
 LONGEST = 20.0
 """Run time (s) after the heal for which the run goes on, if an island does not come back into its band."""

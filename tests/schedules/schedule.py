@@ -6,10 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from random import Random
 from typing import Any, NamedTuple
 
-from netem.fault_schedule import Heal
-from netem.models.delay import Uniform
-from netem.schema.fault import Fault
-from scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.models.delay import Uniform
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
 
 BEGIN = 2.0
 """Run time (s) of the earliest fault: the feeder has islanded at 1 s."""

@@ -8,7 +8,7 @@ import struct
 import threading
 from types import TracebackType
 
-from scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 
 _ALL_PROTOCOLS = 0x0003
 _ETHERNET = 14

@@ -15,7 +15,7 @@ THREE = ("inv1", "inv2", "inv3")
 def lab(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A site with agents inv1 to inv3; nobody changes it."""
     pytest.importorskip("cryptography", reason="certificates need the extra keys")
-    from wire.trust.site_authority import issue, make_site, revoke
+    from gridpeers.wire.trust.site_authority import issue, make_site, revoke
 
     folder = tmp_path_factory.mktemp("sites") / "lab"
     make_site(folder)

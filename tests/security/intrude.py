@@ -11,10 +11,10 @@ import sys
 from pathlib import Path
 from time import monotonic
 
+from gridpeers.wire.codec import decode
+from gridpeers.wire.keys import Keys, epoch_of
+from gridpeers.wire.messages import Answer, Command, Measurement, Message, Nameplate, State
 from tests.security.intruder import Intruder, credentials
-from wire.codec import decode
-from wire.keys import Keys, epoch_of
-from wire.messages import Answer, Command, Measurement, Message, Nameplate, State
 
 LIE = 12345.0
 """Set-point (W) that no honest agent has."""

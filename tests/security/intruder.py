@@ -12,13 +12,13 @@ from typing import Any
 
 from msgspec import structs
 
-from scenarios.drivers.free_endpoint import parse_endpoint
-from wire.codec import encode
-from wire.driver.session import Session
-from wire.messages import Message
-from wire.trust.credentials import Credentials
-from wire.trust.key_folder import open_credentials
-from wire.trust.member import ROLES
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.wire.codec import encode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.messages import Message
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.member import ROLES
 
 PATIENCE = 60.0
 """Longest wait (s) for anything."""

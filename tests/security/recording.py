@@ -7,7 +7,7 @@ import socket
 import threading
 from types import TracebackType
 
-from scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 
 
 class Recording:

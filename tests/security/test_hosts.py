@@ -50,7 +50,7 @@ class Site(NamedTuple):
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """The plant on host 1, inv1 on host 2, with certificates; intruders have keys of every kind."""
-    from wire.trust.site_authority import issue, make_site, revoke
+    from gridpeers.wire.trust.site_authority import issue, make_site, revoke
 
     folder = tmp_path_factory.mktemp("hosts")
     (folder / "calm.toml").write_text(CALM)
@@ -101,7 +101,7 @@ def test_an_intruder_on_another_host_is_kept_out(site: Site, keys: str, name: st
 
 def test_an_expired_certificate_is_refused_by_both_sides(site: Site) -> None:
     """Our command does not start with it; TLS of the other host refuses it, and the plant says so."""
-    from wire.trust.site_authority import issue
+    from gridpeers.wire.trust.site_authority import issue
 
     late = site.folder / "late"
     shutil.copytree(site.folder / "lab", late)

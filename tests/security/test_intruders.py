@@ -11,13 +11,13 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.wire.messages import Command, Measurement, Message, State
+from gridpeers.wire.trust.tls_refusal import tls_refusal
 from tests.processes.terminals import wait_for
 from tests.security.intruder import PATIENCE, Intruder, answered, credentials, forged, handshake
 from tests.security.recording import Recording
 from tests.toy.town import Town
-from wire.messages import Command, Measurement, Message, State
-from wire.trust.tls_refusal import tls_refusal
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
@@ -49,7 +49,7 @@ def test_without_a_certificate_nobody_gets_a_link(town: Town) -> None:
 
 def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_path: Path) -> None:
     """Though it has the same names."""
-    from wire.trust.site_authority import issue, make_site
+    from gridpeers.wire.trust.site_authority import issue, make_site
 
     other = tmp_path / "lab"
     make_site(other)
@@ -63,7 +63,7 @@ def test_with_a_certificate_of_another_site_nobody_gets_a_link(town: Town, tmp_p
 
 def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: Path) -> None:
     """One handshake with the plant tells which side refuses the other's certificate; a member is refused nothing."""
-    from wire.trust.site_authority import issue, make_site
+    from gridpeers.wire.trust.site_authority import issue, make_site
 
     make_site(other := tmp_path / "lab")
     issue(other, "inv3")
@@ -82,7 +82,7 @@ def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: 
 
 def test_with_an_expired_certificate_nobody_gets_a_link(town: Town, lab: Path, tmp_path: Path) -> None:
     """One of our own site, that ended a day ago."""
-    from wire.trust.site_authority import issue
+    from gridpeers.wire.trust.site_authority import issue
 
     site = tmp_path / "lab"
     shutil.copytree(lab, site)

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.site_authority import issue, make_site
 from tests.toy.town import Town
-from wire.trust.key_folder import open_credentials
-from wire.trust.site_authority import issue, make_site
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
@@ -29,7 +29,7 @@ def test_an_agent_whose_certificate_is_issued_later_joins_the_run(tmp_path: Path
             shutil.copy2(lab / file, host)
         credentials, _ = open_credentials(host, ("agent",), "inv3")
 
-        town.add("inv3", ["-m", "agents"], replace(town.agent_configs["inv3"], credentials=credentials))
+        town.add("inv3", ["-m", "gridpeers.agents"], replace(town.agent_configs["inv3"], credentials=credentials))
 
         town.together(("inv1", "inv2", "inv3"))
         assert town.session.vouches("inv3")

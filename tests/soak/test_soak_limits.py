@@ -10,14 +10,14 @@ from typing import Literal
 import pytest
 from typer.testing import CliRunner
 
-from agents.agent_config import AgentConfig, Control
 from bench.soak import __main__ as command
 from bench.soak.__main__ import StopRequest
 from bench.soak.judging import ProcessSize, growths, judge_checks, judge_growth, judge_late, judge_times
 from bench.soak.soak_actions import DECK, SoakAction, soak_actions
 from bench.soak.soak_monitor import SoakMonitor
-from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
-from wire.messages import AgentStatus, Telemetry
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, Violation
+from gridpeers.wire.messages import AgentStatus, Telemetry
 
 AGENTS = tuple(f"inv{i}" for i in range(1, 10))
 

@@ -10,7 +10,7 @@ import pytest
 
 from bench.soak.soak_actions import SoakAction
 from bench.soak.soak_run import SoakRun
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.schema import load_scenario
 
 
 @pytest.mark.timeout(300)

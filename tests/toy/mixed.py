@@ -11,11 +11,11 @@ from typing import Any
 import msgspec
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.drivers.children import Children
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.outcome import Outcome
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.children import Children
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.outcome import Outcome
 from tests.toy.toy_runs import ProcessRun
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"

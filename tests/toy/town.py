@@ -10,19 +10,17 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.drivers.children import Child
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.secured import secured
-from scenarios.drivers.supervisor import Supervisor
-from scenarios.results.link_record import LinkRecord
-from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_runs import TOY, exists
-from wire.codec import RejectedError, decode, encode
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.messages import (
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.secured import secured
+from gridpeers.scenarios.drivers.supervisor import Supervisor
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import (
     PLANT,
     AgentStatus,
     Answer,
@@ -34,6 +32,8 @@ from wire.messages import (
     State,
     Telemetry,
 )
+from tests.toy.toy_configs import toy_configs
+from tests.toy.toy_runs import TOY, exists
 
 PATIENCE = 60.0
 """Longest wait (s) for anything; a busy machine is slow, and nothing here should take a thirtieth of it.

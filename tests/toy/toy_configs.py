@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from agents.agent_config import AgentConfig, Control
-from plant.plant_config import PlantConfig, PlantSettings, ScheduledAction
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.plant.plant_config import PlantConfig, PlantSettings, ScheduledAction
 from tests.toy.toy_plant import F_NOM, M_P, P_RATED, V_NOM
 
 Schedule = tuple[tuple[float, str, Literal["leave", "join"]], ...]

@@ -12,14 +12,14 @@ from functools import partial
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from agents.lockstep_agent import LockstepAgent
-from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.wire.actions import Fetch, Publish
+from gridpeers.wire.codec import decode
+from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Publish
-from wire.codec import decode
-from wire.messages import PlantEvent, Telemetry
 
 EndSet = LockstepPlant | LockstepAgent
 

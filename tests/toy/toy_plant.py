@@ -1,7 +1,7 @@
 """A plant that can be solved by hand: linear droop, one frequency per island, no network.
 
 For the tests of everything around the plant: it starts at once and needs no numpy. Run as a script it is a plant
-process, like ``python -m plant``. From t = 0.1 s on it is an island.
+process, like ``python -m gridpeers.plant``. From t = 0.1 s on it is an island.
 """
 
 from __future__ import annotations
@@ -9,11 +9,11 @@ from __future__ import annotations
 import sys
 from typing import NamedTuple
 
-from plant.plant_config import PlantConfig
-from plant.plant_process import run_plant
-from scenarios.emulation.emulated_links import links_of
-from wire.driver.process import main
-from wire.messages import LoadSetting, PlantEvent
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_process import run_plant
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.wire.driver.process import main
+from gridpeers.wire.messages import LoadSetting, PlantEvent
 
 M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
 """Droop (pu), nominal frequency (Hz) and voltage (V), rating (W), load per inverter in the island (pu)."""

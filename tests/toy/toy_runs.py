@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.drivers.children import Child, Children
-from scenarios.drivers.outcome import Outcome
-from scenarios.drivers.process_driver import run_processes
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy import toy_plant
-from wire.messages import PlantEvent, Telemetry
 
 TOY = (toy_plant.__file__,)
 """Command of the toy plant's process."""

@@ -3,8 +3,8 @@
 This is the limit of small steps. The inverters' equations are those of `inverter-models.md` sections 3 and 4, without
 the kernel: arrays over all GFM or all GFL, whose states are rows; what depends at once on the network (terminal
 voltages) is an argument. The network is solved by Newton's method at the nodes that carry a load or an inverter: it
-uses the admittances of `plant.network` (beside OpenDSS in the part "power-flow"), and none of `plant.dynamics`'
-reductions.
+uses the admittances of `gridpeers.plant.network` (beside OpenDSS in the part "power-flow"), and none of
+`gridpeers.plant.dynamics`' reductions.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import lu_factor, lu_solve
 
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.kernel.controller_pass import READING
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.kernel.controller_pass import READING
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -350,7 +350,7 @@ class DaeDynamics(Dynamics):
 
 def reference_plant(network: Network, settings: PlantSettings, T_c: float, record_step: float) -> Plant:
     """Return our plant with switches, set-points and readings, but with `DaeDynamics`."""
-    with patch("plant.feeder.plant.Dynamics", DaeDynamics):
+    with patch("gridpeers.plant.feeder.plant.Dynamics", DaeDynamics):
         return Plant(network, replace(settings, h=record_step, method="second-order"), T_c, record_step)
 
 

@@ -9,13 +9,13 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.dynamics.reduction.blas import one_thread
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import Method, PlantConfig, SwitchEvent
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import Method, PlantConfig, SwitchEvent
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 from tests.validation.reference_dynamics import reference_plant
 
 STEPS = (0.004, 0.002, 0.001, 0.0005, 0.00025, 0.000125)

@@ -4,7 +4,7 @@ import pytest
 
 from bench.validation.autotests import AUTOTESTS
 from bench.validation.secondary_feeder import island_tables
-from plant.tables import read_feeder
+from gridpeers.plant.tables import read_feeder
 from tests.validation.limits_kept import assert_limits_kept
 
 STEPS = {"gfm-gfl": "2000", "secondary-start": "610"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plant.plant_config import Method
+from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import GFL_D, GFM_D, inverter
 from tests.unit.plant.dynamics.test_single_phase import pair_of, single
 from tests.validation.reference_dynamics import DaeDynamics

@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from time import monotonic
 from typing import Protocol
 
-from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
-from wire.backlog import Loss
-from wire.driver.free_lists import FreeLists
-from wire.driver.log_limit import limit_log
-from wire.driver.session import Session
+from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.driver.free_lists import FreeLists
+from gridpeers.wire.driver.log_limit import limit_log
+from gridpeers.wire.driver.session import Session
 
 
 class RejectLines(Protocol):
-    """The log lines of rejected messages, as `wire.codec.RejectedMessages` has them."""
+    """The log lines of rejected messages, as `gridpeers.wire.codec.RejectedMessages` has them."""
 
     @property
     def has_lines(self) -> bool: ...  # noqa: D102
@@ -23,7 +23,7 @@ class RejectLines(Protocol):
 
 
 class Core(Protocol):
-    """The part of a node (`wire.node`) that the driver uses."""
+    """The part of a node (`gridpeers.wire.node`) that the driver uses."""
 
     @property
     def rejects(self) -> RejectLines:

@@ -1,8 +1,9 @@
 """A fork server: it imports what many processes need, once, and forks each of them.
 
-    python -m wire.driver.fork_server SOCKET MODULE ...
+    python -m gridpeers.wire.driver.fork_server SOCKET MODULE ...
 
-`SOCKET` is the number of an inherited Unix socket, where the requests of `scenarios.drivers.forking` arrive. Each
+`SOCKET` is the number of an inherited Unix socket, where the requests of `gridpeers.scenarios.drivers.forking` arrive.
+Each
 `MODULE` is imported at the start; of `MODULE:FUNCTION` the function is called too. Then each request, a JSON object
 with the words of a command line (`agents`, `--leash`, `inv1`) and three open files, becomes a process that runs the
 module as `python -m` would: with these as its standard input, output and error, in a session of its own.

@@ -10,9 +10,9 @@ from contextlib import suppress
 from math import inf
 from time import monotonic
 
-from wire.backlog import ROOM, SMALL, Backlog, Loss
-from wire.bounds import LONGEST_MESSAGE
-from wire.token_queue import Kind, Stamped, TokenEvent, TokenQueue
+from gridpeers.wire.backlog import ROOM, SMALL, Backlog, Loss
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.token_queue import Kind, Stamped, TokenEvent, TokenQueue
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
@@ -24,7 +24,7 @@ sender that waits so long for each cannot bring many."""
 
 
 class Inbox:
-    """Queue events from Zenoh's threads to the owner's thread, within the bounds of `wire.backlog` and of tokens.
+    """Queue events from Zenoh's threads to the owner's, within the bounds of `gridpeers.wire.backlog` and of tokens.
 
     The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine
     this is one wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
@@ -40,8 +40,9 @@ class Inbox:
     is_known : Callable[[str, bytes], bool]
         Whether a message on a key is of a known sender; called from Zenoh's threads, and only when many wait.
     is_noted : Callable[[str], bool]
-        Whether the owner has noted the holder of a token, so that it must learn of its end (`wire.token_queue`); called
-        from Zenoh's threads. By default it has noted everybody, and no token is lost.
+        Whether the owner has noted the holder of a token, so that it must learn of its end
+        (`gridpeers.wire.token_queue`); called from Zenoh's threads. By default it has noted everybody, and no token is
+        lost.
 
     Examples
     --------

@@ -10,7 +10,7 @@ import socket
 from contextlib import suppress
 from time import monotonic, sleep
 
-from wire.driver.lingering import ZENOH_LINGERS, linger, tcp_sockets
+from gridpeers.wire.driver.lingering import ZENOH_LINGERS, linger, tcp_sockets
 
 EVERY = 0.01
 """Time (s) between two looks for such links."""

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from time import monotonic
 
-from wire.driver.output import flush_output
+from gridpeers.wire.driver.output import flush_output
 
 GRACE = 1.0
 """Time (s) for such threads to end by themselves."""

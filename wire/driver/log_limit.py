@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from time import monotonic
 
-from wire.rate_limit import RateLimit
+from gridpeers.wire.rate_limit import RateLimit
 
 
 class LogLimit(logging.Filter):

@@ -11,7 +11,7 @@ rich alike. There are two reactions:
   quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
 
 Laws, metrics and checks of a user run in the process that writes: they cannot close its output, and what they put in
-its place is gone when they return (`wire.plugins.foreign_code`).
+its place is gone when they return (`gridpeers.wire.plugins.foreign_code`).
 """
 
 from __future__ import annotations

@@ -19,14 +19,14 @@ from typing import Any, TypeVar, get_args
 
 import msgspec
 
-from wire.driver.drive import StoppedError, StoppedOnLeashError
-from wire.driver.leftover import leave
-from wire.driver.open_files import raise_limit
-from wire.driver.output import watch_readers
-from wire.driver.session import SessionError
-from wire.driver.stop_signal import stop_at_signals
-from wire.foreign_bytes import decode_foreign
-from wire.links import Links
+from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
+from gridpeers.wire.driver.leftover import leave
+from gridpeers.wire.driver.open_files import raise_limit
+from gridpeers.wire.driver.output import watch_readers
+from gridpeers.wire.driver.session import SessionError
+from gridpeers.wire.driver.stop_signal import stop_at_signals
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3
 
@@ -75,7 +75,9 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
         If the configuration has emulated links.
     """
     if tree:
-        raise ConfigurationError(f"{name}: the configuration has emulated links; start it with scenarios.emulation")
+        raise ConfigurationError(
+            f"{name}: the configuration has emulated links; start it with gridpeers.scenarios.emulation"
+        )
 
 
 def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:

@@ -15,15 +15,15 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
-from wire.backlog import Loss
-from wire.driver.foreign import keep_thread_state
-from wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
-from wire.driver.inbox import Inbox
-from wire.driver.large_blocks import give_back_freed
-from wire.driver.left_links import end_left_links
-from wire.driver.lingering import do_not_linger
-from wire.driver.open_files import limit
-from wire.driver.zenoh_settings import (
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.driver.foreign import keep_thread_state
+from gridpeers.wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.large_blocks import give_back_freed
+from gridpeers.wire.driver.left_links import end_left_links
+from gridpeers.wire.driver.lingering import do_not_linger
+from gridpeers.wire.driver.open_files import limit
+from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
     PROFILES,
     RUNTIME,
@@ -32,11 +32,11 @@ from wire.driver.zenoh_settings import (
     runtime_objection,
     zenoh_settings,
 )
-from wire.keys import LATEST_ONLY, is_token
-from wire.packages import not_importable
-from wire.token_queue import Stamped
-from wire.trust.credentials import Credentials
-from wire.trust.link_certificates import LinkCertificates
+from gridpeers.wire.keys import LATEST_ONLY, is_token
+from gridpeers.wire.packages import not_importable
+from gridpeers.wire.token_queue import Stamped
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.link_certificates import LinkCertificates
 
 if TYPE_CHECKING:
     import zenoh

@@ -9,7 +9,7 @@ import re
 from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
-from wire.trust.credentials import Credentials
+from gridpeers.wire.trust.credentials import Credentials
 
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
@@ -64,7 +64,8 @@ PROFILES: dict[Clock, Profile] = {
 
 MOST_BYTES = 8_000_000
 """Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have
-`wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it passes nothing
+`gridpeers.wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it
+passes nothing
 more of that sender on that link."""
 
 
@@ -79,7 +80,7 @@ def zenoh_settings(
     star: bool,
     credentials: Credentials | None,
 ) -> dict[str, Any]:
-    """Return Zenoh's configuration of a session; the parameters are those of `wire.driver.session.Session`."""
+    """Return Zenoh's configuration of a session; parameters are those of `gridpeers.wire.driver.session.Session`."""
     in_star = star and not rendezvous
     config = _peer(() if in_star else listen, connect, gossip and not in_star, meets_all, PROFILES[clock])
     if star and rendezvous:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from wire.printable import printable
+from gridpeers.wire.printable import printable
 
 ANYTHING = (Exception, SystemExit, GeneratorExit)
 """Exceptions of foreign code; only Ctrl+C ends the run."""

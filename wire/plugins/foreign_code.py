@@ -31,7 +31,10 @@ def foreign_code() -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        from wire.plugins.anybody import ANYTHING, named  # brings msgspec, for which a list of scenarios need not wait
+        from gridpeers.wire.plugins.anybody import (  # brings msgspec, for which a list of scenarios need not wait
+            ANYTHING,
+            named,
+        )
 
         if isinstance(error, (*ANYTHING, KeyboardInterrupt)):
             raise

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from wire.plugins.path_text import is_no_path
-from wire.plugins.registry import NOTEBOOK, is_of_another
+from gridpeers.wire.plugins.path_text import is_no_path
+from gridpeers.wire.plugins.registry import NOTEBOOK, is_of_another
 
 
 def folder_of(reference: str, folder: str) -> str:
@@ -14,7 +14,7 @@ def folder_of(reference: str, folder: str) -> str:
 
     Examples
     --------
-    >>> folder_of("wire.plugins.registry:Registry", "here") == str(Path(__file__).resolve().parents[2])
+    >>> folder_of("gridpeers.wire.plugins.registry:Registry", "here") == str(Path(__file__).parents[3])
     True
     >>> folder_of("nowhere:Mine", "here")
     'here'

@@ -9,13 +9,13 @@ from typing import Any
 
 import msgspec
 
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.registry import PluginError, Registry
-from wire.printable import printable
-from wire.schema.table_reading import parameter_values, read_parameters
-from wire.schema.table_schema import Problem, fields_of
-from wire.schema.type_words import in_words, shown
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.table_reading import parameter_values, read_parameters
+from gridpeers.wire.schema.table_schema import Problem, fields_of
+from gridpeers.wire.schema.type_words import in_words, shown
 
 KEYS = ("use", "folder")
 """Keys of a plug-in's table that are no parameters of it."""

@@ -16,8 +16,8 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from wire.plugins.foreign_code import foreign_code
-from wire.schema.suggestion import suggestion
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.schema.suggestion import suggestion
 
 T = TypeVar("T")
 
@@ -58,7 +58,7 @@ class Registry(Generic[T]):
     >>> greetings.resolve("helo")
     Traceback (most recent call last):
         ...
-    wire.plugins.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings are ...
+    gridpeers.wire.plugins.registry.PluginError: there is no greeting "helo"; did you mean "hello"? The greetings ...
     """
 
     def __init__(
@@ -189,7 +189,9 @@ class Registry(Generic[T]):
         except PluginError:
             raise
         except (Exception, SystemExit) as error:  # whatever a user's module does while it is imported
-            from wire.printable import printable  # it brings msgspec, and the command line's help waits for this module
+            from gridpeers.wire.printable import (
+                printable,  # it brings msgspec, and the command line's help waits for this module
+            )
 
             text = printable(f"{type(error).__name__}: {error}", 300)
             raise PluginError(f"{reference}: importing {name} failed: {text}") from error

@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from wire.printable import printable
+from gridpeers.wire.printable import printable
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any
 
 import msgspec
 
-from wire.schema.table_schema import Field, Problem, below, fields_of, named
+from gridpeers.wire.schema.table_schema import Field, Problem, below, fields_of, named
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lamb
 
     Examples
     --------
-    >>> from plant.plant_config import GfmParameters
+    >>> from gridpeers.plant.plant_config import GfmParameters
     >>> contradictions(GfmParameters, GfmParameters(P_min=2.0))
     [Problem(path='P_min_pu', text='2 must be below P_max_pu = 1; swap them or set both')]
     """
@@ -138,7 +138,7 @@ def problems_of(struct: msgspec.Struct) -> list[Problem]:
 
     Examples
     --------
-    >>> from netem.models.loss import Bernoulli
+    >>> from gridpeers.netem.models.loss import Bernoulli
     >>> problems_of(Bernoulli(p=2.0))
     [Problem(path='p', text='a loss is a probability from 0 to 1, got 2; did you mean 0.02 (2 %)?')]
     """

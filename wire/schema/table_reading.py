@@ -8,9 +8,9 @@ from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
 
-from wire.schema.relations import contradictions
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import (
+from gridpeers.wire.schema.relations import contradictions
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import (
     INHERITED,
     INLINE,
     NO_KEY,
@@ -21,7 +21,7 @@ from wire.schema.table_schema import (
     below,
     fields_of,
 )
-from wire.schema.type_words import (
+from gridpeers.wire.schema.type_words import (
     expected,
     inner_struct,
     keys_of,
@@ -49,7 +49,7 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
 
     Examples
     --------
-    >>> from netem.schema.netem import Netem
+    >>> from gridpeers.netem.schema.netem import Netem
     >>> netem, problems = read_table(Netem, {"link": [{"on": "* <-> *", "delay": "20 ms", "los": 0.1}]})
     >>> for path, text in problems:  # doctest: +ELLIPSIS
     ...     print(f"{path}: {text}")
@@ -70,7 +70,7 @@ def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any]
 
     Examples
     --------
-    >>> from agents.laws.dapi import Dapi
+    >>> from gridpeers.agents.laws.dapi import Dapi
     >>> for name, text in read_parameters(Dapi, {"k": 5000, "betta": 1, "a": "1"})[1]:  # doctest: +ELLIPSIS
     ...     print(f"{name}: {text}")
     betta: unknown parameter; did you mean "beta"? The parameters are P_set_min, P_set_max, ...

@@ -9,8 +9,8 @@ A table is a `msgspec.Struct`, or any class with parameters, such as a law. Its 
         gain: Annotated[float, Unit("1/s"), Range(0, 100), "Rate of the consensus."] = 5.0
 
 A field without a default must be given. Of a class that is no struct, names that begin with "_" and class variables are
-no fields. `wire.schema.table_reading` reads tables by the fields; the reference pages, the writer of scenarios and the
-axes of plots take keys, units and ranges from them.
+no fields. `gridpeers.wire.schema.table_reading` reads tables by the fields; the reference pages, the writer of
+scenarios and the axes of plots take keys, units and ranges from them.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin, g
 
 import msgspec
 
-from wire.schema.plausible import Plausible, Probability, Range, Unit
+from gridpeers.wire.schema.plausible import Plausible, Probability, Range, Unit
 
 
 class Problem(NamedTuple):

@@ -11,10 +11,10 @@ from typing import Any, Literal, get_args, get_origin
 
 import msgspec
 
-from wire.printable import printable
-from wire.schema.plausible import number_in
-from wire.schema.suggestion import suggestion
-from wire.schema.table_schema import NO_KEY, Example, Field, OtherKeys, fields_of
+from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.plausible import number_in
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import NO_KEY, Example, Field, OtherKeys, fields_of
 
 _KIND_WORDS = {
     float: "a number",

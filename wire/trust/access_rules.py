@@ -1,4 +1,4 @@
-"""Zenoh's access rules of a process, from the table of keys (`wire.keys.describe`) and the members of its site. Pure.
+"""Zenoh's access rules of a process, from the keys (`gridpeers.wire.keys.describe`) and the members of its site. Pure.
 
 Everything is denied that no rule allows. Each other member is a subject of its own, by the common names under which it
 is accepted, and has one policy; its rules name disjoint keys. So no two rules can apply to one message, and their order
@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any, Literal, NamedTuple
 
-from wire.keys import ANY_TOKEN, KeySpec, describe
-from wire.trust.member import Member
+from gridpeers.wire.keys import ANY_TOKEN, KeySpec, describe
+from gridpeers.wire.trust.member import Member
 
 Flow = Literal["ingress", "egress"]
 

@@ -12,8 +12,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wire.printable import printable
-from wire.trust.member import DATE_AND_TIME, Member
+from gridpeers.wire.printable import printable
+from gridpeers.wire.trust.member import DATE_AND_TIME, Member
 
 if TYPE_CHECKING:
     from cryptography import x509

@@ -5,8 +5,8 @@ from __future__ import annotations
 from datetime import datetime
 from pathlib import Path
 
-from wire.trust.certificate_files import KeysError, own_certificate
-from wire.trust.member import DATE_AND_TIME, Member
+from gridpeers.wire.trust.certificate_files import KeysError, own_certificate
+from gridpeers.wire.trust.member import DATE_AND_TIME, Member
 
 
 def validity(folder: Path, member: Member, now: datetime) -> str:

@@ -9,10 +9,10 @@ from typing import Any
 
 import msgspec
 
-from wire.messages import PLANT
-from wire.printable import printable
-from wire.trust.access_rules import access_control
-from wire.trust.member import Member, with_inverters
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.printable import printable
+from gridpeers.wire.trust.access_rules import access_control
+from gridpeers.wire.trust.member import Member, with_inverters
 
 
 class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
-from wire.printable import printable
-from wire.trust.certificate_files import CA, KeysError, check_certificate, check_key, read_certificate
-from wire.trust.credentials import Credentials
-from wire.trust.member import DATE_AND_TIME, Member, Role
-from wire.trust.member_list import MemberList, read_list
+from gridpeers.wire.printable import printable
+from gridpeers.wire.trust.certificate_files import CA, KeysError, check_certificate, check_key, read_certificate
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.member import DATE_AND_TIME, Member, Role
+from gridpeers.wire.trust.member_list import MemberList, read_list
 
 COMMANDING: tuple[Role, ...] = ("operator",)
 """Roles that may command a run."""

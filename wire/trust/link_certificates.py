@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Protocol
 
-from wire.messages import PLANT
-from wire.trust.credentials import Credentials
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.trust.credentials import Credentials
 
 
 class Link(Protocol):

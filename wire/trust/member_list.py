@@ -8,10 +8,10 @@ from pathlib import Path
 
 import msgspec
 
-from wire.bounds import is_name
-from wire.foreign_bytes import decode_foreign
-from wire.trust.certificate_files import CA, KeysError, read_certificate, read_file
-from wire.trust.member import Member
+from gridpeers.wire.bounds import is_name
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.trust.certificate_files import CA, KeysError, read_certificate, read_file
+from gridpeers.wire.trust.member import Member
 
 LIST = "members.json"
 """Name of its file."""

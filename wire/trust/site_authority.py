@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from wire.bounds import is_name
-from wire.printable import printable
-from wire.trust.certificate_files import CA, CA_KEY, KeysError, require_private
-from wire.trust.member import DATE_AND_TIME, LONGEST_COMMON_NAME, Member, Role
-from wire.trust.member_list import LIST, MemberList, SignedList, read_list
+from gridpeers.wire.bounds import is_name
+from gridpeers.wire.printable import printable
+from gridpeers.wire.trust.certificate_files import CA, CA_KEY, KeysError, require_private
+from gridpeers.wire.trust.member import DATE_AND_TIME, LONGEST_COMMON_NAME, Member, Role
+from gridpeers.wire.trust.member_list import LIST, MemberList, SignedList, read_list
 
 if TYPE_CHECKING:
     from cryptography import x509

@@ -9,10 +9,10 @@ import typer
 
 from gridpeers.cli.commands.run_command import carry_out
 from gridpeers.cli.usage import BAD_INPUT, ScenarioName, check_choice, chosen, fail, load
-from plant.simulator import OwnSimulator
+from gridpeers.plant.simulator import OwnSimulator
 
 if TYPE_CHECKING:
-    from scenarios.schema import ScenarioModel
+    from gridpeers.scenarios.schema import ScenarioModel
 
 app = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Offer our plant to simulators of others.")
 

@@ -27,10 +27,10 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from scenarios.chaos.campaign import Campaign, Summary, Tell
-    from scenarios.chaos.chaos_folder import ChaosFolder
-    from scenarios.chaos.chaos_run import ChaosRow
-    from scenarios.schema import ScenarioModel
+    from gridpeers.scenarios.chaos.campaign import Campaign, Summary, Tell
+    from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+    from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+    from gridpeers.scenarios.schema import ScenarioModel
 
 _CampaignStart: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
 """Runs that a campaign has already, and a function that returns its folder, made and locked."""
@@ -92,13 +92,13 @@ def chaos(
         _PACKAGES | ({"distributed": "--dask"} if dask else {}),
         "install what chaos needs: pip install 'gridpeers[chaos]'",
     )
-    from scenarios.chaos.campaign import Campaign
-    from scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
-    from scenarios.chaos.disturbed_scenario import ChaosBase
-    from scenarios.results.run_files import RUNS as RUNS_FOLDER
-    from scenarios.results.run_files import FolderError, set_broken, set_status, shown
-    from scenarios.sweep.workers import cores
-    from wire.driver.command_line import command_line
+    from gridpeers.scenarios.chaos.campaign import Campaign
+    from gridpeers.scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
+    from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+    from gridpeers.scenarios.results.run_files import RUNS as RUNS_FOLDER
+    from gridpeers.scenarios.results.run_files import FolderError, set_broken, set_status, shown
+    from gridpeers.scenarios.sweep.workers import cores
+    from gridpeers.wire.driver.command_line import command_line
 
     if out is not None and resume is not None:
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
@@ -148,7 +148,7 @@ def _new_campaign(context: typer.Context, out: Path | None, campaign: Campaign) 
     """Begin a campaign in a new folder, which is made only once the scenario has passed without disturbances."""
     from datetime import datetime
 
-    from scenarios.results.run_files import new_folder, require_folder
+    from gridpeers.scenarios.results.run_files import new_folder, require_folder
 
     name = f"{campaign.base.scenario.name}-chaos"
     require_folder(out, name)
@@ -163,7 +163,7 @@ def _new_campaign(context: typer.Context, out: Path | None, campaign: Campaign) 
 
 def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) -> _CampaignStart:
     """Go on with a campaign in its folder."""
-    from scenarios.chaos.chaos_folder import kept_rows
+    from gridpeers.scenarios.chaos.chaos_folder import kept_rows
 
     if folder.is_dir():
         _lock(context, folder, "--resume")
@@ -172,7 +172,7 @@ def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) 
 
 def _lock(context: typer.Context, folder: Path, option: str) -> None:
     """Lock the campaign's folder until the command ends."""
-    from scenarios.results.folder_lock import locked
+    from gridpeers.scenarios.results.folder_lock import locked
 
     handle = locked(folder, option, "chaos")
     context.call_on_close(lambda: os.close(handle))
@@ -192,8 +192,8 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     """Say what begins; end with a line for each check that the scenario violates by itself."""
     from gridpeers.cli.progress import TRYING, explained_work
-    from scenarios.chaos.campaign import undisturbed
-    from scenarios.checks.check_registry import ALWAYS
+    from gridpeers.scenarios.chaos.campaign import undisturbed
+    from gridpeers.scenarios.checks.check_registry import ALWAYS
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
@@ -210,7 +210,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
 def _work(campaign: Campaign) -> str:
     """Return what the runs with disturbances need before the first of them ends, in words."""
-    from wire.counted import counted
+    from gridpeers.wire.counted import counted
 
     runs = f"{counted(campaign.runs, 'run')} with disturbances"
     if campaign.driver == "processes":
@@ -224,7 +224,7 @@ def _work(campaign: Campaign) -> str:
 
 def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenario: str) -> Summary:
     """Do the campaign, showing how far it is; whatever ends it early ends the command."""
-    from scenarios.chaos.campaign import run_campaign
+    from gridpeers.scenarios.chaos.campaign import run_campaign
 
     with _kept_if_ended(campaign, folder.rows, folder.path, scenario), _stages(console) as tell:
         return run_campaign(campaign, folder, tell)
@@ -234,11 +234,11 @@ def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenar
 def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
     """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
     from gridpeers.cli.interruption import exit_code, interruptible
-    from scenarios.chaos.machine_error import MachineError, machine_lack
-    from scenarios.results.run_files import refusal, shown
-    from scenarios.sweep.workers import WorkersError
-    from wire.driver.command_line import command_line
-    from wire.driver.open_files import too_few_files
+    from gridpeers.scenarios.chaos.machine_error import MachineError, machine_lack
+    from gridpeers.scenarios.results.run_files import refusal, shown
+    from gridpeers.scenarios.sweep.workers import WorkersError
+    from gridpeers.wire.driver.command_line import command_line
+    from gridpeers.wire.driver.open_files import too_few_files
 
     try:
         with interruptible():

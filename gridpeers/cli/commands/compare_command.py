@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require
-from wire.printable import printable
+from gridpeers.wire.printable import printable
 
 _Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
 
@@ -32,9 +32,9 @@ def compare(
     if out.suffix not in kinds:
         fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
 
+    from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
+    from gridpeers.scenarios.schema import ScenarioError
     from gridpeers.studies.comparison import compare as compare_runs
-    from scenarios.results.run_files import FolderError, refusal, shown
-    from scenarios.schema import ScenarioError
 
     try:
         comparison = compare_runs(first, second, names=_names(first, second))

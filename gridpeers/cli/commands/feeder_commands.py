@@ -11,7 +11,7 @@ import typer
 from gridpeers.cli.commands.feeder_glm_command import glm
 from gridpeers.cli.commands.grow_command import grow
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
-from wire.counted import counted
+from gridpeers.wire.counted import counted
 
 if TYPE_CHECKING:
     from gridpeers.feeder import Feeder
@@ -57,7 +57,7 @@ def import_(
     Example:  gridpeers feeder import Master.dss --out my-feeder
     """
     from gridpeers.output_folders import FolderError, shown, whole_folder
-    from plant.tables import feeders
+    from gridpeers.plant.tables import feeders
 
     feeder = read_script(str(file), switch or [], leave_out or [])
     folder = out or Path(folder_of(feeder.name))
@@ -84,8 +84,8 @@ def check(feeder: FeederName, load_set: LoadSet = None, switch: Switches = None,
 
     Example:  gridpeers feeder check microgrid123
     """
-    from plant.equipment.connectivity import Connectivity
-    from plant.equipment.neutrals import returns_in_words
+    from gridpeers.plant.equipment.connectivity import Connectivity
+    from gridpeers.plant.equipment.neutrals import returns_in_words
 
     tables = _read(feeder, load_set, switch, leave_out)
     _describe(tables)
@@ -125,8 +125,8 @@ def solve(
 
     Example:  gridpeers feeder solve microgrid123 --open 13-152
     """
-    from plant.equipment.imported_equipment import is_behind
-    from scenarios.results.run_files import refusal, shown, write_whole
+    from gridpeers.plant.equipment.imported_equipment import is_behind
+    from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
 
     try:
         table = _read(feeder, load_set, switch, leave_out).solve(open_ or ())
@@ -174,7 +174,7 @@ def plot(
     """
     from io import BytesIO
 
-    from scenarios.results.run_files import refusal, shown, write_whole
+    from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
 
     tables = _read(feeder, load_set, switch, leave_out)
     try:
@@ -195,7 +195,7 @@ app.command()(glm)
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     """Read a feeder that was written for another program, or end with every problem in it."""
     from gridpeers.feeder import READERS
-    from plant.tables import FeederError
+    from gridpeers.plant.tables import FeederError
 
     read = READERS.get(Path(name).suffix.lower())
     if read is None:
@@ -210,8 +210,8 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
     """Write the tables of a script's feeder and read them again; end with every problem if a run could not."""
-    from plant.imports.import_checks import of_script
-    from plant.tables import FeederError
+    from gridpeers.plant.imports.import_checks import of_script
+    from gridpeers.plant.tables import FeederError
 
     feeder.save(folder)
     try:
@@ -235,7 +235,7 @@ def folder_of(name: str) -> str:
 def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
     """Read a feeder of tables or a script, or end with every problem in it."""
     from gridpeers.feeder import READERS, Feeder
-    from plant.tables import FeederError
+    from gridpeers.plant.tables import FeederError
 
     if Path(name).suffix.lower() in READERS:
         if load_set is not None:
@@ -252,7 +252,7 @@ def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: 
 
 
 def _describe(feeder: Feeder) -> None:
-    from plant.equipment.imported_equipment import is_behind
+    from gridpeers.plant.equipment.imported_equipment import is_behind
 
     load, generation = (sum(by_bus.values()) / 1e3 for by_bus in (feeder.load_by_bus(), feeder.generation_by_bus()))
     buses = [bus for bus in feeder.buses if not is_behind(bus.name)]

@@ -10,8 +10,8 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, check_choice, fail, load, refuse
 
 if TYPE_CHECKING:
-    from plant.equipment import Feeder
-    from plant.plant_config import PlantSettings
+    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.plant_config import PlantSettings
 
 
 def glm(
@@ -37,10 +37,10 @@ def glm(
     from tempfile import gettempdir
 
     from gridpeers.feeder import READERS
-    from plant.dynamics import PlantError
-    from plant.gridlabd.model.export_glm import export_glm
-    from plant.tables import FeederError
-    from scenarios.results.run_files import refusal, shown, write_whole
+    from gridpeers.plant.dynamics import PlantError
+    from gridpeers.plant.gridlabd.model.export_glm import export_glm
+    from gridpeers.plant.tables import FeederError
+    from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
 
     if Path(feeder).suffix.lower() in READERS:
         fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
@@ -65,8 +65,8 @@ def glm(
 
 def _own(name: str, load_set: str | None) -> tuple[Feeder, PlantSettings]:
     """Return a feeder and the default settings, or end with every problem of its tables."""
-    from plant.plant_config import PlantSettings
-    from plant.tables import FeederError, read_feeder
+    from gridpeers.plant.plant_config import PlantSettings
+    from gridpeers.plant.tables import FeederError, read_feeder
 
     try:
         return read_feeder(name, load_set or "main"), PlantSettings(feeder=name)
@@ -76,7 +76,7 @@ def _own(name: str, load_set: str | None) -> tuple[Feeder, PlantSettings]:
 
 def _of_scenario(name: str, scenario: str, case: str | None, load_set: str | None) -> tuple[Feeder, PlantSettings]:
     """Return a scenario's feeder, with its changes, and its settings; or end if it is on another feeder."""
-    from scenarios.schema.configs import configs
+    from gridpeers.scenarios.schema.configs import configs
 
     spec, feeder = load(scenario, {"plant.load_set": load_set} if load_set else {})
     if name != spec.plant.feeder and Path(name).resolve() != Path(spec.plant.feeder).resolve():

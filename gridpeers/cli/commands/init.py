@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from gridpeers.feeder import Feeder
-    from plant.equipment import Feeder as Tables
-    from scenarios.proposal.feeder_proposal import Proposal
-    from scenarios.schema import ScenarioModel
+    from gridpeers.plant.equipment import Feeder as Tables
+    from gridpeers.scenarios.proposal.feeder_proposal import Proposal
+    from gridpeers.scenarios.schema import ScenarioModel
 
     Project = tuple[ScenarioModel, Tables]
     """A scenario and its feeder."""
@@ -125,7 +125,7 @@ def init(
     from importlib.util import find_spec
 
     from gridpeers.output_folders import FolderError, shown, whole_folder
-    from wire.driver.command_line import command_line
+    from gridpeers.wire.driver.command_line import command_line
 
     try:
         if feeder is None:
@@ -152,8 +152,8 @@ def _with_proposal(
 ) -> tuple[Feeder, Proposal]:
     """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
     from gridpeers.cli.commands.feeder_commands import read_script
-    from scenarios.proposal.feeder_proposal import propose
-    from scenarios.proposal.proposal_errors import NoSwitchError
+    from gridpeers.scenarios.proposal.feeder_proposal import propose
+    from gridpeers.scenarios.proposal.proposal_errors import NoSwitchError
 
     feeder = read_script(script, switches, leave_out)
     try:
@@ -169,7 +169,7 @@ def _with_proposal(
 
 def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Proposal) -> str | None:
     """Return the settings with which a project comes to rest on droop alone, or None; say what they are."""
-    from scenarios.proposal.droop_alone import unsteady
+    from gridpeers.scenarios.proposal.droop_alone import unsteady
 
     if not (found := unsteady(*project, "none")):
         return ""
@@ -184,7 +184,7 @@ def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Pro
 
 def _remedy(feeder: Tables, proposal: Proposal) -> str:
     """Return what may help where no settings do: with much fixed generation, to do without it."""
-    from wire.schema.suggestion import first_of
+    from gridpeers.wire.schema.suggestion import first_of
 
     if proposal.generation < MUCH * proposal.load:
         return "more --inverters give more leaders, or try another --switch"
@@ -202,7 +202,7 @@ def _tried_with_agents(file: Path, case: str, settings: str, rewritten: Callable
     unequal, var sharing weighs more.
     """
     import gridpeers as gp
-    from plant.feeder.current_limits import LIMITS
+    from gridpeers.plant.feeder.current_limits import LIMITS
 
     def failed() -> tuple[dict[str, str], bool]:
         result = gp.load(file).run(case)
@@ -240,13 +240,13 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
     from gridpeers.cli.progress import TRYING, explained_work
-    from plant.equipment.neutrals import returns_in_words
-    from scenarios.proposal.proposal_errors import NoProposalError
-    from scenarios.run_request import BrokenRunError
-    from scenarios.schema import load_scenario
-    from scenarios.start_check import start_problem
-    from wire.counted import counted
-    from wire.driver.command_line import command_line
+    from gridpeers.plant.equipment.neutrals import returns_in_words
+    from gridpeers.scenarios.proposal.proposal_errors import NoProposalError
+    from gridpeers.scenarios.run_request import BrokenRunError
+    from gridpeers.scenarios.schema import load_scenario
+    from gridpeers.scenarios.start_check import start_problem
+    from gridpeers.wire.counted import counted
+    from gridpeers.wire.driver.command_line import command_line
 
     try:
         feeder, proposal = _with_proposal(str(script), switches, leave_out, count)

@@ -12,7 +12,7 @@ import typer
 
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BAD_INPUT, fail, require
-from wire.trust.member import Role
+from gridpeers.wire.trust.member import Role
 
 app = typer.Typer(
     cls=Commands,
@@ -41,7 +41,7 @@ def init(
     Example:  gridpeers keys init lab
     """
     with _errors(days):
-        from wire.trust.site_authority import make_site
+        from gridpeers.wire.trust.site_authority import make_site
 
         known = make_site(site, days=days)
         names = ", ".join(f"{member.name} ({member.role})" for member in known.members)
@@ -66,9 +66,9 @@ def issue(
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
     with _errors(days):
-        from wire.trust.certificate_files import KeysError
-        from wire.trust.member_list import read_list
-        from wire.trust.site_authority import issue, objections
+        from gridpeers.wire.trust.certificate_files import KeysError
+        from gridpeers.wire.trust.member_list import read_list
+        from gridpeers.wire.trust.site_authority import issue, objections
 
         names = list(dict.fromkeys(names))
         known = read_list(keys)
@@ -86,7 +86,7 @@ def revoke(name: _Name, keys: _Keys = Path()) -> None:
     Example:  gridpeers keys revoke inv4 --keys lab
     """
     with _errors():
-        from wire.trust.site_authority import revoke as revoke_name
+        from gridpeers.wire.trust.site_authority import revoke as revoke_name
 
         revoke_name(keys, name)
         typer.echo(
@@ -104,9 +104,9 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys
-        from wire.trust.certificate_validity import validity
-        from wire.trust.member_list import LIST, read_list
+        from gridpeers.wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys
+        from gridpeers.wire.trust.certificate_validity import validity
+        from gridpeers.wire.trust.member_list import LIST, read_list
 
         known, now = read_list(keys), datetime.now(UTC)
         mistaken = mistaken_keys(keys, known.members)
@@ -131,7 +131,7 @@ def _errors(days: float = 1.0) -> Iterator[None]:
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
     if not 0.0 < days <= 3650.0:
         fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
-    from wire.trust.certificate_files import KeysError
+    from gridpeers.wire.trust.certificate_files import KeysError
 
     try:
         yield

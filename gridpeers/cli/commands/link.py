@@ -9,11 +9,11 @@ import typer
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-from scenarios.live.client.access import Access
+from gridpeers.scenarios.live.client.access import Access
 
 if TYPE_CHECKING:
-    from agents.agent_config import AgentConfig
-    from scenarios.emulation.link_command import LinkCommand
+    from gridpeers.agents.agent_config import AgentConfig
+    from gridpeers.scenarios.emulation.link_command import LinkCommand
 
 link = typer.Typer(
     cls=Commands,
@@ -64,7 +64,7 @@ def set_(
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
         fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
         if not fault and not profile:
-            from scenarios.live.client.run_address import UsageError
+            from gridpeers.scenarios.live.client.run_address import UsageError
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
@@ -93,7 +93,7 @@ def cut(
     Example:  gridpeers link cut inv4 inv7 --for 5
     """
     with usage_errors():
-        from netem.models.medium import Cut
+        from gridpeers.netem.models.medium import Cut
 
         _give(
             links,
@@ -148,8 +148,8 @@ def show(
     Example:  gridpeers link show
     """
     with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
-        from scenarios.live.requests.link_requests import link_states
-        from scenarios.live.show.link_table import links_text
+        from gridpeers.scenarios.live.requests.link_requests import link_states
+        from gridpeers.scenarios.live.show.link_table import links_text
 
         t, states, silent = link_states(client)
         typer.echo(links_text(run, t, states), nl=False)
@@ -158,9 +158,9 @@ def show(
 
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
-    from netem.models.delay import DELAY, LONGEST_DELAY, Uniform
-    from scenarios.live.client.run_address import UsageError
-    from wire.schema.plausible import Plausible
+    from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Uniform
+    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.wire.schema.plausible import Plausible
 
     if jitter is None:
         return {} if delay is None else {"delay": delay}
@@ -176,8 +176,8 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 
 def _pattern(links: list[str], arrow: str) -> str:
-    from scenarios.emulation.link_command import EVERYTHING
-    from scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.emulation.link_command import EVERYTHING
+    from gridpeers.scenarios.live.client.run_address import UsageError
 
     if not links:
         return EVERYTHING
@@ -204,12 +204,12 @@ def _give(
     access: Access,
 ) -> None:
     """Check a link command, give it, and print the receivers' answers."""
-    from netem.fault_schedule import Heal
-    from netem.schema.fault import Fault
-    from netem.schema.pattern import objections
-    from scenarios.emulation.link_command import LinkCommand
-    from scenarios.live.client.run_address import UsageError
-    from scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
+    from gridpeers.netem.fault_schedule import Heal
+    from gridpeers.netem.schema.fault import Fault
+    from gridpeers.netem.schema.pattern import objections
+    from gridpeers.scenarios.emulation.link_command import LinkCommand
+    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
     if wrong := objections(on, None, {}):
@@ -240,7 +240,7 @@ def _give(
 
 def _age_note(command: LinkCommand, agent: AgentConfig) -> str:
     """Return a note if agents will ignore states for their age; else ""."""
-    from netem.models.delay import Constant, RandomDelay
+    from gridpeers.netem.models.delay import Constant, RandomDelay
 
     delay = command.fault.models().get("delay") if command.fault is not None else None
     limit = agent.control.degraded_communication.max_age or agent.max_age

@@ -27,9 +27,9 @@ def metrics(
     """
     require({"mcap": "the record of a run"})
 
-    from scenarios.record.record_metrics import report_of
-    from scenarios.record.record_reader import RecordFileError, RunRecord
-    from scenarios.results.report import show
+    from gridpeers.scenarios.record.record_metrics import report_of
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.report import show
 
     try:
         report = report_of(RunRecord.open(run, case))

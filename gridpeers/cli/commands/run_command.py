@@ -24,15 +24,15 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
-from plant.simulator import Simulator
+from gridpeers.plant.simulator import Simulator
 
 if TYPE_CHECKING:
     import socket
 
+    from gridpeers.plant.equipment import Feeder
     from gridpeers.runs.choices import Pace
-    from plant.equipment import Feeder
-    from scenarios.run_request import Driver
-    from scenarios.schema import ScenarioModel
+    from gridpeers.scenarios.run_request import Driver
+    from gridpeers.scenarios.schema import ScenarioModel
 
 
 def run(
@@ -92,7 +92,7 @@ def run(
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
     if driver == "processes":
-        from scenarios.drivers.warm_servers import prepare
+        from gridpeers.scenarios.drivers.warm_servers import prepare
 
         prepare()
     from gridpeers.runs.choices import Pace
@@ -112,10 +112,10 @@ def run(
 def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
     """End with every problem of the certificates that a run needs, before anything starts; say which end soon."""
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
-    from scenarios.drivers.secured import secured
-    from scenarios.schema.configs import configs
-    from scenarios.schema.participants import inverters_of
-    from wire.trust.certificate_files import KeysError
+    from gridpeers.scenarios.drivers.secured import secured
+    from gridpeers.scenarios.schema.configs import configs
+    from gridpeers.scenarios.schema.participants import inverters_of
+    from gridpeers.wire.trust.certificate_files import KeysError
 
     inverters = tuple(row.name for row in inverters_of(spec, feeder))
     notes: dict[str, None] = {}
@@ -148,7 +148,7 @@ def carry_out(
     from datetime import datetime
 
     from gridpeers.runs.choices import check_how
-    from scenarios.schema import ScenarioError
+    from gridpeers.scenarios.schema import ScenarioError
 
     try:
         check_how(driver, pace, spec, dash="--")
@@ -165,11 +165,11 @@ def carry_out(
 
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import COMPILING, RESTING, progress
-    from scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
-    from scenarios.results.file_sizes import file_sizes, require_room
-    from scenarios.results.run_files import RUNS, FolderError, new_folder, shown
-    from scenarios.run import run as run_scenario
-    from scenarios.run_request import BrokenRunError, LawStopError, Request
+    from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
+    from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
+    from gridpeers.scenarios.results.run_files import RUNS, FolderError, new_folder, shown
+    from gridpeers.scenarios.run import run as run_scenario
+    from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Request
 
     try:
         if driver == "processes":
@@ -197,8 +197,8 @@ def carry_out(
             fail([f"FAILED  {error}", *([left] if folder.is_dir() else [])], CLAIM_FAILED)
         except BrokenRunError as error:
             fail([f"the run broke: {error}", *([left] if folder.is_dir() else [])], BROKEN)
-        from scenarios.checks.check_registry import LAW_FAILED
-        from scenarios.results.report import show
+        from gridpeers.scenarios.checks.check_registry import LAW_FAILED
+        from gridpeers.scenarios.results.report import show
 
         show(report, console)
     failed = any(verdict.status == "FAIL" for verdict in report.verdicts) or report.fails(LAW_FAILED)

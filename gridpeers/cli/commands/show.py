@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, load, require
-from wire.counted import counted
+from gridpeers.wire.counted import counted
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
 """Values of the argument of `doc`."""
@@ -19,7 +19,7 @@ def list_() -> None:
 
     Example:  gridpeers list
     """
-    from scenarios.catalogue_files import summaries
+    from gridpeers.scenarios.catalogue_files import summaries
 
     scenarios = summaries()
     width = max(map(len, scenarios), default=0)
@@ -44,12 +44,12 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from gridpeers.cli.progress import TRYING, explained_work
-    from scenarios.predict.robustness_notes import robustness_notes
-    from scenarios.results.file_sizes import file_sizes
-    from scenarios.schema.liar_notes import liar_notes
-    from scenarios.schema.security_notes import security_notes
-    from scenarios.schema.supply import supply_notes
-    from scenarios.start_check import start_problem
+    from gridpeers.scenarios.predict.robustness_notes import robustness_notes
+    from gridpeers.scenarios.results.file_sizes import file_sizes
+    from gridpeers.scenarios.schema.liar_notes import liar_notes
+    from gridpeers.scenarios.schema.security_notes import security_notes
+    from gridpeers.scenarios.schema.supply import supply_notes
+    from gridpeers.scenarios.start_check import start_problem
 
     with explained_work(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)
@@ -76,6 +76,6 @@ def doc(
 
     Example:  gridpeers doc scenario
     """
-    from scenarios.reference import page
+    from gridpeers.scenarios.reference import page
 
     typer.echo(page(topic), nl=False)

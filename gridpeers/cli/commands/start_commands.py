@@ -22,12 +22,12 @@ from gridpeers.cli.commands.options import (
     usage_errors,
 )
 from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
-from scenarios.live.client.access import Access
-from wire.driver.command_line import command_line
-from wire.driver.output import watch_readers
+from gridpeers.scenarios.live.client.access import Access
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
-    from scenarios.live.launch.live_processes import ProcessOutcome
+    from gridpeers.scenarios.live.launch.live_processes import ProcessOutcome
 
 _Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
 _Listen = Annotated[
@@ -75,9 +75,9 @@ def _start(
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
-        from scenarios.live.client.access import objection, with_protocol
-        from scenarios.live.client.run_address import RunAddress, UsageError, check_endpoint, check_name
-        from scenarios.live.launch.plant_endpoint import check_alone, endpoint_for_run
+        from gridpeers.scenarios.live.client.access import objection, with_protocol
+        from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError, check_endpoint, check_name
+        from gridpeers.scenarios.live.launch.plant_endpoint import check_alone, endpoint_for_run
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_name("--run", run)
@@ -91,17 +91,17 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
-        from scenarios.checks.check_registry import LAW_FAILED
-        from scenarios.live.launch.link_log import LinkLog, check_new
-        from scenarios.live.launch.live_folders import folders, live_record
-        from scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
-        from scenarios.live.launch.live_processes import all_here, plant_here, say
-        from scenarios.live.numbers.live_report import conclude
-        from scenarios.record.record_info import LIVE
-        from scenarios.results.file_sizes import HOUR, file_sizes, require_room
-        from scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
-        from scenarios.results.metrics_file import RunMetrics
-        from scenarios.schema.plugin_keys import checks_off
+        from gridpeers.scenarios.checks.check_registry import LAW_FAILED
+        from gridpeers.scenarios.live.launch.link_log import LinkLog, check_new
+        from gridpeers.scenarios.live.launch.live_folders import folders, live_record
+        from gridpeers.scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
+        from gridpeers.scenarios.live.launch.live_processes import all_here, plant_here, say
+        from gridpeers.scenarios.live.numbers.live_report import conclude
+        from gridpeers.scenarios.record.record_info import LIVE
+        from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
+        from gridpeers.scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
+        from gridpeers.scenarios.results.metrics_file import RunMetrics
+        from gridpeers.scenarios.schema.plugin_keys import checks_off
 
         check_new(record)
         spec = chosen(spec, chosen_case(spec, case), None)
@@ -117,7 +117,7 @@ def _start(
         )
         config, everyone = configure(spec, feeder, options, endpoint, beyond)
         if keys is not None:
-            from scenarios.drivers.secured import secured
+            from gridpeers.scenarios.drivers.secured import secured
 
             inverters = tuple(row.name for row in (*feeder.inverters, *feeder.spares))
             started = config.agents if agents else ()
@@ -215,10 +215,10 @@ def agent(
     """
     require({"zenoh": "an agent"})
     with usage_errors():
-        from scenarios.drivers.free_endpoint import free_endpoint
-        from scenarios.live.client.access import objection
-        from scenarios.live.client.run_address import UsageError, check_endpoint, check_inverters, check_wait
-        from scenarios.live.launch.live_processes import agent_here
+        from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+        from gridpeers.scenarios.live.client.access import objection
+        from gridpeers.scenarios.live.client.run_address import UsageError, check_endpoint, check_inverters, check_wait
+        from gridpeers.scenarios.live.launch.live_processes import agent_here
 
         check_inverters(inverters)
         if keys is not None and len(inverters) > 1:

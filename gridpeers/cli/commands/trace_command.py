@@ -11,7 +11,7 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, fail, require
 
 if TYPE_CHECKING:
-    from scenarios.record.record_reader import RunRecord
+    from gridpeers.scenarios.record.record_reader import RunRecord
 
 MOST = 20_000
 """Most messages in a diagram: more are a grey area."""
@@ -65,13 +65,13 @@ def trace(
     if not (isfinite(since) and isfinite(end) and 0.0 <= since < end):
         fail([f"--from {since:g} --to {end:g}: needs two run times in s, the later one second"], BAD_INPUT)
 
-    from scenarios.record.record_reader import RecordFileError, RunRecord
-    from scenarios.results.run_files import refusal, shown
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.run_files import refusal, shown
 
     try:
         record = RunRecord.open(run, case)
         if svg is None:
-            from scenarios.trace.perfetto_trace import write_perfetto_trace
+            from gridpeers.scenarios.trace.perfetto_trace import write_perfetto_trace
 
             target = out or record.path.with_name("trace.pftrace")
             arrows = write_perfetto_trace(record, target)
@@ -90,10 +90,10 @@ def trace(
 
 def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str) -> str:
     """Draw the messages of a window; return how many."""
-    from scenarios.results.plots.space_time_diagram import space_time_diagram
-    from scenarios.results.plots.style import save
-    from scenarios.short_names import in_order, short
-    from scenarios.trace.flows import flows
+    from gridpeers.scenarios.results.plots.space_time_diagram import space_time_diagram
+    from gridpeers.scenarios.results.plots.style import save
+    from gridpeers.scenarios.short_names import in_order, short
+    from gridpeers.scenarios.trace.flows import flows
 
     if since > record.t_end:
         fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)

@@ -13,11 +13,11 @@ import typer
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.page_beside import HERE, PORT
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
-from scenarios.live.client.access import Access
-from wire.driver.output import watch_readers
+from gridpeers.scenarios.live.client.access import Access
+from gridpeers.wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
-    from scenarios.view.page_server import Pages
+    from gridpeers.scenarios.view.page_server import Pages
 
 Line = Callable[[str], str]
 """Makes the line that a command prints, from the address of its page."""
@@ -76,9 +76,9 @@ def _live(
 ) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a live run, and the line that tells their address."""
     with run_client(run, connect, wait, access, meet_agents=True, acts=control) as client:
-        from scenarios.view.live_pages import LivePages
-        from scenarios.view.page_rights import looks_only
-        from scenarios.view.run_follower import RunFollower
+        from gridpeers.scenarios.view.live_pages import LivePages
+        from gridpeers.scenarios.view.page_rights import looks_only
+        from gridpeers.scenarios.view.run_follower import RunFollower
 
         rights = "" if control else f"; {looks_only(client.where.credentials)}"
         with RunFollower(client) as follower:
@@ -92,10 +92,10 @@ def _live(
 def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a record, and the line that tells their address."""
     require({"mcap": "the record of a run"})
-    from scenarios.record.record_path import record_path
-    from scenarios.record.record_reader import RecordFileError
-    from scenarios.view.recorded.record_pages import RecordPages
-    from scenarios.view.recorded.recorded_run import RecordedRun
+    from gridpeers.scenarios.record.record_path import record_path
+    from gridpeers.scenarios.record.record_reader import RecordFileError
+    from gridpeers.scenarios.view.recorded.record_pages import RecordPages
+    from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
 
     try:
         path = record_path(path, case).parent if case else path
@@ -110,13 +110,13 @@ def _serve(
 ) -> NoReturn:
     """Serve pages until a signal comes."""
     with usage_errors():
-        from scenarios.view.page_address import access, listen, url_of
+        from gridpeers.scenarios.view.page_address import access, listen, url_of
 
         token, hosts = access(address, token)
         listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
-        from scenarios.view.page_server import PageOptions, PageServer
-        from wire.driver.drive import StoppedError
+        from gridpeers.scenarios.view.page_server import PageOptions, PageServer
+        from gridpeers.wire.driver.drive import StoppedError
 
         watch_readers(quits=False)
         signal = "SIGINT"

@@ -34,10 +34,10 @@ def why(
     """
     require({"mcap": "the record of a run"})
 
-    from scenarios.explanation.explanation import explain
-    from scenarios.explanation.explanation_text import show
-    from scenarios.explanation.trail import trail
-    from scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.explanation.explanation import explain
+    from gridpeers.scenarios.explanation.explanation_text import show
+    from gridpeers.scenarios.explanation.trail import trail
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 
     if not isfinite(t):
         fail([f"TIME {t}: needs a run time in s, as 4.3"], BAD_INPUT)

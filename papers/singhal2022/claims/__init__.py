@@ -1,7 +1,7 @@
 """The paper's claims on its experiments, one file per experiment."""
 
 from gridpeers.benchmarks import Claim
-from papers.singhal2022.claims import (
+from gridpeers.papers.singhal2022.claims import (
     communication_claims,
     intermittency_claims,
     islanding_claims,

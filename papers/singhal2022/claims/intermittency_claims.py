@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Findings
-from papers.singhal2022.claims.experiment_claims import ExperimentClaims
-from papers.singhal2022.tolerances import AT_LIMIT, EQUAL, F_NONE, HEADROOM_GONE, MQSI_UNMOVED
+from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims
+from gridpeers.papers.singhal2022.tolerances import AT_LIMIT, EQUAL, F_NONE, HEADROOM_GONE, MQSI_UNMOVED
 
 CLOUDS = "clouds"
 """Label of the event in the scenario."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import F_BAND, MPSI_BAND, Findings
-from papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
-from papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
+from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
+from gridpeers.papers.singhal2022.tolerances import AT_ONCE, EQUAL, V_FIGURE, WITHIN
 
 LEAVE, RETURN = "leave", "return"
 """Labels of the events in the scenario."""

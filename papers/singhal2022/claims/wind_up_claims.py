@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Findings
-from papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
-from papers.singhal2022.tolerances import WITHIN
+from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
+from gridpeers.papers.singhal2022.tolerances import WITHIN
 
 CASES = ("none", "clamp", "conditional")
 SUN, CLOUDS = "sun", "clouds"

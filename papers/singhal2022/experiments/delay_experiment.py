@@ -6,9 +6,8 @@ from typing import Literal
 
 import numpy as np
 
-from gridpeers.theory import var_growth
-from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
@@ -17,6 +16,7 @@ from papers.singhal2022.experiments.experiment_output import (
     TableCell,
     time_panels,
 )
+from gridpeers.theory import var_growth
 
 DELAY, K_Q = "link[0].delay", "gains.k_q"
 WHOLE, ALONE = 0.25, 1e5

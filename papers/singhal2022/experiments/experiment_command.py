@@ -13,8 +13,8 @@ from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, Dask, check_cho
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from papers.singhal2022.experiments.experiment_output import ExperimentResult
-    from papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
+    from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
+    from gridpeers.papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
 
 
 def experiment(
@@ -42,7 +42,7 @@ def experiment(
     needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
     require(needed)
     from gridpeers.output_folders import RUNS, refusal, shown
-    from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS, FromSweep
+    from gridpeers.papers.singhal2022.experiments.experiment_registry import EXPERIMENTS, FromSweep
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
@@ -72,8 +72,8 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, ag
     check_packages(dask=bool(dask))
     import pandas as pd
 
+    from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
     from gridpeers.sweep_files import read_sweep
-    from papers.singhal2022.experiments.experiment_data import SweepData
 
     try:
         plan = read_sweep(source.sweep)
@@ -92,7 +92,7 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.output_folders import shown
-    from papers.singhal2022.experiments.experiment_data import CaseData
+    from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData
 
     scenario, left = gp.load(source.scenario), f"what came until then is in {shown(folder)}/"
     try:
@@ -110,7 +110,7 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
 
 def _title(source: FromSweep | FromScenario) -> str:
     """Return the title of the file that is run."""
+    from gridpeers.papers.singhal2022.experiments.experiment_registry import FromScenario
     from gridpeers.sweep_files import sweep_title
-    from papers.singhal2022.experiments.experiment_registry import FromScenario
 
     return gp.load(source.scenario).title if isinstance(source, FromScenario) else sweep_title(source.sweep)

@@ -14,7 +14,7 @@ import numpy as np
 
 from gridpeers.measures import Floats
 from gridpeers.output_folders import write_whole
-from papers.singhal2022.experiments.experiment_data import INDEXES
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES
 
 Look = Literal["measured", "hollow", "predicted", "points", "trace", "solid", "reference"]
 """Measured: line and filled markers. Hollow: hollow markers, another way to measure. Predicted: a dashed line. Points:
@@ -116,7 +116,7 @@ class ExperimentResult:
 
     def write(self, folder: Path) -> tuple[Path, ...]:
         """Write figure.png, table.csv and table.md into a folder; the files."""
-        from papers.singhal2022.experiments import (
+        from gridpeers.papers.singhal2022.experiments import (
             experiment_plots as plots,  # matplotlib takes long to import; nothing else waits for it
         )
 

@@ -17,7 +17,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from gridpeers.figures import PAGE, save
-from papers.singhal2022.experiments.experiment_output import Curve, Page, Panel
+from gridpeers.papers.singhal2022.experiments.experiment_output import Curve, Page, Panel
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#7a7a7a", "#000000")
 MARKERS = "osD^vPX*"

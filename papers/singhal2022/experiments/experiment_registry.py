@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from papers.singhal2022.experiments.degraded_communication_experiment import degraded_communication
-from papers.singhal2022.experiments.delay_experiment import communication, delay
-from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
-from papers.singhal2022.experiments.experiment_output import ExperimentResult
-from papers.singhal2022.experiments.hostile_experiment import hostile
-from papers.singhal2022.experiments.loss_experiment import loss
-from papers.singhal2022.experiments.outage_experiments import flapping, partition
-from papers.singhal2022.experiments.places_experiment import places
-from papers.singhal2022.experiments.topology_experiment import topology
+from gridpeers.papers.singhal2022.experiments.degraded_communication_experiment import degraded_communication
+from gridpeers.papers.singhal2022.experiments.delay_experiment import communication, delay
+from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
+from gridpeers.papers.singhal2022.experiments.hostile_experiment import hostile
+from gridpeers.papers.singhal2022.experiments.loss_experiment import loss
+from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping, partition
+from gridpeers.papers.singhal2022.experiments.places_experiment import places
+from gridpeers.papers.singhal2022.experiments.topology_experiment import topology
 
 
 @dataclass(frozen=True)

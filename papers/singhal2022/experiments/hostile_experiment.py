@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from papers.singhal2022.experiments.experiment_data import SweepData
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gridpeers.measures import Floats, Settling
-from gridpeers.theory import Case, Loop, Ticks, Times, predicted_times, sharing_index
-from papers.singhal2022.experiments.experiment_data import CaseData, cut_between, times_of, without
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, cut_between, times_of, without
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
@@ -16,6 +15,7 @@ from papers.singhal2022.experiments.experiment_output import (
     Panel,
     TableCell,
 )
+from gridpeers.theory import Case, Loop, Ticks, Times, predicted_times, sharing_index
 
 COLUMNS = (
     ("halves", ("halves", "halves-expire")),

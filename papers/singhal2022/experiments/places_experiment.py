@@ -11,10 +11,9 @@ from itertools import product
 import numpy as np
 
 from gridpeers.measures import Flags, Floats
-from gridpeers.theory import delay_limit, var_delay_limit, var_growth
-from papers.singhal2022.experiments.delay_experiment import ALONE, DELAY, K_Q, WHOLE
-from papers.singhal2022.experiments.experiment_data import SweepData
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.delay_experiment import ALONE, DELAY, K_Q, WHOLE
+from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
@@ -22,6 +21,7 @@ from papers.singhal2022.experiments.experiment_output import (
     Page,
     Panel,
 )
+from gridpeers.theory import delay_limit, var_delay_limit, var_growth
 
 ON = "link[0].on"
 

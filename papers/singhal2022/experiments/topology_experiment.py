@@ -6,10 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gridpeers.random_graphs import Control, adjacency
-from gridpeers.theory import InverterGroup, predicted_times
-from papers.singhal2022.experiments.experiment_data import INDEXES, SweepData, times_of
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData, times_of
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
@@ -17,6 +15,8 @@ from papers.singhal2022.experiments.experiment_output import (
     TableCell,
     time_panels,
 )
+from gridpeers.random_graphs import Control, adjacency
+from gridpeers.theory import InverterGroup, predicted_times
 
 DELAY, LINKS = "link[0].delay", "graph.links"
 PREDICTED = ("predicted f", "predicted sharing")

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.figures import PAGE
-from papers.singhal2022.claims.topology_claims import TREE, GraphRun, medians
+from gridpeers.papers.singhal2022.claims.topology_claims import TREE, GraphRun, medians
 
 LEAST = 1e-6
 """MPSI below this is drawn as this: on an axis of logarithms there is no 0."""

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from gridpeers.figures import PAGE
-from papers.singhal2022.tolerances import MQSI_FACTOR
+from gridpeers.papers.singhal2022.tolerances import MQSI_FACTOR
 
 _COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
 _MARKERS = "os^D"

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 import gridpeers as gp
 from gridpeers.output_folders import feeder_folder
-from papers.singhal2022.claims.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.claims.islanding_claims import CASES, EVENTS
 
 if TYPE_CHECKING:
-    from papers.singhal2022.figures.var_sharing import EventValues
+    from gridpeers.papers.singhal2022.figures.var_sharing import EventValues
 
 BANKS: dict[str, dict[str, int]] = {
     "300 kvar at 83, 300 at 151 (ours)": {"83": 100, "151": 100},

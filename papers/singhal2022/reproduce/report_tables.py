@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from gridpeers.benchmarks import HEADINGS, Quantity
-from papers.singhal2022.reproduce.reproduction import PartResult
-from papers.singhal2022.tables import Cell, PaperTable
-from papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
+from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult
+from gridpeers.papers.singhal2022.tables import Cell, PaperTable
+from gridpeers.papers.singhal2022.tolerances import MQSI_FACTOR, V_RELATIVE
 
 
 class Entry(NamedTuple):

@@ -12,11 +12,11 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from gridpeers.benchmarks import HEADINGS
 from gridpeers.output_folders import set_status, versions, write_whole
-from papers.singhal2022.headline import headline
-from papers.singhal2022.reproduce.report_tables import lines, tolerances
-from papers.singhal2022.reproduce.reproduction import Reproduction, machine, metrics_json
-from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.work import FORMATS, Work
+from gridpeers.papers.singhal2022.headline import headline
+from gridpeers.papers.singhal2022.reproduce.report_tables import lines, tolerances
+from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction, machine, metrics_json
+from gridpeers.papers.singhal2022.reproduce.settings import settings
+from gridpeers.papers.singhal2022.reproduce.work import FORMATS, Work
 
 PAPER = (
     "Singhal, Vu, Du: Consensus Control for Coordinating Grid-Forming and Grid-Following Inverters in Microgrids. "

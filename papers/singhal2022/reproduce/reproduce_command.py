@@ -21,7 +21,7 @@ from gridpeers.cli.usage import (
     require,
     terminal,
 )
-from papers.singhal2022.reproduce.parts import CHOICES, chosen
+from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, chosen
 
 
 def reproduce(
@@ -76,9 +76,9 @@ def _reproduce(
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
-    from papers.singhal2022.reproduce.report_writing import write
-    from papers.singhal2022.reproduce.reproduction import Reproduction
-    from papers.singhal2022.reproduce.work import Work
+    from gridpeers.papers.singhal2022.reproduce.report_writing import write
+    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
+    from gridpeers.papers.singhal2022.reproduce.work import Work
 
     now = datetime.now().astimezone()
     try:
@@ -123,8 +123,8 @@ def _reproduce(
 
 def _summary(whole: object) -> list[str]:
     """Return the end in lines: every claim that does not hold, and the counts."""
-    from papers.singhal2022.headline import headline
-    from papers.singhal2022.reproduce.reproduction import Reproduction
+    from gridpeers.papers.singhal2022.headline import headline
+    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
 
     assert isinstance(whole, Reproduction)
     lines = []

@@ -9,8 +9,8 @@ from typing import Any
 
 import gridpeers as gp
 from gridpeers.benchmarks import Settling, Steady
+from gridpeers.papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
 from gridpeers.random_graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
-from papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
 
 LINKS = (8, 9, 10, 12, 16, 24, 36)
 """Links of the connected graphs; most where the paper's curve bends."""

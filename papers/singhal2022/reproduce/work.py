@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import gridpeers as gp
 from gridpeers.benchmarks import Findings, judge
 from gridpeers.cli.remaining import Tell
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.claims.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.reproduce import capacitor_banks as banks
+from gridpeers.papers.singhal2022.reproduce import topology_study as topology
+from gridpeers.papers.singhal2022.reproduce.parts import Part
+from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult
+from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.theory import ScenarioModel
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.claims.islanding_claims import CASES, EVENTS
-from papers.singhal2022.reproduce import capacitor_banks as banks
-from papers.singhal2022.reproduce import topology_study as topology
-from papers.singhal2022.reproduce.parts import Part
-from papers.singhal2022.reproduce.reproduction import PartResult
-from papers.singhal2022.tables import tables_of
 
 if TYPE_CHECKING:
     from gridpeers.figures import Format
@@ -137,7 +137,7 @@ class Work:
         found = topology.study(self.seed, note, jobs=self.jobs, dask=self.dask)
         if figures:
             from gridpeers.figures import save
-            from papers.singhal2022.figures.topologies import topologies
+            from gridpeers.papers.singhal2022.figures.topologies import topologies
 
             save(topologies(found.graphs), folder, part.pictures[0].stem, FORMATS)
         return found, {}, None, folder
@@ -153,7 +153,7 @@ class Work:
         paper = {(cell.case, cell.event): cell.paper for cell in cells}
         if figures:
             from gridpeers.figures import save
-            from papers.singhal2022.figures.var_sharing import var_sharing
+            from gridpeers.papers.singhal2022.figures.var_sharing import var_sharing
 
             save(var_sharing(paper, ours, CASES, EVENTS), folder, part.pictures[0].stem, FORMATS)
         metrics = [

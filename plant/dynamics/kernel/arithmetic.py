@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import compiled
 
 A120 = complex(-0.5, 0.5 * np.sqrt(3.0))
 """a = exp(j 120 deg)."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import compiled
 
 Integers = NDArray[np.int64]
 Real = NDArray[np.float64]

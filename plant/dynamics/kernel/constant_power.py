@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120
-from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.solve import solve_network
+from gridpeers.plant.dynamics.kernel.arithmetic import A120
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.solve import solve_network
 
 EXACT, SETTLED = 1e-13, 1e-11
 """Largest change of an injection (pu of its rated current) at which to end: at once, and after `PATIENCE`."""
@@ -45,7 +45,7 @@ def settle_powers(
     most
         Most rounds.
     net
-        A `plant.dynamics.reduction.reduced.Reduced` of islands at rest.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced` of islands at rest.
     J
         Injections (A), n_inv x 3: first guess, then solution.
     S

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, magnitude, unit_phasor
-from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.gfl import advance_gfl
-from plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
+from gridpeers.plant.dynamics.kernel.arithmetic import A120, magnitude, unit_phasor
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.gfl import advance_gfl
+from gridpeers.plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
 
 READING = 7
 """Numbers per inverter and step: f (Hz), P (W), Q (var), mean V (V), V of the lowest and the highest phase (V), and
@@ -28,7 +28,7 @@ class Units(NamedTuple):
     f_nom: float
     """Nominal frequency (Hz)."""
     gfm: Any
-    """Records of `plant.dynamics.kernel.gfm.PARAMETERS`."""
+    """Records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`."""
     gfm_at: NDArray[np.int64]
     """The inverter that each belongs to."""
     gfm_state: Any
@@ -38,7 +38,7 @@ class Units(NamedTuple):
     gfm_d: Any
     """Slopes of the step's first pass."""
     gfl: Any
-    """The same for `plant.dynamics.kernel.gfl`."""
+    """The same for `gridpeers.plant.dynamics.kernel.gfl`."""
     gfl_at: NDArray[np.int64]
     gfl_state: Any
     gfl_0: Any
@@ -118,7 +118,7 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
     units
         `Units`.
     net
-        A `plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     theta
         Room for a number an inverter.
     rotation

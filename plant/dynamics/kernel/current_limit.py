@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.solve import solve_network
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.solve import solve_network
 
 MAX_LIMITING = 2000
 """Most rounds of one limiting. A lone inverter needs about a hundred: a limited current is no source of voltage."""
@@ -35,7 +35,7 @@ def limit_currents(
     Parameters
     ----------
     gfm, gfm_at, online, J, V, limiting
-        As in `plant.dynamics.kernel.controller_pass.Units`: J is reduced, and `limiting` says whose.
+        As in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is reduced, and `limiting` says whose.
     """
     largest = 0.0
     for k in range(gfm_at.size):
@@ -71,7 +71,8 @@ def solve_on(
     net, rotation, x, I_b, tolerance, work
         As for `solve_network`.
     units
-        A `plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the last solution.
+        A `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the last
+        solution.
     """
     total = 0
     for _ in range(MAX_LIMITING):

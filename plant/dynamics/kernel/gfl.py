@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat, unit_phasor
-from plant.dynamics.kernel.compiled import compiled
-from plant.plant_config import GflParameters, Method
+from gridpeers.plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat, unit_phasor
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.plant_config import GflParameters, Method
 
 PARAMETERS = np.dtype(
     [
@@ -96,7 +96,7 @@ def filter_admittance(par: GflParameters, S_b: float, V_b: float) -> complex:
 def pack(
     par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float, method: Method = "first-order"
 ) -> NDArray[np.void]:
-    """Parameters of one unit as the compiled pass wants them; arguments as `plant.dynamics.kernel.gfm.pack`.
+    """Parameters of one unit as the compiled pass wants them; arguments as `gridpeers.plant.dynamics.kernel.gfm.pack`.
 
     In the method "second-order" the unit is a current source towards the network, in either model.
 

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat
-from plant.dynamics.kernel.compiled import compiled
-from plant.plant_config import GfmParameters
+from gridpeers.plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.plant_config import GfmParameters
 
 PARAMETERS = np.dtype(
     [

@@ -1,11 +1,11 @@
-"""The law of `plant.equipment.imported_equipment.LoadPart`, compiled: any power of the voltage, within limits."""
+"""The law of `gridpeers.plant.equipment.imported_equipment.LoadPart`, compiled: any power of the voltage in limits."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import compiled
 
 COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
 """Columns of `law`: P (W), Q (var), voltages (V), and the exponents n_p, n_q and edge; see `LoadPart`."""

@@ -15,11 +15,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
-from plant.dynamics.kernel.current_limit import solve_within_limits
-from plant.dynamics.kernel.sparse import extrapolate, note_increment
-from plant.dynamics.kernel.step import FAILURES
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
+from gridpeers.plant.dynamics.kernel.current_limit import solve_within_limits
+from gridpeers.plant.dynamics.kernel.sparse import extrapolate, note_increment
+from gridpeers.plant.dynamics.kernel.step import FAILURES
 
 CONSISTENT = 1e-10
 """Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
@@ -118,7 +118,7 @@ def solve_together(
     Parameters
     ----------
     net
-        A `plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     units
         `Units` whose states at the start of the step are the present ones.
     forward
@@ -195,9 +195,9 @@ def run_second_order_steps(
     tolerance
         Of the network solution (V).
     net
-        A `plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     units
-        A `plant.dynamics.kernel.controller_pass.Units`.
+        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
     present
         The same, with the present states in place of those at the start of the step.
     slopes

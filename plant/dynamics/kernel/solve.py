@@ -1,4 +1,4 @@
-"""The network solution of the inner loop, compiled: see `plant.dynamics.reduction.reduction` for the equations."""
+"""The network solution of the inner loop, compiled; equations: `gridpeers.plant.dynamics.reduction.reduction`."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.arithmetic import A120, multiply_add
-from plant.dynamics.kernel.block_factors import solve_blocks
-from plant.dynamics.kernel.compiled import compiled
-from plant.dynamics.kernel.limited_load import limited_currents
-from plant.dynamics.kernel.sparse import COPY, branch_voltages, draw_remainders
+from gridpeers.plant.dynamics.kernel.arithmetic import A120, multiply_add
+from gridpeers.plant.dynamics.kernel.block_factors import solve_blocks
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.limited_load import limited_currents
+from gridpeers.plant.dynamics.kernel.sparse import COPY, branch_voltages, draw_remainders
 
 MAX_ITERATIONS = 60
 
@@ -122,7 +122,7 @@ def solve_network(
     Parameters
     ----------
     net
-        A `plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     J
         Injections, n_inv x 3 (A).
     rotation

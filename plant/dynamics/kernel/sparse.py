@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, no_factors
-from plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, no_factors
+from gridpeers.plant.dynamics.kernel.compiled import compiled
 
 COPY = -2
 """In place of the position of a terminal that copies the first one of its single-phase inverter."""
@@ -115,7 +115,7 @@ def draw_remainders(
     I_b
         Currents of the branches (A) at x.
     i_c, A, B
-        The tangent; see `plant.dynamics.reduction.reduced.Reduced`.
+        The tangent; see `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     x
         [Re V_b; Im V_b] of the branches (V).
     right

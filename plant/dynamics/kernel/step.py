@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.compiled import compiled, unlocked
-from plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
-from plant.dynamics.kernel.current_limit import limit_currents, solve_on
-from plant.dynamics.kernel.solve import solve_network
-from plant.dynamics.kernel.sparse import extrapolate, note_increment
+from gridpeers.plant.dynamics.kernel.compiled import compiled, unlocked
+from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
+from gridpeers.plant.dynamics.kernel.current_limit import limit_currents, solve_on
+from gridpeers.plant.dynamics.kernel.solve import solve_network
+from gridpeers.plant.dynamics.kernel.sparse import extrapolate, note_increment
 
 FAILURES = 3
 """What can fail in a step: 0 the first network solution, 1 the second, 2 a controller whose frequency is not finite."""
@@ -42,9 +42,9 @@ def run_steps(
     tolerance
         Of the network solution (V).
     net
-        A `plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
     units
-        A `plant.dynamics.kernel.controller_pass.Units`.
+        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
     x
         Branch voltages in the islands' frames, the first guess of the next solution.
     out

@@ -7,9 +7,9 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, add_tangent
-from plant.dynamics.reduction.elimination import WEAK
-from plant.dynamics.reduction.reduced import Complex
+from gridpeers.plant.dynamics.kernel.block_factors import BlockFactors, Integers, Real, add_tangent
+from gridpeers.plant.dynamics.reduction.elimination import WEAK
+from gridpeers.plant.dynamics.reduction.reduced import Complex
 
 
 def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:

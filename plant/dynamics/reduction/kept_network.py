@@ -8,10 +8,10 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
-from plant.dynamics.reduction.elimination import eliminated
-from plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
+from gridpeers.plant.dynamics.reduction.elimination import eliminated
+from gridpeers.plant.dynamics.reduction.reduced import Real
 
 
 class KeptNetwork:

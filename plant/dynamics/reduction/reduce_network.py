@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.reduction.reduced import Complex
-from plant.dynamics.reduction.reduction import DenseReduction
-from plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.reduction.reduced import Complex
+from gridpeers.plant.dynamics.reduction.reduction import DenseReduction
+from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
 
 Reduction = DenseReduction | SparseReduction
 
@@ -17,7 +17,7 @@ MOST_DENSE = 30
 
 
 def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
-    """Return a switch state as it is solved; arguments as for `plant.dynamics.switch_state.SwitchState`.
+    """Return a switch state as it is solved; arguments as for `gridpeers.plant.dynamics.switch_state.SwitchState`.
 
     Never dense with a neutral: where nothing earths it, the impedance of its insulation is in each entry, and what
     matters is in differences too small for their rounding.

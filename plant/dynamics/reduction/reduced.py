@@ -1,4 +1,4 @@
-"""The arrays of the inner loop, linearised: see `plant.dynamics.reduction.reduction` for the equations."""
+"""The arrays of the inner loop, linearised: see `gridpeers.plant.dynamics.reduction.reduction` for the equations."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel.sparse import NO_MAPS, SparseMaps
+from gridpeers.plant.dynamics.kernel.sparse import NO_MAPS, SparseMaps
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -29,7 +29,7 @@ class Reduced(NamedTuple):
     limited_at: NDArray[np.int64]
     """Live branches with the law of a `LoadPart`."""
     law: Real
-    """Their rows of `plant.dynamics.kernel.limited_load.COLUMNS`."""
+    """Their rows of `gridpeers.plant.dynamics.kernel.limited_load.COLUMNS`."""
     i_c: Complex
     """Tangent of the load law, constant part (A)."""
     A: Complex

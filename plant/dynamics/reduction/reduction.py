@@ -21,11 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.island_newton import DenseIsland, solve_island
-from plant.dynamics.reduction.blas import one_thread
-from plant.dynamics.reduction.reduced import Complex, Real, Reduced
-from plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.island_newton import DenseIsland, solve_island
+from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.switch_state import SwitchState
 
 
 class DenseReduction(SwitchState):

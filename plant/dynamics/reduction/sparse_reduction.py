@@ -7,16 +7,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.island_newton import ROUNDING, solve_island
-from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
-from plant.dynamics.kernel.sparse import COPY, SparseMaps
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction.block_pattern import BlockPattern
-from plant.dynamics.reduction.elimination import WEAK
-from plant.dynamics.reduction.kept_network import kept_network
-from plant.dynamics.reduction.reduced import Complex, Real, Reduced
-from plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.island_newton import ROUNDING, solve_island
+from gridpeers.plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
+from gridpeers.plant.dynamics.kernel.sparse import COPY, SparseMaps
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.reduction.block_pattern import BlockPattern
+from gridpeers.plant.dynamics.reduction.elimination import WEAK
+from gridpeers.plant.dynamics.reduction.kept_network import kept_network
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.switch_state import SwitchState
 
 
 class SparseReduction(SwitchState):

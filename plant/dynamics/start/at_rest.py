@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.error import PlantError
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.reduction.reduced import Real
-from plant.dynamics.start.operating_point import OperatingPoint
+from gridpeers.plant.dynamics.error import PlantError
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics.start.operating_point import OperatingPoint
 
 
 def set_equilibrium(

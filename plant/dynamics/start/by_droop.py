@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import root
 
-from plant.dynamics.error import PlantError
-from plant.dynamics.reduction.blas import one_thread
-from plant.dynamics.reduction.reduced import Complex, Real
-from plant.dynamics.start.power_flow import PowerFlow
-from plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
+from gridpeers.plant.dynamics.error import PlantError
+from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
+from gridpeers.plant.dynamics.start.power_flow import PowerFlow
+from gridpeers.plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
 
 MOST_BY_DIFFERENCES = 100
 """Inverters up to which a Jacobian by differences is worth its power flows, one an inverter; else Newton-Krylov."""

@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.phasors import PHASES, aligned_sum
-from plant.dynamics.reduction.reduced import Complex, Real
-from plant.dynamics.start.by_droop import solve_by_droop
-from plant.dynamics.start.power_flow import PowerFlow
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.phasors import PHASES, aligned_sum
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
+from gridpeers.plant.dynamics.start.by_droop import solve_by_droop
+from gridpeers.plant.dynamics.start.power_flow import PowerFlow
 
 
 @dataclass(frozen=True, kw_only=True)

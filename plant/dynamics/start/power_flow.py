@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.error import NoPowerFlowError, PlantError
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
-from plant.dynamics.reduction.reduce_network import reduce_network
-from plant.dynamics.reduction.reduced import Complex, Real, Reduced
-from plant.dynamics.weak_branches import weak_branches
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.error import NoPowerFlowError, PlantError
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.kernel.constant_power import NO_NETWORK, settle_powers
+from gridpeers.plant.dynamics.reduction.reduce_network import reduce_network
+from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.weak_branches import weak_branches
 
 MOST_ROUNDS = 500
 """Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:

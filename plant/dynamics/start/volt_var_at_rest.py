@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics.reduction.reduced import Real
 
 DROOP, INSIDE, UNDER, OVER = range(4)
 """Where an inverter rests: on the droop, inside its band, or on the edge below or above V_set."""

@@ -6,16 +6,16 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from plant.equipment import Feeder, Regulator
-from plant.feeder import Plant
-from plant.gridlabd.model.glm import START, read_table, write_glm
-from plant.gridlabd.model.glm_block import TableRow
-from plant.gridlabd.model.glm_network import network_blocks
-from plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from plant.tables import FeederError
-from plant.tables.write import TAP_STEP, write_feeder
+from gridpeers.plant.equipment import Feeder, Regulator
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.gridlabd.model.glm import START, read_table, write_glm
+from gridpeers.plant.gridlabd.model.glm_block import TableRow
+from gridpeers.plant.gridlabd.model.glm_network import network_blocks
+from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError
+from gridpeers.plant.tables.write import TAP_STEP, write_feeder
 
 POWER_FLOW_HEADER = f"""clock {{
 	timezone UTC0;

@@ -1,7 +1,8 @@
 """Write a feeder of `plant/data` as a GridLAB-D model (GLM).
 
-This file and its two helpers read the tables by themselves and share no code with `plant.tables` and `plant.network`,
-so that a problem there shows as a difference. Only the inverters' parameters come as `plant.plant_config` has them.
+This file and its two helpers read the tables by themselves and share no code with `gridpeers.plant.tables` and
+`gridpeers.plant.network`, so that a problem there shows as a difference. Only the inverters' parameters come as
+`gridpeers.plant.plant_config` has them.
 """
 
 from __future__ import annotations
@@ -11,9 +12,9 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
-from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.model.glm_inverters import inverter_blocks, node_blocks
-from plant.gridlabd.model.glm_network import network_blocks
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks, node_blocks
+from gridpeers.plant.gridlabd.model.glm_network import network_blocks
 
 START = "2000-01-01 00:00:00"
 """GridLAB-D's clock at the start; delta mode begins one second later."""

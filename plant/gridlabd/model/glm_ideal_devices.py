@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from plant.gridlabd.model.glm_block import TableRow, block
+from gridpeers.plant.gridlabd.model.glm_block import TableRow, block
 
 FEET_PER_MILE = 5280.0
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import pi
 
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.model.glm_block import TableRow, block
-from plant.gridlabd.model.glm_network import F_NOM
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.gridlabd.model.glm_block import TableRow, block
+from gridpeers.plant.gridlabd.model.glm_network import F_NOM
 
 
 def node_of(bus: str, phases: str) -> str:

@@ -6,8 +6,8 @@ import cmath
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from math import pi, sqrt
 
-from plant.gridlabd.model.glm_block import TableRow, block
-from plant.gridlabd.model.glm_ideal_devices import compensations, regulator_blocks, switch_blocks
+from gridpeers.plant.gridlabd.model.glm_block import TableRow, block
+from gridpeers.plant.gridlabd.model.glm_ideal_devices import compensations, regulator_blocks, switch_blocks
 
 F_NOM = 60.0
 """Nominal frequency (Hz)."""

@@ -6,11 +6,11 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from plant.equipment import Feeder
-from plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from plant.equipment.own_parameters import InverterParameters
-from plant.gridlabd.model.glm_inverters import node_of
-from plant.gridlabd.model.glm_network import F_NOM
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.gridlabd.model.glm_inverters import node_of
+from gridpeers.plant.gridlabd.model.glm_network import F_NOM
 
 GLM_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_-]*")
 """Names that GridLAB-D takes for an object: a dot would begin the name of a property."""

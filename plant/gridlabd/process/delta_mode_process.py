@@ -8,10 +8,10 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from plant.gridlabd.process.gridlabd_messages import messages
-from plant.request_process import ProcessEndedError, RequestProcess
-from plant.transient_folder import TransientFolder
-from wire.packages import damaged
+from gridpeers.plant.gridlabd.process.gridlabd_messages import messages
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
+from gridpeers.plant.transient_folder import TransientFolder
+from gridpeers.wire.packages import damaged
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")
 

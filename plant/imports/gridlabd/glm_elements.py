@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment import Bus, Switch
-from plant.equipment.imported_equipment import LinearElement, bus_behind
-from plant.imports.gridlabd.glm_classes import SWITCHES
+from gridpeers.plant.equipment import Bus, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement, bus_behind
+from gridpeers.plant.imports.gridlabd.glm_classes import SWITCHES
 
 Complex = NDArray[np.complex128]
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from plant.equipment.imported_equipment import LinearElement, LoadPart, cut_off
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, cut_off
 
 Taken = dict[str, dict[str, complex]]
 """By branch of a load ("A", "BC", "12"): constant power `P` (VA), current as power at nominal voltage `I` (VA), `Y`."""

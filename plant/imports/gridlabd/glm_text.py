@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from wire.text_file import script_of
+from gridpeers.wire.text_file import script_of
 
 INCLUDE = re.compile(r'^(\s*#include\s+["<])([^">]+)([">])', re.IGNORECASE)
 

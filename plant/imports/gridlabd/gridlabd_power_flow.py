@@ -6,8 +6,8 @@ buses, branches with their admittance matrices as the solver uses them, and the 
 every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its
 tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
 
-Usage: `python -m plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not beyond the first
-moment.
+Usage: `python -m gridpeers.plant.imports.gridlabd.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not beyond
+the first moment.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from plant.gridlabd.process.delta_mode import NotImportableError, end_with, gridlabd_package
-from plant.imports.gridlabd.glm_classes import CHILD_OF_BUS, WATCHING
-from plant.imports.gridlabd.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
+from gridpeers.plant.gridlabd.process.delta_mode import NotImportableError, end_with, gridlabd_package
+from gridpeers.plant.imports.gridlabd.glm_classes import CHILD_OF_BUS, WATCHING
+from gridpeers.plant.imports.gridlabd.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
 
 TOLERANCE = "1e-10"
 """Largest change of a voltage in the last iteration (pu). GridLAB-D's default, 1e-6, costs six digits."""

@@ -10,15 +10,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from plant.gridlabd.process.gridlabd_messages import messages
-from plant.imports.gridlabd.glm_text import GlmText
-from plant.request_process import program
-from plant.tables.read import FeederError
-from plant.transient_folder import TransientFolder, no_room
-from wire.packages import damaged
-from wire.printable import printable
+from gridpeers.plant.gridlabd.process.gridlabd_messages import messages
+from gridpeers.plant.imports.gridlabd.glm_text import GlmText
+from gridpeers.plant.request_process import program
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.plant.transient_folder import TransientFolder, no_room
+from gridpeers.wire.packages import damaged
+from gridpeers.wire.printable import printable
 
-POWER_FLOW = "plant.imports.gridlabd.gridlabd_power_flow"
+POWER_FLOW = "gridpeers.plant.imports.gridlabd.gridlabd_power_flow"
 
 MISSING = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
 
@@ -29,7 +29,7 @@ LONGEST = 600.0
 
 
 def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
-    """Return what GridLAB-D's solver holds of a model (`plant.imports.gridlabd.gridlabd_power_flow`).
+    """Return what GridLAB-D's solver holds of a model (`gridpeers.plant.imports.gridlabd.gridlabd_power_flow`).
 
     Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
     no solution on the way, its `solved` is false, and all else is of the first moment.

@@ -16,9 +16,9 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from plant.equipment import Feeder, Source
-from plant.equipment.imported_equipment import LinearElement, LoadPart
-from plant.imports.gridlabd.glm_classes import (
+from gridpeers.plant.equipment import Feeder, Source
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
+from gridpeers.plant.imports.gridlabd.glm_classes import (
     CHILD_OF_BUS,
     CONTROLS,
     DATA,
@@ -28,12 +28,12 @@ from plant.imports.gridlabd.glm_classes import (
     SWITCHES,
     WATCHING,
 )
-from plant.imports.gridlabd.glm_elements import SPLIT, GlmElements, letters_of
-from plant.imports.gridlabd.glm_loads import BusLoads
-from plant.imports.gridlabd.glm_text import GlmText
-from plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
-from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.import_checks import (
+from gridpeers.plant.imports.gridlabd.glm_elements import SPLIT, GlmElements, letters_of
+from gridpeers.plant.imports.gridlabd.glm_loads import BusLoads
+from gridpeers.plant.imports.gridlabd.glm_text import GlmText
+from gridpeers.plant.imports.gridlabd.gridlabd_power_flow import PV, SWING
+from gridpeers.plant.imports.gridlabd.gridlabd_process import solved_model
+from gridpeers.plant.imports.import_checks import (
     BEYOND,
     left_out_by,
     path_problems,
@@ -42,10 +42,10 @@ from plant.imports.import_checks import (
     report_powers,
     without_unfed,
 )
-from plant.imports.import_comparison import MATCH, difference
-from plant.imports.plain_names import with_plain_names
-from plant.tables.read import FeederError
-from wire.schema.suggestion import suggestion
+from gridpeers.plant.imports.import_comparison import MATCH, difference
+from gridpeers.plant.imports.plain_names import with_plain_names
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.wire.schema.suggestion import suggestion
 
 FAR = 1.3
 """Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
-from plant.gridlabd.process.delta_mode import GridlabdCore
+from gridpeers.plant.gridlabd.process.delta_mode import GridlabdCore
 
 STRIDE = 3
 """Doubles of a complex number in GridLAB-D's arrays: real part, imaginary part, notation."""

@@ -1,5 +1,5 @@
 """Feeders written for OpenDSS: the engine reads the script, we take over its elements."""
 
-from plant.imports.opendss.read_opendss import read_opendss
+from gridpeers.plant.imports.opendss.read_opendss import read_opendss
 
 __all__ = ["read_opendss"]

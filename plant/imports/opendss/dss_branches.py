@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Any, NamedTuple
 
-from plant.imports.opendss.dss_elements import letter_of
+from gridpeers.plant.imports.opendss.dss_elements import letter_of
 
 
 class Branches(NamedTuple):

@@ -6,16 +6,16 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from plant.equipment import NODES, Feeder
-from plant.equipment.imported_equipment import LoadPart
-from plant.imports.import_checks import left_out_by, refuse_if, report_powers
-from plant.imports.opendss.dss_elements import DssElements, complex_of, nodes_of, numbered_nodes
-from plant.imports.opendss.dss_engine import DssEngine
-from plant.imports.opendss.dss_generation import GENERATION, read_generation
-from plant.imports.opendss.dss_loads import read_loads
-from plant.imports.opendss.dss_script import METERS
-from plant.imports.opendss.dss_values import unusual_voltages
-from wire.schema.suggestion import suggestion
+from gridpeers.plant.equipment import NODES, Feeder
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.imports.import_checks import left_out_by, refuse_if, report_powers
+from gridpeers.plant.imports.opendss.dss_elements import DssElements, complex_of, nodes_of, numbered_nodes
+from gridpeers.plant.imports.opendss.dss_engine import DssEngine
+from gridpeers.plant.imports.opendss.dss_generation import GENERATION, read_generation
+from gridpeers.plant.imports.opendss.dss_loads import read_loads
+from gridpeers.plant.imports.opendss.dss_script import METERS
+from gridpeers.plant.imports.opendss.dss_values import unusual_voltages
+from gridpeers.wire.schema.suggestion import suggestion
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""

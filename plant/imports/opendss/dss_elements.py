@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from plant.equipment import NODES, Bus, Source, Switch
-from plant.equipment.connectivity import Node
-from plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
-from plant.imports.opendss.dss_engine import DssEngine
-from plant.tables.feeder_columns import SOURCE_VOLTAGE
+from gridpeers.plant.equipment import NODES, Bus, Source, Switch
+from gridpeers.plant.equipment.connectivity import Node
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
+from gridpeers.plant.imports.opendss.dss_engine import DssEngine
+from gridpeers.plant.tables.feeder_columns import SOURCE_VOLTAGE
 
 Complex = NDArray[np.complex128]
 

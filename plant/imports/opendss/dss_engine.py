@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from plant.imports.import_checks import path_problems
-from plant.imports.opendss.dss_script import HUNTING, DssScript
-from plant.imports.opendss.dss_values import impossible_values, repeated_names
+from gridpeers.plant.imports.import_checks import path_problems
+from gridpeers.plant.imports.opendss.dss_script import HUNTING, DssScript
+from gridpeers.plant.imports.opendss.dss_values import impossible_values, repeated_names
 
 SETTLE = ("set mode=snapshot", "set maxcontroliter=1000", "set maxiterations=1000", "solve")
 """Solves with controls, which set taps and capacitor steps."""

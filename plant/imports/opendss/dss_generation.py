@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from plant.dynamics.kernel.limited_load import limited_admittance
-from plant.equipment.imported_equipment import LoadPart, cut_off
-from plant.imports.opendss.dss_branches import branches_of
-from plant.imports.opendss.dss_elements import complex_of
-from plant.imports.opendss.dss_engine import DssEngine
-from plant.network.loads import law_row
+from gridpeers.plant.dynamics.kernel.limited_load import limited_admittance
+from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
+from gridpeers.plant.imports.opendss.dss_branches import branches_of
+from gridpeers.plant.imports.opendss.dss_elements import complex_of
+from gridpeers.plant.imports.opendss.dss_engine import DssEngine
+from gridpeers.plant.network.loads import law_row
 
 GENERATION = frozenset({"generator", "pvsystem", "storage"})
 """Classes that are taken over as the power that they deliver in the script's snapshot."""

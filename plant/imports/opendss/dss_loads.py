@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from plant.equipment.imported_equipment import LoadPart, cut_off
-from plant.imports.opendss.dss_branches import branches_of
-from plant.imports.opendss.dss_elements import complex_of
-from plant.imports.opendss.dss_engine import DssEngine
+from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
+from gridpeers.plant.imports.opendss.dss_branches import branches_of
+from gridpeers.plant.imports.opendss.dss_elements import complex_of
+from gridpeers.plant.imports.opendss.dss_engine import DssEngine
 
 EXPONENTS = {1: (0.0, 0.0), 2: (2.0, 2.0), 3: (0.0, 2.0), 5: (1.0, 1.0)}
 """With what power of the voltage P and Q go, by the load's `model`."""

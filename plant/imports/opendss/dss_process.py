@@ -14,18 +14,18 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from plant.imports.opendss.dss_circuit import DssCircuit, ImportRequest
-from plant.request_process import ProcessEndedError, RequestProcess, program
-from plant.tables.read import FeederError
-from plant.transient_folder import TransientFolder, no_room
-from wire.packages import damaged
-from wire.printable import printable
+from gridpeers.plant.imports.opendss.dss_circuit import DssCircuit, ImportRequest
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, program
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.plant.transient_folder import TransientFolder, no_room
+from gridpeers.wire.packages import damaged
+from gridpeers.wire.printable import printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
 
 USER = "the import of .dss files"
 
-SERVER = "plant.imports.opendss.dss_server"
+SERVER = "gridpeers.plant.imports.opendss.dss_server"
 
 LONGEST = 600.0
 """Time (s) after which a script that does not end is given up."""

@@ -31,8 +31,8 @@ import traceback
 from pathlib import Path
 from typing import Any, NoReturn
 
-from plant.imports.opendss.dss_circuit import ImportRequest, read_circuit
-from plant.tables.read import FeederError
+from gridpeers.plant.imports.opendss.dss_circuit import ImportRequest, read_circuit
+from gridpeers.plant.tables.read import FeederError
 
 PLACE_SIZE = 1024
 """Longest text (bytes) of what the engine is about to do."""

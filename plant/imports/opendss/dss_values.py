@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from plant.equipment import PHASES
-from plant.equipment.connectivity import Node
-from plant.equipment.imported_equipment import LoadPart
-from plant.imports.opendss.dss_script import FREQUENCY
-from plant.tables.feeder_columns import Manifest
-from wire.schema.table_schema import named
+from gridpeers.plant.equipment import PHASES
+from gridpeers.plant.equipment.connectivity import Node
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.imports.opendss.dss_script import FREQUENCY
+from gridpeers.plant.tables.feeder_columns import Manifest
+from gridpeers.wire.schema.table_schema import named
 
 FAR = 1.5
 """Ratio of two voltages that only a lost factor explains, such as that between phases and to ground."""

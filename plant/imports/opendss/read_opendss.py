@@ -12,12 +12,12 @@ from pathlib import Path
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.imports.import_checks import SHOWN_NAMES, number_of, refuse_if, refuse_unsolvable, without_unfed
-from plant.imports.opendss.dss_circuit import ImportRequest
-from plant.imports.opendss.dss_process import reading
-from plant.imports.plain_names import with_plain_names
-from wire.schema.suggestion import first_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.imports.import_checks import SHOWN_NAMES, number_of, refuse_if, refuse_unsolvable, without_unfed
+from gridpeers.plant.imports.opendss.dss_circuit import ImportRequest
+from gridpeers.plant.imports.opendss.dss_process import reading
+from gridpeers.plant.imports.plain_names import with_plain_names
+from gridpeers.wire.schema.suggestion import first_of
 
 UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
 """Remedy where nothing determines a voltage to ground."""
@@ -37,7 +37,7 @@ def read_opendss(
     """
     path = Path(path).absolute()
     with reading(ImportRequest(path, f_nom, list(leave_out), list(switches))) as engine:
-        import plant.network  # noqa: F401  takes longer to load than the engine to read a small script
+        import gridpeers.plant.network  # noqa: F401  takes longer to load than the engine to read a small script
 
         circuit = engine.circuit(path)
     feeder, problems, notes = circuit.feeder, circuit.problems, list(circuit.feeder.notes)
@@ -52,7 +52,7 @@ def read_opendss(
 
 def _compared(path: Path, feeder: Feeder, V: dict[tuple[str, str], complex]) -> Feeder:
     """Return the feeder with a note if our power flow has not the engine's voltages; refuse it if it has none."""
-    from plant.imports.import_comparison import MATCH, difference, loads_without_ground
+    from gridpeers.plant.imports.import_comparison import MATCH, difference, loads_without_ground
 
     solved = True
     try:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
-from netem.ledger import LinkCounts
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.communication_summary import CommunicationSummary
-from scenarios.checks.communication.link_accounts import Missing
-from scenarios.checks.communication.record_sink import Link
-from scenarios.checks.judged_time import require_longer
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
+from gridpeers.scenarios.checks.communication.link_accounts import Missing
+from gridpeers.scenarios.checks.communication.record_sink import Link
+from gridpeers.scenarios.checks.judged_time import require_longer
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 
 class MessageAccount(Check):

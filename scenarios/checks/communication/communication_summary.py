@@ -14,20 +14,20 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
-from netem.ledger import LinkCounts, LinkTrace
-from scenarios.checks.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
-from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.checks.communication.heals import Heal, Heals
-from scenarios.checks.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
-from scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from scenarios.checks.communication.record_pass import end_of, opened, read_into
-from scenarios.checks.communication.record_sink import Link, SentState
-from scenarios.checks.communication.sent_states import SentStates
-from scenarios.record.journal_coverage import Hole
-from scenarios.record.record_info import RecordInfo
-from wire.journal import Decision
-from wire.messages import PLANT
-from wire.timing.session_deadline import PATIENCE
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.checks.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
+from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
+from gridpeers.scenarios.checks.communication.heals import Heal, Heals
+from gridpeers.scenarios.checks.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
+from gridpeers.scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
+from gridpeers.scenarios.checks.communication.record_pass import end_of, opened, read_into
+from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.scenarios.checks.communication.sent_states import SentStates
+from gridpeers.scenarios.record.journal_coverage import Hole
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.wire.journal import Decision
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.timing.session_deadline import PATIENCE
 
 DELAY_TICKS, DELAY = 300, 5.0
 """How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100

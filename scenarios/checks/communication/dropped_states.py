@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wire.journal import RejectedCount
-from wire.messages import Journal
+from gridpeers.wire.journal import RejectedCount
+from gridpeers.wire.messages import Journal
 
 ON_WAY = 1.0
 """Longest time (s of wall time) that a state is on its way, as the check of the account has it by default."""

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.heals import Heal
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication.heals import Heal
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 
 class Rejoined(Check):

@@ -9,15 +9,15 @@ from math import inf
 
 import msgspec
 
-from netem.ledger import LinkTrace
-from netem.schema.fault import Span
-from netem.schema.pattern import Link as LinkEnds
-from scenarios.checks.communication.neighbour_use import Uses
-from scenarios.checks.communication.record_sink import Link, SentState
-from scenarios.checks.communication.sent_states import SentStates
-from scenarios.checks.communication.state_window import StateWindow
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_info import RecordInfo
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.pattern import Link as LinkEnds
+from gridpeers.scenarios.checks.communication.neighbour_use import Uses
+from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.scenarios.checks.communication.sent_states import SentStates
+from gridpeers.scenarios.checks.communication.state_window import StateWindow
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_info import RecordInfo
 
 CUTS = ("cut", "partition")
 """Faults with an end, and reasons of dropped messages, that part two agents."""

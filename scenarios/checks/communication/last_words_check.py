@@ -8,14 +8,14 @@ from typing import Annotated
 
 import msgspec
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.communication_summary import CommunicationSummary
-from scenarios.checks.judged_time import require_longer
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_info import LIVE
-from wire.messages import PlantEvent
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
+from gridpeers.scenarios.checks.judged_time import require_longer
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _SAID = re.compile(r"\S+ (leaves|left|dies)\b")
 """Events of an agent that ends as the scenario, or a person, wants it."""

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 
-from netem.ledger import LinkTrace
-from scenarios.checks.communication.neighbour_use import Uses
-from scenarios.checks.communication.record_sink import Link, SentState
-from scenarios.checks.communication.sent_states import SentStates
-from scenarios.record.journal_coverage import Hole, inside
-from wire.messages import PLANT
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.checks.communication.neighbour_use import Uses
+from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.scenarios.checks.communication.sent_states import SentStates
+from gridpeers.scenarios.record.journal_coverage import Hole, inside
+from gridpeers.wire.messages import PLANT
 
 WAIT = 1000
 """Verdicts of an emulated link after which a state without one has none: a link judges what it gets at once."""

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from scenarios.checks.communication.record_sink import Link, SentState
-from scenarios.checks.communication.state_window import StateWindow
-from scenarios.record.journal_coverage import INSTANT, Hole, inside
-from wire.journal import Decision
+from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.scenarios.checks.communication.state_window import StateWindow
+from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, inside
+from gridpeers.wire.journal import Decision
 
 MOST = 20_000
 """States of an agent that wait for its journal at most: it may be lost, and the agent go on."""
@@ -28,7 +28,7 @@ class NeighbourUse(NamedTuple):
     age: float | None
     """Age of that state (s); None if there was none."""
     unused: str
-    """Why it was left out (`wire.journal.UNUSED`); empty if it was used."""
+    """Why it was left out (`gridpeers.wire.journal.UNUSED`); empty if it was used."""
 
     def number_at(self, own: int) -> int | None:
         """Return the number of the neighbour's state at the decision from which the own state `own` came."""

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from netem.ledger import LinkCounts, LinkTrace
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.checks.communication.record_pass import end_of, opened, read_into
-from scenarios.checks.communication.record_sink import Link, SentState
-from scenarios.record.journal_coverage import Hole
-from scenarios.record.record_info import RecordInfo
-from wire.journal import Decision
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
+from gridpeers.scenarios.checks.communication.record_pass import end_of, opened, read_into
+from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.scenarios.record.journal_coverage import Hole
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.wire.journal import Decision
 
 MOST_BYTES = 64_000_000
 """Largest record that is taken into memory: some ten minutes of nine agents."""

@@ -13,18 +13,18 @@ from typing import Any
 
 import msgspec
 
-from netem.ledger import LinkTrace
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.checks.communication.dropped_states import OF_SENDER, DropTimes
-from scenarios.checks.communication.record_sink import PassEnd, RecordSink, SentState
-from scenarios.emulation.link_reports import data_of
-from scenarios.record.decision_entries import is_periodic
-from scenarios.record.journal_coverage import JournalCoverage
-from scenarios.record.journal_reader import entries_of, values_of
-from scenarios.record.record_file import RecordFile
-from wire.bounds import MOST_COUNT
-from wire.codec import sound
-from wire.journal import (
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.checks.communication.dropped_states import OF_SENDER, DropTimes
+from gridpeers.scenarios.checks.communication.record_sink import PassEnd, RecordSink, SentState
+from gridpeers.scenarios.emulation.link_reports import data_of
+from gridpeers.scenarios.record.decision_entries import is_periodic
+from gridpeers.scenarios.record.journal_coverage import JournalCoverage
+from gridpeers.scenarios.record.journal_reader import entries_of, values_of
+from gridpeers.scenarios.record.record_file import RecordFile
+from gridpeers.wire.bounds import MOST_COUNT
+from gridpeers.wire.codec import sound
+from gridpeers.wire.journal import (
     Decision,
     Entry,
     Exchange,
@@ -34,9 +34,9 @@ from wire.journal import (
     RejectedCount,
     SentMessage,
 )
-from wire.journal_keys import kind_of, name_of
-from wire.messages import PLANT, Journal, LinkReport, State
-from wire.timing.clock import time_of
+from gridpeers.wire.journal_keys import kind_of, name_of
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
+from gridpeers.wire.timing.clock import time_of
 
 
 def opened(path: Path) -> RecordFile:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, Protocol
 
-from netem.ledger import LinkCounts, LinkTrace
-from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.record.journal_coverage import INSTANT, Hole
-from wire.journal import Decision
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
+from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole
+from gridpeers.wire.journal import Decision
 
 Link = tuple[str, str]
 """Sender and receiver."""

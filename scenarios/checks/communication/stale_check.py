@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
-from agents.agent_config import MAX_AGE
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judged_time import Since, require_time
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.agents.agent_config import MAX_AGE
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.judged_time import Since, require_time
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 
 class StaleValues(Check):

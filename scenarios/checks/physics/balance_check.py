@@ -8,15 +8,15 @@ from typing import Annotated
 
 import numpy as np
 
-from plant.equipment import Feeder
-from plant.equipment.load_powers import set_power
-from plant.plant_config import PlantSettings
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
-from scenarios.results.switch_positions import closed_switches
-from wire.messages import PlantEvent
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.load_powers import set_power
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.physics.island_power_flow import MOST_NODES, IslandPowerFlow, NetworkState
+from gridpeers.scenarios.results.switch_positions import closed_switches
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _latest: list[tuple[Feeder, tuple[str, ...], PlantSettings, IslandPowerFlow]] = []
 """The power flows of the last feeder: the cases of a run have one in common."""

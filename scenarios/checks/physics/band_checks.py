@@ -7,12 +7,12 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase, IslandWindow
-from scenarios.checks.judged_time import Since
-from scenarios.results.history import Flags, Floats
-from wire.schema.plausible import Plausible, Unit
-from wire.schema.relations import Below
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
+from gridpeers.scenarios.checks.judged_time import Since
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.relations import Below
 
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
 

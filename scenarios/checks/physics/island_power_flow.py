@@ -11,17 +11,17 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.phasors import PHASES
-from plant.dynamics.start.power_flow import PowerFlow
-from plant.equipment import Feeder
-from plant.equipment.named_loads import with_powers
-from plant.feeder.circuits import circuit_of
-from plant.feeder.installed_inverters import installed_inverters
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from scenarios.results.history import Flags, Floats
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.phasors import PHASES
+from gridpeers.plant.dynamics.start.power_flow import PowerFlow
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.scenarios.results.history import Flags, Floats
 
 MOST_NODES = 1500
 """Nodes above which a feeder takes seconds."""
@@ -93,7 +93,7 @@ class IslandPowerFlow:
         Raises
         ------
         RuntimeError
-            If no state of the network has these powers (`plant.dynamics.PlantError`).
+            If no state of the network has these powers (`gridpeers.plant.dynamics.PlantError`).
         """
         P, Q, V, online = P[self._at], Q[self._at], V[self._at], present[self._at]
         flow, units = self._flow(state, online)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from scenarios.results.history import Floats
+from gridpeers.scenarios.results.history import Floats
 
 RANK = 1e-3
 """Part of the largest singular value below which a singular value is noise, or of no account."""

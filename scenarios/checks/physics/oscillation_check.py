@@ -7,11 +7,11 @@ from typing import Annotated, NamedTuple
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.physics.matrix_pencil import Mode, modes
-from scenarios.results.history import Flags, Floats
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.physics.matrix_pencil import Mode, modes
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 FEWEST = 30
 """Rows without which nothing is said."""

@@ -7,11 +7,11 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Check, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.judged_time import Since, require_longer, require_time
-from scenarios.results.history import Flags
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.judged_time import Since, require_longer, require_time
+from gridpeers.scenarios.results.history import Flags
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _LOADING = Plausible("a limit of loading", 0.1, 10.0, above_zero=True)
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
 
 
 class Returned(Check):

@@ -7,13 +7,13 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase, IslandWindow
-from scenarios.checks.judged_time import Since
-from scenarios.results.history import Flags, Floats, History, Nameplates
-from scenarios.results.sharing_index import NO_LOAD, sharing_index
-from scenarios.results.steadiness import ends_of
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
+from gridpeers.scenarios.checks.judged_time import Since
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
+from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index
+from gridpeers.scenarios.results.steadiness import ends_of
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _LIMIT = Plausible("a sharing index", 1e-4, 2.0, above_zero=True)
 _AFTER = Plausible("a settling time", 0.0, 3600.0)

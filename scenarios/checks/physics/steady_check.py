@@ -7,12 +7,12 @@ from typing import Annotated
 
 import numpy as np
 
-from scenarios.checks.check_verdict import Check, NotJudgedError, Violation
-from scenarios.checks.checked_case import CheckedCase, IslandWindow
-from scenarios.checks.judged_time import Since
-from scenarios.results.history import Flags, Floats
-from scenarios.results.steadiness import FEWEST, STEADY, Ends, ends_of
-from wire.schema.plausible import Plausible, Unit
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
+from gridpeers.scenarios.checks.judged_time import Since
+from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.scenarios.results.steadiness import FEWEST, STEADY, Ends, ends_of
+from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _RATE = Plausible("a rate", 1e-6, 100.0, above_zero=True)
 

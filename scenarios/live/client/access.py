@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from ipaddress import ip_address
 from pathlib import Path
 
-from scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 
 
 @dataclass(frozen=True)

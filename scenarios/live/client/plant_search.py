@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
-from scenarios.live.client.access import is_loopback_host
-from scenarios.live.client.run_address import PROBE, RunAddress, accepting
-from wire.driver.command_line import command_line
-from wire.driver.session import Session
-from wire.messages import PLANT
-from wire.trust.tls_refusal import tls_refusal
+from gridpeers.scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
+from gridpeers.scenarios.live.client.access import is_loopback_host
+from gridpeers.scenarios.live.client.run_address import PROBE, RunAddress, accepting
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.messages import PLANT
+from gridpeers.wire.trust.tls_refusal import tls_refusal
 
 
 class PlantSearch:

@@ -8,10 +8,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from scenarios.drivers.free_endpoint import parse_endpoint
-from scenarios.live.client.access import Access, is_loopback_host, with_protocol
-from wire.keys import check_name as check_key_part
-from wire.trust.credentials import Credentials
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.live.client.access import Access, is_loopback_host, with_protocol
+from gridpeers.wire.keys import check_name as check_key_part
+from gridpeers.wire.trust.credentials import Credentials
 
 RUN = "gridpeers"
 """Default name of a run."""
@@ -116,7 +116,7 @@ def check_inverters(names: Sequence[str]) -> None:
     >>> check_inverters(["inv1", "inv2", "inv1"])
     Traceback (most recent call last):
         ...
-    scenarios.live.client.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an inverter
+    gridpeers.scenarios.live.client.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an ...
     """
     for name in names:
         check_name("INVERTER", name)

@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator
 from time import monotonic
 from types import TracebackType
 
-from scenarios.live.client.plant_search import PlantSearch
-from scenarios.live.client.run_address import RunAddress
-from scenarios.live.client.run_tokens import RunTokens
-from wire.codec import RejectedError, decode
-from wire.driver.session import Session
-from wire.keys import ANY_ALIVE_PLANT, Keys
-from wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
+from gridpeers.scenarios.live.client.plant_search import PlantSearch
+from gridpeers.scenarios.live.client.run_address import RunAddress
+from gridpeers.scenarios.live.client.run_tokens import RunTokens
+from gridpeers.wire.codec import RejectedError, decode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import ANY_ALIVE_PLANT, Keys
+from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
 
 VISITOR = "visitor"
 

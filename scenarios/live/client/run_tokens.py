@@ -5,10 +5,10 @@ Anybody may hold tokens, as many as he likes, so each kind has room for as many 
 
 from __future__ import annotations
 
-from wire.bounds import MOST_INVERTERS
-from wire.keys import Keys, epoch_of, run_of_plant
-from wire.membership import MOST_PROCESSES
-from wire.plant_follower import MOST_PLANTS
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
+from gridpeers.wire.membership import MOST_PROCESSES
+from gridpeers.wire.plant_follower import MOST_PLANTS
 
 
 class RunTokens:
@@ -46,7 +46,7 @@ class RunTokens:
         return runs | {self._run} if self.epochs else runs
 
     def is_noted(self, key: str) -> bool:
-        """Whether a token is noted, so that its end must be known; see `wire.token_queue`. Any thread may ask."""
+        """Whether a token is noted, so that its end must be known: `gridpeers.wire.token_queue`. From any thread."""
         return key in self._noted
 
     def appeared(self, key: str) -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from netem.schema.netem import Netem
-from scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
-from wire.timing.clock import rounded_up
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
+from gridpeers.wire.timing.clock import rounded_up
 
 
 def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:

@@ -10,21 +10,21 @@ from pathlib import Path
 
 import msgspec
 
-from agents.agent_config import MAX_AGE
-from netem.fault_schedule import Change, replayed
-from netem.schema.netem import Netem
-from plant.equipment import Feeder
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.live.client.run_address import UsageError
-from scenarios.record.record_info import LIVE
-from scenarios.results.run_files import shown, write_whole
-from scenarios.schema import ScenarioModel
-from scenarios.schema.netem_tables import netem_of
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_writing import toml_lines
-from wire.driver.command_line import command_line
-from wire.messages import LinkRequest
-from wire.timing.clock import rounded_up
+from gridpeers.agents.agent_config import MAX_AGE
+from gridpeers.netem.fault_schedule import Change, replayed
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.scenarios.record.record_info import LIVE
+from gridpeers.scenarios.results.run_files import shown, write_whole
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.netem_tables import netem_of
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_writing import toml_lines
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.messages import LinkRequest
+from gridpeers.wire.timing.clock import rounded_up
 
 LINKS_ALONE = (
     "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."

@@ -11,14 +11,21 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.plant_config import PlantConfig
-from scenarios.live.launch.ended_scenario import ended_scenario
-from scenarios.record.record_info import LIVE, RecordInfo
-from scenarios.results.run_files import FolderError, new_folder, refusal, set_broken, set_complete, write_whole
-from scenarios.schema import ScenarioModel
-from scenarios.schema.scenario_writing import to_toml
-from scenarios.versions import versions
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.live.launch.ended_scenario import ended_scenario
+from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
+from gridpeers.scenarios.results.run_files import (
+    FolderError,
+    new_folder,
+    refusal,
+    set_broken,
+    set_complete,
+    write_whole,
+)
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import versions
 
 
 @dataclass(frozen=True)

@@ -6,19 +6,19 @@ from collections.abc import Iterator
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from plant.equipment import Feeder
-from plant.plant_config import PlantConfig
-from scenarios.live.client.run_address import LONGEST_TIME, UsageError, check_duration, check_wait
-from scenarios.live.show.feeder_map import feeder_map
-from scenarios.run_speed import SPEEDS
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import as_in, configs
-from scenarios.schema.netem_tables import netem_of, setup_of
-from scenarios.schema.scenario_model import NEEDS_KEYS
-from wire.driver.command_line import command_line
-from wire.journal import RecordLevel
-from wire.schema.suggestion import suggestion
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.live.client.run_address import LONGEST_TIME, UsageError, check_duration, check_wait
+from gridpeers.scenarios.live.show.feeder_map import feeder_map
+from gridpeers.scenarios.run_speed import SPEEDS
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import as_in, configs
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.scenario_model import NEEDS_KEYS
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
@@ -80,7 +80,7 @@ def configure(
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> plant, agents = configure(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
     >>> plant.end, plant.settings.spares, agents[-1].name
     (None, ('inv10',), 'inv10')

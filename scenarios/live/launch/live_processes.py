@@ -13,31 +13,31 @@ from time import monotonic
 
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from agents.agent_process import run_agents
-from plant.plant_config import PlantConfig
-from plant.plant_process import run_plant
-from plant.realtime.pacer import sentence
-from plant.start_words import COMPILING, READY
-from scenarios.drivers.children import Child
-from scenarios.drivers.supervisor import Supervisor
-from scenarios.drivers.telemetry_client import with_recorder
-from scenarios.drivers.warm_servers import release
-from scenarios.emulation.emulated_links import links_of
-from scenarios.live.client.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.launch.link_log import LinkLog
-from scenarios.live.launch.live_recorder import LiveRecorder
-from scenarios.live.requests.agent_configs import check_free, configuration, own_code
-from scenarios.live.requests.run_requests import ANSWER
-from scenarios.record.record_info import RecordInfo
-from scenarios.results.record import Recorded
-from scenarios.short_names import short
-from wire.driver.drive import StoppedError
-from wire.driver.stop_signal import StopSignal, stop_at_signals
-from wire.messages import PLANT, Pacing, PlantEvent
-from wire.printable import printable
-from wire.rate_limit import RateLimit
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_process import run_agents
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_process import run_plant
+from gridpeers.plant.realtime.pacer import sentence
+from gridpeers.plant.start_words import COMPILING, READY
+from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.drivers.supervisor import Supervisor
+from gridpeers.scenarios.drivers.telemetry_client import with_recorder
+from gridpeers.scenarios.drivers.warm_servers import release
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.launch.link_log import LinkLog
+from gridpeers.scenarios.live.launch.live_recorder import LiveRecorder
+from gridpeers.scenarios.live.requests.agent_configs import check_free, configuration, own_code
+from gridpeers.scenarios.live.requests.run_requests import ANSWER
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.short_names import short
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.driver.stop_signal import StopSignal, stop_at_signals
+from gridpeers.wire.messages import PLANT, Pacing, PlantEvent
+from gridpeers.wire.printable import printable
+from gridpeers.wire.rate_limit import RateLimit
 
 LOGGED = ("roster", "warning")
 """Kinds of events that a plant in this process also writes to its log."""

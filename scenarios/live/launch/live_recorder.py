@@ -8,17 +8,17 @@ from collections.abc import Callable, Collection
 from pathlib import Path
 from time import monotonic
 
-from scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
-from scenarios.drivers.telemetry_stream import Recordable
-from scenarios.live.launch.link_log import LinkLog
-from scenarios.live.show.snapshot import line_of
-from scenarios.record.record_info import RecordInfo
-from scenarios.results.record import Recorded, Recorder, RecordError
-from wire.driver.free_lists import FreeLists
-from wire.driver.large_blocks import keep_out_of_the_heap
-from wire.messages import LinkRequest, PlantEvent, Telemetry
-from wire.rate_limit import RateLimit
-from wire.trust.credentials import Credentials
+from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable
+from gridpeers.scenarios.live.launch.link_log import LinkLog
+from gridpeers.scenarios.live.show.snapshot import line_of
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.wire.driver.free_lists import FreeLists
+from gridpeers.wire.driver.large_blocks import keep_out_of_the_heap
+from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
+from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.trust.credentials import Credentials
 
 _STOP, _CRASH = "stop", "crash/"
 

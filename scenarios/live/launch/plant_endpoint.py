@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from scenarios.drivers.free_endpoint import ListenError, free_endpoint
-from scenarios.live.client.access import Access
-from scenarios.live.client.run_address import (
+from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.client.run_address import (
     RUN,
     RunAddress,
     UsageError,
@@ -13,9 +13,9 @@ from scenarios.live.client.run_address import (
     loopback_of,
     next_port,
 )
-from scenarios.live.client.run_client import RunClient
-from wire.driver.command_line import command_line
-from wire.trust.credentials import Credentials
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.trust.credentials import Credentials
 
 LOOKING = 1.5
 """Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""

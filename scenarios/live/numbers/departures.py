@@ -8,17 +8,17 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple
 
-from plant.equipment import Feeder
-from plant.equipment.bus_islands import switch_names
-from plant.equipment.named_loads import load_name, named_loads
-from scenarios.live.numbers.expected_silence import ExpectedSilence
-from scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
-from scenarios.live.show.snapshot import line_of
-from scenarios.results.event_windows import Window, windows
-from scenarios.results.switch_positions import is_closed
-from scenarios.schema import ScenarioModel
-from scenarios.schema.netem_tables import netem_of
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import switch_names
+from gridpeers.plant.equipment.named_loads import load_name, named_loads
+from gridpeers.scenarios.live.numbers.expected_silence import ExpectedSilence
+from gridpeers.scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
+from gridpeers.scenarios.live.show.snapshot import line_of
+from gridpeers.scenarios.results.event_windows import Window, windows
+from gridpeers.scenarios.results.switch_positions import is_closed
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.netem_tables import netem_of
+from gridpeers.wire.messages import PlantEvent
 
 _SHOWN = 3
 """Most departures in a note; metrics.json has all of them."""

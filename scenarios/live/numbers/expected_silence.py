@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from math import inf
 
-from netem.models.loss import Bernoulli
-from netem.schema.fault import Span
-from netem.schema.pattern import Link
-from plant.equipment import Feeder
-from scenarios.schema import ScenarioModel
-from scenarios.schema.netem_tables import netem_of, setup_of
-from wire.messages import PLANT, PlantEvent
+from gridpeers.netem.models.loss import Bernoulli
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.wire.messages import PLANT, PlantEvent
 
 _NOTICED = 1.0
 """Time (s) after the end of a fault until which a silence is its doing: states have to come and to be reported."""
@@ -28,7 +28,7 @@ _AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
 
 
 class ExpectedSilence:
-    """Recognise events of silence (`plant.realtime.silence_detector`) that the scenario itself causes.
+    """Recognise events of silence (`gridpeers.plant.realtime.silence_detector`) that the scenario itself causes.
 
     Parameters
     ----------

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import msgspec
 
-from plant.equipment import Feeder
-from scenarios.live.numbers.departures import Departures
-from scenarios.results.event_windows import as_they_came
-from scenarios.results.history import History
-from scenarios.results.island_membership import taken_part
-from scenarios.results.plots.drawing import Drawing, Mark, drawing_of
-from scenarios.schema import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.live.numbers.departures import Departures
+from gridpeers.scenarios.results.event_windows import as_they_came
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.island_membership import taken_part
+from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "leaves", "died": "dies"}
 """Verbs of the plant's events, and the same in figures."""

@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.checks_file import FILE, verdicts_json
-from scenarios.checks.judging import JudgingStop, judge_case
-from scenarios.console import terminal
-from scenarios.live.launch.live_folders import Folders
-from scenarios.live.launch.live_processes import ProcessOutcome
-from scenarios.live.numbers.departures import Departures, compare, few
-from scenarios.live.numbers.live_figures import live_drawing
-from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
-from scenarios.results.event_windows import CaseRecord, Window, late_moves
-from scenarios.results.findings import find
-from scenarios.results.island_membership import taken_part
-from scenarios.results.law_failures import law_failures
-from scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
-from scenarios.results.record import Recorded
-from scenarios.results.report import RunReport, plain, show
-from scenarios.results.run_files import shown, write_whole
-from scenarios.schema import ScenarioModel
-from wire.driver.drive import StoppedError
-from wire.messages import Pacing
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checks_file import FILE, verdicts_json
+from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
+from gridpeers.scenarios.console import terminal
+from gridpeers.scenarios.live.launch.live_folders import Folders
+from gridpeers.scenarios.live.launch.live_processes import ProcessOutcome
+from gridpeers.scenarios.live.numbers.departures import Departures, compare, few
+from gridpeers.scenarios.live.numbers.live_figures import live_drawing
+from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.event_windows import CaseRecord, Window, late_moves
+from gridpeers.scenarios.results.findings import find
+from gridpeers.scenarios.results.island_membership import taken_part
+from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.report import RunReport, plain, show
+from gridpeers.scenarios.results.run_files import shown, write_whole
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.messages import Pacing
 
 
 def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
@@ -75,7 +75,9 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     stop.end()
     if not figures:
         return report
-    from scenarios.results.plots.run_figures import draw_all  # matplotlib takes longer to import than all else
+    from gridpeers.scenarios.results.plots.run_figures import (
+        draw_all,  # matplotlib takes longer to import than all else
+    )
 
     draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")
     return report

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from scenarios.results.event_windows import Window, as_they_came, windows
-from scenarios.results.steadiness import STEADY
-from scenarios.schema import ScenarioModel
-from wire.messages import PlantEvent
+from gridpeers.scenarios.results.event_windows import Window, as_they_came, windows
+from gridpeers.scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.wire.messages import PlantEvent
 
 NEAR = 1e-9
 """Times (s) that differ by less are the same: they are multiples of the plant's step."""

@@ -7,14 +7,14 @@ from time import monotonic
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from agents.own_nameplate import check_nameplate
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests.run_requests import ANSWER, ASKED_AGAIN, plant_status
-from scenarios.short_names import in_order
-from wire.driver.command_line import command_line
-from wire.foreign_bytes import decode_foreign
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.own_nameplate import check_nameplate
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.requests.run_requests import ANSWER, ASKED_AGAIN, plant_status
+from gridpeers.scenarios.short_names import in_order
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.foreign_bytes import decode_foreign
 
 
 def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
@@ -93,7 +93,7 @@ def own_code(config: AgentConfig) -> tuple[str, ...]:
 
     Examples
     --------
-    >>> from agents.agent_config import Control, LawChoice
+    >>> from gridpeers.agents.agent_config import Control, LawChoice
     >>> control = Control(secondary="all", graph="full", law=LawChoice(command=("./mylaw",)))
     >>> own_code(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0, f_nom=60.0,
     ...     m_p=0.01, m_q=0.05, T_c=0.02, control=control, deadline=10.0, connect=()))

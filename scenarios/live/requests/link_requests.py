@@ -8,20 +8,20 @@ from typing import Any
 
 import msgspec
 
-from agents.agent_config import AgentConfig
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_reports import LinkStatus, decode_statuses
-from scenarios.live.client.run_address import UsageError
-from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests.agent_configs import configurations
-from scenarios.live.requests.run_requests import data_of, request
-from wire.messages import PLANT, Answer, LinkAcknowledgement
-from wire.schema.table_schema import Problem
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.emulation.link_reports import LinkStatus, decode_statuses
+from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.requests.agent_configs import configurations
+from gridpeers.scenarios.live.requests.run_requests import data_of, request
+from gridpeers.wire.messages import PLANT, Answer, LinkAcknowledgement
+from gridpeers.wire.schema.table_schema import Problem
 
 
 class _LinkReply(msgspec.Struct, frozen=True):
-    """The plant's answer to "link" and "links"; see `plant.realtime.run_commands`."""
+    """The plant's answer to "link" and "links"; see `gridpeers.plant.realtime.run_commands`."""
 
     number: int
     t: float

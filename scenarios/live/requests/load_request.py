@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from math import isfinite
 
-from plant.equipment.named_loads import FACTOR
-from scenarios.live.client.run_address import UsageError
-from wire.messages import LoadSetting
+from gridpeers.plant.equipment.named_loads import FACTOR
+from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.wire.messages import LoadSetting
 
 MOST = 1e8
 """Largest number (kW or kvar) that is sent; what is plausible the plant knows, as it knows the feeder."""

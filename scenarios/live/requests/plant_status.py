@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import msgspec
 
-from wire.messages import Pacing, PlantEvent
+from gridpeers.wire.messages import Pacing, PlantEvent
 
 
 class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
-    """The plant's answer to "status", as far as it is shown; see `plant.realtime.run_commands`."""
+    """The plant's answer to "status", as far as it is shown; see `gridpeers.plant.realtime.run_commands`."""
 
     phase: str
     """gathering, running or closing."""

@@ -10,12 +10,12 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests.plant_status import PlantStatus
-from wire.bounds import MOST_COUNT
-from wire.codec import encode
-from wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
-from wire.printable import printable
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.wire.bounds import MOST_COUNT
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
+from gridpeers.wire.printable import printable
 
 T = TypeVar("T")
 

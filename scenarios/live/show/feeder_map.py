@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.equipment.named_loads import named_loads
-from scenarios.results.plots.feeder_places import has_coordinates, places
-from wire.foreign_bytes import decode_foreign
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.named_loads import named_loads
+from gridpeers.scenarios.results.plots.feeder_places import has_coordinates, places
+from gridpeers.wire.foreign_bytes import decode_foreign
 
 
 class MapSwitch(msgspec.Struct, frozen=True):
@@ -71,7 +71,7 @@ def feeder_map(feeder: Feeder) -> FeederMap:
 
     Examples
     --------
-    >>> from plant.tables import read_feeder
+    >>> from gridpeers.plant.tables import read_feeder
     >>> diagram = feeder_map(read_feeder("microgrid123"))
     >>> diagram.inverters[0].name, diagram.buses[diagram.inverters[0].bus][0], diagram.switches[0].name
     ('inv1', '160', '13-152')

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from scenarios.emulation.link_reports import LinkStatus
-from scenarios.short_names import in_order
-from wire.messages import PLANT
+from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.short_names import in_order
+from gridpeers.wire.messages import PLANT
 
 _HEAD = ("link", "sent", "delivered", "dropped", "now")
 

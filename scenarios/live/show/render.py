@@ -9,8 +9,8 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from scenarios.live.show.snapshot import InverterStatus, Snapshot
-from scenarios.short_names import short
+from gridpeers.scenarios.live.show.snapshot import InverterStatus, Snapshot
+from gridpeers.scenarios.short_names import short
 
 EVENTS = 6
 """Number of the latest events in a view."""

@@ -9,11 +9,11 @@ import re
 from collections import deque
 from collections.abc import Collection
 
-from agents.agent_config import AgentConfig
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.snapshot import OLD, V_HIGH, V_LOW, InverterStatus, Snapshot, line_of
-from scenarios.short_names import in_order, short
-from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.snapshot import OLD, V_HIGH, V_LOW, InverterStatus, Snapshot, line_of
+from gridpeers.scenarios.short_names import in_order, short
+from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 SILENT = 1.5
 """An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""

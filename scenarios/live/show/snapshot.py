@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from wire.messages import PlantEvent
+from gridpeers.wire.messages import PlantEvent
 
 OLD = 0.2
 """An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""

@@ -13,16 +13,16 @@ from typing import Protocol
 from rich.console import Console
 from rich.live import Live
 
-from agents.agent_config import AgentConfig
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.requests.agent_configs import read_config
-from scenarios.live.requests.run_requests import plant_status
-from scenarios.live.show.render import plain, table
-from scenarios.live.show.run_monitor import RunMonitor
-from scenarios.live.show.snapshot import Snapshot
-from wire.bounds import MOST_INVERTERS
-from wire.messages import PLANT, AgentStatus, Telemetry
-from wire.timing.session_deadline import SessionDeadline
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.requests.agent_configs import read_config
+from gridpeers.scenarios.live.requests.run_requests import plant_status
+from gridpeers.scenarios.live.show.render import plain, table
+from gridpeers.scenarios.live.show.run_monitor import RunMonitor
+from gridpeers.scenarios.live.show.snapshot import Snapshot
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
+from gridpeers.wire.timing.session_deadline import SessionDeadline
 
 LOOK = 1.2
 """Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""

@@ -10,16 +10,16 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from scenarios.results.evaluation.quantities import Quantity
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import callable_objection, plugin_of
-from wire.plugins.registry import Registry
-from wire.printable import printable
+from gridpeers.scenarios.results.evaluation.quantities import Quantity
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import callable_objection, plugin_of
+from gridpeers.wire.plugins.registry import Registry
+from gridpeers.wire.printable import printable
 
 if TYPE_CHECKING:
-    from scenarios.results.evaluation.claims import Claim
-    from scenarios.results.findings import Findings
+    from gridpeers.scenarios.results.evaluation.claims import Claim
+    from gridpeers.scenarios.results.findings import Findings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,7 +64,7 @@ class Published:
 
 
 def _claim_objection(it: Any) -> str:
-    from scenarios.results.evaluation.claims import Claim  # numpy, which a scenario is read without
+    from gridpeers.scenarios.results.evaluation.claims import Claim  # numpy, which a scenario is read without
 
     return "" if isinstance(it, Claim) else callable_objection(it, "findings")
 
@@ -116,7 +116,7 @@ BENCHMARKS: Registry[Benchmark] = Registry(
     "benchmarks",
     _benchmark_objection,
     own={
-        name: f"papers.singhal2022.paper_benchmarks:{name.replace('-', '_').upper()}"
+        name: f"gridpeers.papers.singhal2022.paper_benchmarks:{name.replace('-', '_').upper()}"
         for name in ("islanding", "intermittency", "communication", "switching", "plug-n-play", "wind-up")
     },
 )

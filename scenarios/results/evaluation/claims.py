@@ -22,14 +22,14 @@ from typing import Any, Literal
 
 import numpy as np
 
-from scenarios.results.evaluation.benchmark_registry import CLAIMS
-from scenarios.results.evaluation.quantities import Measure
-from scenarios.results.findings import Findings
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import Plugin, made
-from wire.plugins.registry import PluginError
-from wire.printable import printable
+from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
+from gridpeers.scenarios.results.evaluation.quantities import Measure
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import Plugin, made
+from gridpeers.wire.plugins.registry import PluginError
+from gridpeers.wire.printable import printable
 
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a known reason that is shown; NOT RUN: a case that it is about was left out."""

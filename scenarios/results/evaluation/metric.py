@@ -17,14 +17,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from wire.plugins.anybody import ANYTHING, named
-from wire.plugins.foreign_code import foreign_code
-from wire.plugins.plugin import KEYS, Plugin, callable_objection, made
-from wire.plugins.registry import PluginError, Registry
-from wire.printable import printable
+from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, made
+from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.printable import printable
 
 if TYPE_CHECKING:
-    from scenarios.results.evaluation.window_metrics import WindowData
+    from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
 
@@ -38,7 +38,7 @@ METRICS: Registry[Any] = Registry(
     "metric",
     "metrics",
     lambda it: callable_objection(it, "window", (*KEYS, "name")),
-    own={name: f"scenarios.results.evaluation.window_metrics:{name}" for name in _OURS},
+    own={name: f"gridpeers.scenarios.results.evaluation.window_metrics:{name}" for name in _OURS},
 )
 """Metrics by name; those of gridpeers come first."""
 

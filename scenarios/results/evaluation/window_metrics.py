@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from plant.equipment import Feeder
-from scenarios.results.evaluation.metric import Measured, make_metrics, measured
-from scenarios.results.event_windows import CaseRecord, Window
-from scenarios.results.history import Flags, Floats, History, Nameplates, read_only
-from scenarios.results.metrics import SHARING, Settling, Steady, measure, settling
-from scenarios.schema import ScenarioModel
-from scenarios.schema.participants import without_agent
-from scenarios.schema.plugin_keys import metrics_of
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.results.evaluation.metric import Measured, make_metrics, measured
+from gridpeers.scenarios.results.event_windows import CaseRecord, Window
+from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, read_only
+from gridpeers.scenarios.results.metrics import SHARING, Settling, Steady, measure, settling
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.plugin_keys import metrics_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,12 +9,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results import metrics
-from scenarios.results.history import Floats, History, Nameplates
-from scenarios.results.island_membership import RowMeasure, worst
-from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import finish
-from scenarios.results.plots.style import (
+from gridpeers.scenarios.results import metrics
+from gridpeers.scenarios.results.history import Floats, History, Nameplates
+from gridpeers.scenarios.results.island_membership import RowMeasure, worst
+from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.marks import finish
+from gridpeers.scenarios.results.plots.style import (
     SHARING,
     VOLTAGE,
     Bounds,
@@ -25,7 +25,7 @@ from scenarios.results.plots.style import (
     nominal_line,
     words,
 )
-from scenarios.results.sharing_index import NO_LOAD
+from gridpeers.scenarios.results.sharing_index import NO_LOAD
 
 
 def _where_shared(index: Floats, x: Floats, history: History, nameplates: Nameplates) -> Floats:

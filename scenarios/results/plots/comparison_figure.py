@@ -9,10 +9,10 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results.plots.case_figures import MEASURES, measured
-from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import BLACK, mark_events
-from scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, name_panel, time_axis
+from gridpeers.scenarios.results.plots.case_figures import MEASURES, measured
+from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.marks import BLACK, mark_events
+from gridpeers.scenarios.results.plots.style import PAGE, Style, from_zero, legend_below, name_panel, time_axis
 
 WIDTH, HEIGHT = 7.4, 2.3
 """Size of a figure, and of each row of panels in it (inches)."""

@@ -8,11 +8,11 @@ import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results.history import Floats
-from scenarios.results.plots.case_figures import MEASURES, measured
-from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import mark_events
-from scenarios.results.plots.style import (
+from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.results.plots.case_figures import MEASURES, measured
+from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.marks import mark_events
+from gridpeers.scenarios.results.plots.style import (
     OTHER_STYLES,
     PAGE,
     from_zero,

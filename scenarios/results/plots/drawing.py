@@ -6,15 +6,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from plant.equipment import Feeder
-from scenarios.results.history import History, Nameplates
-from scenarios.results.island_membership import Island, IslandInterval, Islands, island_intervals
-from scenarios.schema import ScenarioModel
-from scenarios.schema.configs import limits_of
-from scenarios.schema.participants import without_agent
-from scenarios.schema.scenario_model import Event, LoadChange
-from scenarios.short_names import in_order, short
-from wire.messages import PlantEvent
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.island_membership import Island, IslandInterval, Islands, island_intervals
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import limits_of
+from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
+from gridpeers.scenarios.short_names import in_order, short
+from gridpeers.wire.messages import PlantEvent
 
 
 class Mark(NamedTuple):
@@ -115,7 +115,7 @@ def happening(event: Event, scenario: ScenarioModel) -> str:
 
     Examples
     --------
-    >>> from scenarios.schema import load_scenario
+    >>> from gridpeers.scenarios.schema import load_scenario
     >>> scenario, _ = load_scenario("microgrid-switching")
     >>> [happening(event, scenario) for event in scenario.events]
     ['13-152 opens', 'sw1_2, sw2_3 open']

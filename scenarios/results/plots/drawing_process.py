@@ -1,8 +1,8 @@
-"""A process that draws some figures of a run: `python -m scenarios.results.plots.drawing_process` < PICKLE.
+"""A process that draws some figures of a run: `python -m gridpeers.scenarios.results.plots.drawing_process` < PICKLE.
 
 On standard input comes, pickled, what to draw, where to, and which share of the figures: the number of the share, from
-0, and that of all shares. `scenarios.results.figure_processes` writes it, and closes its end when they are drawn.
-If it ends before, the command was killed, and its folder may be that of another run by now.
+0, and that of all shares. `gridpeers.scenarios.results.figure_processes` writes it, and closes its end when they are
+drawn. If it ends before, the command was killed, and its folder may be that of another run by now.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import pickle
 import sys
 import threading
 
-from scenarios.results.plots.run_figures import draw_share
+from gridpeers.scenarios.results.plots.run_figures import draw_share
 
 
 def _end_with_the_command() -> None:

@@ -14,11 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
-from plant.equipment import Feeder, Switch
-from plant.equipment.connectivity import Connectivity
-from scenarios.results.plots.feeder_places import Places, has_coordinates, places
-from scenarios.results.plots.label_places import Label, label_sides
-from wire.counted import counted
+from gridpeers.plant.equipment import Feeder, Switch
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.scenarios.results.plots.feeder_places import Places, has_coordinates, places
+from gridpeers.scenarios.results.plots.label_places import Label, label_sides
+from gridpeers.wire.counted import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""

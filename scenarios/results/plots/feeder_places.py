@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from plant.equipment import Feeder
+from gridpeers.plant.equipment import Feeder
 
 Places = Mapping[str, tuple[float, float]]
 """Place of each bus (drawing units)."""

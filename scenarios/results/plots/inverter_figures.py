@@ -8,12 +8,12 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results import metrics
-from scenarios.results.island_membership import part_of
-from scenarios.results.plots.case_figures import curves, draw_measure
-from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.marks import finish, mark_events, note_above
-from scenarios.results.plots.style import (
+from gridpeers.scenarios.results import metrics
+from gridpeers.scenarios.results.island_membership import part_of
+from gridpeers.scenarios.results.plots.case_figures import curves, draw_measure
+from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.marks import finish, mark_events, note_above
+from gridpeers.scenarios.results.plots.style import (
     MOVER,
     OTHER_STYLES,
     STAYERS,

@@ -11,8 +11,8 @@ from typing import Any, Literal, NamedTuple
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from scenarios.results.plots.drawing import Drawing, Mark
-from scenarios.results.plots.style import time_axis
+from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
+from gridpeers.scenarios.results.plots.style import time_axis
 
 Panels = NDArray[Any]
 """Panels of a figure, rows by columns."""

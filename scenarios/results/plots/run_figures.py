@@ -9,11 +9,11 @@ from pathlib import Path
 import matplotlib as mpl
 from matplotlib.figure import Figure
 
-from scenarios.results.plots.case_figures import MEASURES, overview, single
-from scenarios.results.plots.drawing import Drawing
-from scenarios.results.plots.inverter_figures import available_power, microgrids, plug_and_play, powers
-from scenarios.results.plots.style import PAGE, save
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.results.plots.case_figures import MEASURES, overview, single
+from gridpeers.scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.plots.inverter_figures import available_power, microgrids, plug_and_play, powers
+from gridpeers.scenarios.results.plots.style import PAGE, save
+from gridpeers.wire.schema.suggestion import suggestion
 
 
 def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:

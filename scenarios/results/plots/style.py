@@ -17,8 +17,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scenarios.results.history import Floats
-from scenarios.results.plots.drawing import Drawing
+from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.results.plots.drawing import Drawing
 
 LineStyle = tuple[str, Any]
 """Colour and dash pattern."""

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Any, NamedTuple
 
-from scenarios.schema.scenario_errors import Problems
-from scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
-from scenarios.sweep.file.paths import flatten
-from scenarios.sweep.file.sweep_model import GraphAxis, ValueRange
-from wire.schema.relations import problems_of
-from wire.schema.table_reading import read_table
-from wire.schema.table_schema import fields_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.file.graph_axis import algebraic_connectivity, connected_graphs
+from gridpeers.scenarios.sweep.file.paths import flatten
+from gridpeers.scenarios.sweep.file.sweep_model import GraphAxis, ValueRange
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.schema.table_schema import fields_of
 
 
 class Setting(NamedTuple):

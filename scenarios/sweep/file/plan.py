@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from plant.equipment import Feeder
-from scenarios.schema import ScenarioModel
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.schema import ScenarioModel
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.schema.scenario_errors import Problems
-from scenarios.sweep.file.axes import Axis, Setting, is_number, of_values
-from scenarios.sweep.file.paths import flatten
-from scenarios.sweep.file.sweep_model import RandomAxis
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.file.axes import Axis, Setting, is_number, of_values
+from gridpeers.scenarios.sweep.file.paths import flatten
+from gridpeers.scenarios.sweep.file.sweep_model import RandomAxis
+from gridpeers.wire.schema.suggestion import suggestion
 
 DISTRIBUTIONS = ("uniform", "loguniform", "choice")
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from plant.equipment import Feeder
-from plant.tables import read_feeder
-from scenarios.schema import ScenarioModel
-from scenarios.schema.loading import check_tables
-from scenarios.schema.scenario_errors import Problems
-from scenarios.sweep.file.axes import Setting
-from scenarios.sweep.file.paths import PathError, Tree, put
-from scenarios.sweep.file.plan import Run
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.loading import check_tables
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.file.axes import Setting
+from gridpeers.scenarios.sweep.file.paths import PathError, Tree, put
+from gridpeers.scenarios.sweep.file.plan import Run
 
 MOST_LISTED = 20
 """Most problems of samples in a message: the rest is more of the same."""

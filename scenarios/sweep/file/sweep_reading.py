@@ -9,20 +9,20 @@ from pathlib import Path
 
 import msgspec
 
-from scenarios.catalogue_files import SWEEPS, names_in
-from scenarios.duration import duration
-from scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
-from scenarios.schema.loading import find_file, read_toml
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_errors import Problems
-from scenarios.sweep.file.axes import Axis, graph_axes, grid_axes, of_values, samples, zip_axes
-from scenarios.sweep.file.paths import PathError, flatten, steps
-from scenarios.sweep.file.plan import Plan, fingerprint
-from scenarios.sweep.file.random_axis import random_axes
-from scenarios.sweep.file.samples import BaseScenario, checked_runs
-from scenarios.sweep.file.sweep_model import Sweep
-from wire.schema.relations import problems_of
-from wire.schema.suggestion import suggestion
+from gridpeers.scenarios.catalogue_files import SWEEPS, names_in
+from gridpeers.scenarios.duration import duration
+from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
+from gridpeers.scenarios.schema.loading import find_file, read_toml
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.file.axes import Axis, graph_axes, grid_axes, of_values, samples, zip_axes
+from gridpeers.scenarios.sweep.file.paths import PathError, flatten, steps
+from gridpeers.scenarios.sweep.file.plan import Plan, fingerprint
+from gridpeers.scenarios.sweep.file.random_axis import random_axes
+from gridpeers.scenarios.sweep.file.samples import BaseScenario, checked_runs
+from gridpeers.scenarios.sweep.file.sweep_model import Sweep
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.suggestion import suggestion
 
 SECONDS_PER_SECOND = 0.05
 """Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers), for messages alone."""

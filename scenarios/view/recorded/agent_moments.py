@@ -7,10 +7,10 @@ from collections import Counter, defaultdict
 from functools import lru_cache
 from typing import NamedTuple
 
-from scenarios.record.journal_coverage import inside
-from scenarios.record.record_reader import RunRecord
-from wire.journal import Decision
-from wire.messages import PLANT, Measurement, State
+from gridpeers.scenarios.record.journal_coverage import inside
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.journal import Decision
+from gridpeers.wire.messages import PLANT, Measurement, State
 
 GONE = 0.5
 """Wall-clock: time (s) without a decision after which an agent counts as not there, if that is 2.5 control periods."""

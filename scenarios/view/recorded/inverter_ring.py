@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from plant.equipment import Feeder
-from plant.tables import FeederError, read_feeder
-from scenarios.live.show.feeder_map import FeederMap, MapInverter
-from scenarios.record.record_info import RecordInfo
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.scenarios.live.show.feeder_map import FeederMap, MapInverter
+from gridpeers.scenarios.record.record_info import RecordInfo
 
 
 def feeder_of(info: RecordInfo) -> Feeder | None:

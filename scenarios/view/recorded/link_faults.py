@@ -9,15 +9,15 @@ from functools import lru_cache
 
 import msgspec
 
-from netem.fault_schedule import Change, FaultSchedule, schedule_of
-from netem.ledger import LinkCounts
-from netem.schema.pattern import Link, links_among
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.emulation.link_descriptions import words
-from scenarios.emulation.link_reports import LinkStatus, data_of
-from scenarios.record.record_reader import RunRecord
-from wire.messages import LinkReport, LinkRequest
+from gridpeers.netem.fault_schedule import Change, FaultSchedule, schedule_of
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.netem.schema.pattern import Link, links_among
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.emulation.link_descriptions import words
+from gridpeers.scenarios.emulation.link_reports import LinkStatus, data_of
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.wire.messages import LinkReport, LinkRequest
 
 NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupted=0, in_flight=0)
 """Counts of a link before its first message."""

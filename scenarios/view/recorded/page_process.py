@@ -11,10 +11,10 @@ from types import TracebackType
 
 import msgspec
 
-from scenarios.view.page_server import PageOptions, PageServer
-from scenarios.view.recorded.record_pages import RecordPages
-from scenarios.view.recorded.recorded_run import RecordedRun
-from wire.driver.process import LEASH
+from gridpeers.scenarios.view.page_server import PageOptions, PageServer
+from gridpeers.scenarios.view.recorded.record_pages import RecordPages
+from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
+from gridpeers.wire.driver.process import LEASH
 
 LEAVING = 5.0
 """Time (s) that the process has to end by itself."""
@@ -54,7 +54,7 @@ class PageProcess:
         descriptor = listening.fileno()
         config = PageConfig(path=str(folder), descriptor=descriptor, hosts=PageOptions().hosts)
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "scenarios.view.recorded", LEASH, "view"],
+            [sys.executable, "-P", "-m", "gridpeers.scenarios.view.recorded", LEASH, "view"],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

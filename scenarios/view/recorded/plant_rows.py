@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
-from agents.agent_config import AgentConfig
-from scenarios.record.record_reader import RunRecord
-from scenarios.view.liveness import FROZEN
-from scenarios.view.strips import LENGTH, Point, next_due, point_of
-from wire.messages import Telemetry
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.view.liveness import FROZEN
+from gridpeers.scenarios.view.strips import LENGTH, Point, next_due, point_of
+from gridpeers.wire.messages import Telemetry
 
 LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)
 """Lengths of strips (s): a record that is shorter than the last has more points a second."""

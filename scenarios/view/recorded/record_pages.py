@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 from msgspec.structs import replace
 
-from scenarios.record.record_reader import RecordFileError
-from scenarios.view.link_states import LinkView
-from scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
-from scenarios.view.recorded.record_view import RecordView
-from scenarios.view.recorded.recorded_run import RecordedRun
-from wire.bounds import Text
-from wire.driver.command_line import command_line
-from wire.foreign_bytes import decode_foreign
-from wire.plugins.anybody import ANYTHING, named
+from gridpeers.scenarios.record.record_reader import RecordFileError
+from gridpeers.scenarios.view.link_states import LinkView
+from gridpeers.scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
+from gridpeers.scenarios.view.recorded.record_view import RecordView
+from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
+from gridpeers.wire.bounds import Text
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.plugins.anybody import ANYTHING, named
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket

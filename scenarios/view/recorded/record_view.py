@@ -12,21 +12,21 @@ from itertools import takewhile
 
 from msgspec.structs import replace
 
-from plant.equipment.load_powers import set_power
-from scenarios.explanation.explanation import explain
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.feeder_map import FeederMap, feeder_map
-from scenarios.live.show.snapshot import InverterStatus
-from scenarios.record.record_reader import RunRecord
-from scenarios.view.link_states import LinkView
-from scenarios.view.liveness import LivenessView
-from scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
-from scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
-from scenarios.view.recorded.link_faults import NO_MESSAGES, LinkFaults
-from scenarios.view.recorded.plant_rows import PlantRows
-from scenarios.view.run_view import Cursor, EventView, Frame, RunView
-from scenarios.view.strips import LENGTH
-from wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
+from gridpeers.plant.equipment.load_powers import set_power
+from gridpeers.scenarios.explanation.explanation import explain
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.feeder_map import FeederMap, feeder_map
+from gridpeers.scenarios.live.show.snapshot import InverterStatus
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.view.link_states import LinkView
+from gridpeers.scenarios.view.liveness import LivenessView
+from gridpeers.scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
+from gridpeers.scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
+from gridpeers.scenarios.view.recorded.link_faults import NO_MESSAGES, LinkFaults
+from gridpeers.scenarios.view.recorded.plant_rows import PlantRows
+from gridpeers.scenarios.view.run_view import Cursor, EventView, Frame, RunView
+from gridpeers.scenarios.view.strips import LENGTH
+from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
 WINDOW = 1.0
 """Time (s) before a moment over which messages are counted."""

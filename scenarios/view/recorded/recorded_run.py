@@ -9,10 +9,10 @@ from typing import Literal
 
 import msgspec
 
-from scenarios.record.record_info import FILE
-from scenarios.record.record_reader import RecordFileError, RunRecord
-from scenarios.view.recorded.record_view import RecordView
-from scenarios.view.run_view import EventView
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.view.recorded.record_view import RecordView
+from gridpeers.scenarios.view.run_view import EventView
 
 STILL = 3.0
 """Time (s) after which a record that does not grow is no longer followed: its writer has a chunk every 0.25 s."""

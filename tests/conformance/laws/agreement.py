@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from agents.laws.law import Law, Neighbour, Own
+from gridpeers.agents.laws.law import Law, Neighbour, Own
 
 Floats = NDArray[np.float64]
 M_P = 0.01

@@ -6,8 +6,8 @@ import json
 import sys
 from time import sleep
 
-from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.law import Neighbour, Own
 
 FAILURES = {
     "rubbish": "hello",

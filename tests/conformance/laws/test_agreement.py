@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from agents.laws.consensus import Consensus
-from agents.laws.event_triggered import EventTriggered
-from agents.laws.finite_time import FiniteTime
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.event_triggered import EventTriggered
+from gridpeers.agents.laws.finite_time import FiniteTime
 from tests.conformance.laws.agreement import M_P, agreement, laplacian, ring
 
 P_SET = (0.1, 0.9, 0.4, 0.7, 0.2, 0.5)

@@ -51,7 +51,7 @@ def test_every_carrier_of_a_law_gives_the_same_history(carrier: str, driver: Dri
     Processes run a class in tests/unit/gridpeers/test_own_law.py, and a program in test_law_programs.py.
     """
     laws: dict[str, Any] = {
-        "class": "agents.laws.consensus:Consensus",
+        "class": "gridpeers.agents.laws.consensus:Consensus",
         "program": PROGRAM | PATIENT,
         "fmu": fmu | PATIENT,
     }

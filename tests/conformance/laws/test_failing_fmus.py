@@ -12,10 +12,10 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.agent_config import LawChoice
-from agents.carriers.fmu import FmuLaw, load_problem
-from agents.carriers.fmu_interface import fmu_problems
-from agents.laws.call import LawError, decide, start_law
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.carriers.fmu import FmuLaw, load_problem
+from gridpeers.agents.carriers.fmu_interface import fmu_problems
+from gridpeers.agents.laws.call import LawError, decide, start_law
 from tests.conformance.laws.test_programs_end import OWN
 
 NAME = "FailingFmu.fmu"
@@ -64,9 +64,9 @@ def test_an_fmu_that_fails_in_a_step_is_told(how: float, said: str, folder: Path
 
 AGENT = """
 import os, signal
-from agents.carriers.fmu import FmuLaw
-from agents.agent_config import LawChoice
-from agents.laws.law import Own
+from gridpeers.agents.carriers.fmu import FmuLaw
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.laws.law import Own
 law = FmuLaw(LawChoice(fmu={name!r}, folder={folder!r}, parameters={{"how": 1}}))
 law.start(Own(*{own!r}))
 os.write(law._group.program.stdin.fileno(), {step!r})

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.law import Neighbour, Own
 from tests.conformance.laws.law_runs import Driver, islanding, written
 from tests.conformance.laws.test_carriers import PATIENT
 

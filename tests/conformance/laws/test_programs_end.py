@@ -9,12 +9,12 @@ from time import monotonic
 
 import pytest
 
-from agents.agent_config import LawChoice
-from agents.carriers.make import close_laws
-from agents.carriers.process_group import LEAVING
-from agents.carriers.program import ProgramLaw
-from agents.laws.call import LawError
-from agents.laws.law import Own
+from gridpeers.agents.agent_config import LawChoice
+from gridpeers.agents.carriers.make import close_laws
+from gridpeers.agents.carriers.process_group import LEAVING
+from gridpeers.agents.carriers.program import ProgramLaw
+from gridpeers.agents.laws.call import LawError
+from gridpeers.agents.laws.law import Own
 
 OWN = Own("inv1", True, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
 
@@ -23,8 +23,8 @@ STAYS = "sleep 600 & sleep 600"
 
 AGENT = f"""
 import os, signal
-from agents.carriers.program import ProgramLaw
-from agents.agent_config import LawChoice
+from gridpeers.agents.carriers.program import ProgramLaw
+from gridpeers.agents.agent_config import LawChoice
 law = ProgramLaw(LawChoice(command=("sh", "-c", {STAYS!r})))
 """
 

@@ -11,13 +11,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_info
 
-from scenarios.catalogue_files import CATALOGUE, names_in
-from scenarios.drivers.free_endpoint import local_endpoint
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.results.record import Recorded, Recorder
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
+from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 FILE = Path(__file__).parent / "hashes.toml"
 """The pins."""

@@ -13,11 +13,11 @@ from tests.pinned_kernels import choose
 
 choose()  # before numpy is imported
 
-from scenarios.drivers.free_endpoint import local_endpoint  # noqa: E402
-from scenarios.drivers.process_driver import run_processes  # noqa: E402
-from scenarios.results.record import Recorder  # noqa: E402
-from scenarios.schema import load_scenario  # noqa: E402
-from scenarios.schema.configs import configs  # noqa: E402
+from gridpeers.scenarios.drivers.free_endpoint import local_endpoint  # noqa: E402
+from gridpeers.scenarios.drivers.process_driver import run_processes  # noqa: E402
+from gridpeers.scenarios.results.record import Recorder  # noqa: E402
+from gridpeers.scenarios.schema import load_scenario  # noqa: E402
+from gridpeers.scenarios.schema.configs import configs  # noqa: E402
 from tests.golden.catalogue.pins import cases, environment, read  # noqa: E402
 
 

@@ -6,7 +6,7 @@ import math
 
 import msgspec
 
-from wire.messages import (
+from gridpeers.wire.messages import (
     AgentStatus,
     Angle,
     Answer,

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.messages import MESSAGES, Message
 from tests.golden.messages.message_values import LEAST, WHOLE, with_defaults
-from wire.codec import decode, encode
-from wire.messages import MESSAGES, Message
 
 FILE = Path(__file__).parent / "messages.txt"
 PINNED = {

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.network import Network, PowerFlow, solve_power_flow
-from plant.tables import read_feeder
+from gridpeers.plant.network import Network, PowerFlow, solve_power_flow
+from gridpeers.plant.tables import read_feeder
 
 HERE = Path(__file__).parent
 Z_GFM = 0.0025 + 0.05j

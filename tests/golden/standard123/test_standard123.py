@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.network import Network, PowerFlow, solve_power_flow
-from plant.tables import read_feeder
+from gridpeers.plant.network import Network, PowerFlow, solve_power_flow
+from gridpeers.plant.tables import read_feeder
 
 EXPECTED = Path(__file__).with_name("expected.csv")
 

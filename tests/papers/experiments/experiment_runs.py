@@ -8,16 +8,16 @@ from typing import Any
 import msgspec
 import pandas as pd
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from papers.singhal2022.experiments.experiment_data import CaseData, SweepData
-from plant.equipment import Feeder
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.history import History
-from scenarios.results.record import Recorder
-from scenarios.schema import ScenarioModel, load_scenario
-from scenarios.schema.configs import configs
-from scenarios.sweep.sweep_case import plant_at_start, run_one
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
+from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema import ScenarioModel, load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.sweep.sweep_case import plant_at_start, run_one
 
 ALL = "* <-> *"
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from scenarios.schema import load_scenario
-from scenarios.sweep.sweep_case import run_one
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.sweep.sweep_case import run_one
 
 
 def steady(T_c: float, end_s: float) -> tuple[float, float]:

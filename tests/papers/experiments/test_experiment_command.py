@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from papers.singhal2022.experiments.experiment_output import (
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
     ExperimentTable,
@@ -15,7 +15,7 @@ from papers.singhal2022.experiments.experiment_output import (
     Page,
     Panel,
 )
-from papers.singhal2022.experiments.experiment_registry import EXPERIMENTS
+from gridpeers.papers.singhal2022.experiments.experiment_registry import EXPERIMENTS
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -10,12 +10,12 @@ import pandas as pd
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
+from gridpeers.papers.singhal2022.experiments.hostile_experiment import GRAPHS, attack_words, defence_words, hostile
+from gridpeers.scenarios.predict.robustness import robustness
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.sweep.sweep_case import run_one
 from gridpeers.sweep_files import read_sweep
-from papers.singhal2022.experiments.experiment_data import SweepData
-from papers.singhal2022.experiments.hostile_experiment import GRAPHS, attack_words, defence_words, hostile
-from scenarios.predict.robustness import robustness
-from scenarios.schema import load_scenario
-from scenarios.sweep.sweep_case import run_one
 from tests.papers.experiments.experiment_runs import theory
 from tests.unit.agents.test_resilient_law import spread_after
 

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.headline import within
-from papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
-from papers.singhal2022.reproduce.report_tables import lines
-from papers.singhal2022.reproduce.report_writing import render
-from papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
-from papers.singhal2022.reproduce.settings import settings
-from papers.singhal2022.reproduce.topology_study import graphs
-from papers.singhal2022.tables import TABLES, Cell, tables_of
-from scenarios.results.evaluation.claims import judge
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import Steady
-from scenarios.schema import load_scenario
-from scenarios.sweep.file.graph_axis import algebraic_connectivity
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.headline import within
+from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
+from gridpeers.papers.singhal2022.reproduce.report_tables import lines
+from gridpeers.papers.singhal2022.reproduce.report_writing import render
+from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
+from gridpeers.papers.singhal2022.reproduce.settings import settings
+from gridpeers.papers.singhal2022.reproduce.topology_study import graphs
+from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
+from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.sweep.file.graph_axis import algebraic_connectivity
 
 ISLANDING: Part = PARTS[0]
 PIXEL = bytes.fromhex(

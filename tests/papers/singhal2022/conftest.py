@@ -4,12 +4,12 @@ from dataclasses import dataclass
 
 import pytest
 
-from papers.singhal2022.claims import CLAIMS
-from scenarios.results.evaluation.claims import judge
-from scenarios.results.event_windows import CaseRecord, windows
-from scenarios.results.findings import Findings, SteadyValues, find
-from scenarios.results.history import History, Nameplates
-from scenarios.schema import load_scenario
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.event_windows import CaseRecord, windows
+from gridpeers.scenarios.results.findings import Findings, SteadyValues, find
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.schema import load_scenario
 from tests.golden.catalogue.pins import ran
 
 

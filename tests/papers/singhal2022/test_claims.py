@@ -4,13 +4,13 @@ from dataclasses import replace
 
 import pytest
 
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
-from papers.singhal2022.tables import tables_of
-from papers.singhal2022.tolerances import TABLE
-from scenarios.results.evaluation.claims import Verdict, judge
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import Settling, Steady
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.claims.topology_claims import GraphFindings, GraphRun
+from gridpeers.papers.singhal2022.tables import tables_of
+from gridpeers.papers.singhal2022.tolerances import TABLE
+from gridpeers.scenarios.results.evaluation.claims import Verdict, judge
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import Settling, Steady
 
 ISLANDING = CLAIMS["islanding"]
 Table = dict[str, dict[str, Steady]]

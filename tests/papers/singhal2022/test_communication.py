@@ -2,10 +2,10 @@
 
 import pytest
 
-from agents.topology import adjacency
-from scenarios.results import metrics
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.topology import adjacency
+from gridpeers.scenarios.results import metrics
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 from .conftest import Experiment, expected
 

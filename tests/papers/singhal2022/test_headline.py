@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-from papers.singhal2022.headline import headline, numbers
-from papers.singhal2022.tables import tables_of
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import Steady
+from gridpeers.papers.singhal2022.headline import headline, numbers
+from gridpeers.papers.singhal2022.tables import tables_of
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import Steady
 
 
 def told(case: str, event: str, **ours: float) -> list[str]:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from papers.singhal2022.claims.islanding_claims import EVENTS
-from scenarios.results import metrics
+from gridpeers.papers.singhal2022.claims.islanding_claims import EVENTS
+from gridpeers.scenarios.results import metrics
 
 from .conftest import Experiment, expected
 

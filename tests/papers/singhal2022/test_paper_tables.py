@@ -2,8 +2,8 @@
 
 import pytest
 
-from papers.singhal2022.tables import TABLES, Cell
-from papers.singhal2022.tolerances import TABLE
+from gridpeers.papers.singhal2022.tables import TABLES, Cell
+from gridpeers.papers.singhal2022.tolerances import TABLE
 
 from .conftest import Experiment
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenarios.results import metrics
+from gridpeers.scenarios.results import metrics
 
 from .conftest import Experiment, expected
 

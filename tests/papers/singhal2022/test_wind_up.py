@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.history import History
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from wire.messages import Telemetry
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import Telemetry
 
 from .conftest import Experiment, expected
 

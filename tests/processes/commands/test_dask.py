@@ -9,10 +9,10 @@ import msgspec
 import pytest
 
 import gridpeers as gp
-from scenarios.chaos.campaign import Campaign, run_campaign
-from scenarios.chaos.chaos_folder import ChaosFolder
-from scenarios.chaos.chaos_run import ChaosRow
-from scenarios.sweep import workers
+from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
+from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
+from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+from gridpeers.scenarios.sweep import workers
 from tests.chaos.bases import base_in
 from tests.chaos.small_campaign import small
 from tests.command_line import invoke

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from scenarios.results.record import PARTIAL
+from gridpeers.scenarios.results.record import PARTIAL
 
 SHORT = """
 law = "held:Held"

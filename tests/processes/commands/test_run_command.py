@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from scenarios.explanation.explanation import explain
-from scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.explanation.explanation import explain
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 from tests.processes.terminals import Desk, Terminal
 from tests.record.recorded_runs import recorded_run

@@ -15,13 +15,13 @@ import pytest
 
 import gridpeers
 from gridpeers import Result, Scenario
-from plant.helics import topics
-from plant.helics.bridged_plant import BridgedPlant
-from plant.helics.federate import HelicsError, HelicsFederate
-from plant.helics.helics_settings import HelicsSettings
-from plant.plant_config import PlantConfig, PlantSettings
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.run_request import BrokenRunError
+from gridpeers.plant.helics import topics
+from gridpeers.plant.helics.bridged_plant import BridgedPlant
+from gridpeers.plant.helics.federate import HelicsError, HelicsFederate
+from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.plant.plant_config import PlantConfig, PlantSettings
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.run_request import BrokenRunError
 from tests.command_line import invoke
 from tests.toy.toy_plant import ToyPlant
 

@@ -12,8 +12,8 @@ import tempfile
 from pathlib import Path
 from typing import Literal
 
-from agents.agent_config import Control
-from scenarios.drivers.outcome import Outcome
+from gridpeers.agents.agent_config import Control
+from gridpeers.scenarios.drivers.outcome import Outcome
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun
 

@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.drivers.forking import AVAILABLE
-from scenarios.drivers.warm_servers import figure_server, release
-from scenarios.results import figure_processes
-from scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
-from scenarios.results.plots import run_figures
+from gridpeers.scenarios.drivers.forking import AVAILABLE
+from gridpeers.scenarios.drivers.warm_servers import figure_server, release
+from gridpeers.scenarios.results import figure_processes
+from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
+from gridpeers.scenarios.results.plots import run_figures
 from tests.processes.terminals import children_of
 from tests.unit.scenarios.results.test_plots import drawing
 

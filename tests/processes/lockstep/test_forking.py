@@ -12,11 +12,11 @@ from time import monotonic
 
 import pytest
 
-from scenarios.drivers.children import Child
-from scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
-from scenarios.drivers.warm_servers import agent_server, plant_server, release
+from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
+from gridpeers.scenarios.drivers.warm_servers import agent_server, plant_server, release
+from gridpeers.wire.driver.process import BAD_CONFIG, IN_ORDER
 from tests.toy.toy_configs import agent_config
-from wire.driver.process import BAD_CONFIG, IN_ORDER
 
 pytestmark = pytest.mark.skipif(not AVAILABLE, reason="forks on Linux alone")
 
@@ -32,7 +32,7 @@ def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path, monkeypatch:
     (tmp_path / "speaker.py").write_text(speaker)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     with (tmp_path / "log").open("wb") as log:
-        with ForkServer(("agents.__main__",)) as server:
+        with ForkServer(("gridpeers.agents.__main__",)) as server:
             good, killed = (server.fork(["speaker", "--leash", name], log, speaks=True) for name in ("inv1", "inv2"))
         assert good.stdin is not None
         assert good.stdout is not None
@@ -55,7 +55,7 @@ def test_a_forked_process_is_a_child_like_any_other(tmp_path: Path, monkeypatch:
 
 def test_a_forked_agent_behind_emulated_links_warns_of_nothing(tmp_path: Path) -> None:
     """Its log begins with its own words, though the server has imported the module that it runs."""
-    module = "scenarios.emulation.emulated_agent"
+    module = "gridpeers.scenarios.emulation.emulated_agent"
     with (tmp_path / "log").open("wb") as log, ForkServer((module,)) as server:
         agent = server.fork([module], log, speaks=False)
         assert agent.stdin is not None
@@ -72,7 +72,7 @@ def test_a_process_that_cannot_be_forked_is_started_anew(tmp_path: Path) -> None
     """A server that is gone costs time and nothing else."""
     config = agent_config("inv1")
     with ForkServer(("no_such_module",)) as server:
-        child = Child("inv1", ["-m", "agents"], config, tmp_path / "log", lambda child: None, server=server)
+        child = Child("inv1", ["-m", "gridpeers.agents"], config, tmp_path / "log", lambda child: None, server=server)
         child.signal(signal.SIGKILL)
         child.release()
 
@@ -91,21 +91,21 @@ def test_a_server_with_threads_forks_nothing(tmp_path: Path, monkeypatch: pytest
         ForkServer(("busy_module",)) as server,
         pytest.raises(ForkServerError, match="has 2 threads"),
     ):
-        server.fork(["agents"], log, speaks=False)
+        server.fork(["gridpeers.agents"], log, speaks=False)
 
 
 def test_a_server_that_imports_for_too_long_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Nobody waits for a minute without a word, and it forks nothing afterwards that nobody knows of."""
     (tmp_path / "slow_module.py").write_text("import time\ntime.sleep(60)\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setattr("scenarios.drivers.forking.PATIENCE", 0.1)
+    monkeypatch.setattr("gridpeers.scenarios.drivers.forking.PATIENCE", 0.1)
 
     with (
         (tmp_path / "log").open("wb") as log,
         ForkServer(("slow_module",)) as server,
         pytest.raises(ForkServerError, match="timed out"),
     ):
-        server.fork(["agents"], log, speaks=False)
+        server.fork(["gridpeers.agents"], log, speaks=False)
     assert not server.lives
 
 
@@ -135,7 +135,7 @@ def test_a_forked_plant_has_loaded_its_step_and_no_thread(tmp_path: Path) -> Non
         server = plant_server()
         assert server is not None
         with (tmp_path / "log").open("wb") as log:
-            plant = server.fork(["plant", "--leash", "plant"], log, speaks=True)
+            plant = server.fork(["gridpeers.plant", "--leash", "plant"], log, speaks=True)
         libraries = Path(f"/proc/{plant.pid}/maps").read_text()
         plant.stdin.close()
         assert plant.wait() == IN_ORDER + BAD_CONFIG  # no configuration
@@ -149,9 +149,9 @@ def test_a_forked_plant_has_loaded_its_step_and_no_thread(tmp_path: Path) -> Non
 def test_servers_go_with_a_process_that_is_killed(tmp_path: Path) -> None:
     """Nobody can end them then: they leave because nobody can ask them any more."""
     code = """
-from scenarios.drivers.warm_servers import agent_server
+from gridpeers.scenarios.drivers.warm_servers import agent_server
 with open("log", "wb") as log:
-    agent_server().fork(["agents"], log, speaks=False)  # so the server has imported, and serves
+    agent_server().fork(["gridpeers.agents"], log, speaks=False)  # so the server has imported, and serves
     print(agent_server()._server.pid, flush=True)
     input()
 """

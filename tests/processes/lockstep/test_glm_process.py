@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.gridlabd.read_glm import read_glm
-from plant.tables.read import FeederError
+from gridpeers.plant.imports.gridlabd.read_glm import read_glm
+from gridpeers.plant.tables.read import FeederError
 from tests.unit.plant.imports.gridlabd.glm_models import HEAD
 
 WAITING = """import os, signal, sys
@@ -22,7 +22,7 @@ signal.pause()
 """
 """A package gridlabd that tells its process and folder, and then loads for ever."""
 
-READ = "import sys; from plant.imports.gridlabd.read_glm import read_glm; read_glm(sys.argv[1])"
+READ = "import sys; from gridpeers.plant.imports.gridlabd.read_glm import read_glm; read_glm(sys.argv[1])"
 
 
 @pytest.fixture

@@ -15,16 +15,16 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from plant.gridlabd.process.delta_mode_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
-from plant.plant_config import PlantConfig, Protection
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.gridlabd.process.delta_mode_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
+from gridpeers.plant.plant_config import PlantConfig, Protection
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import Telemetry
 from tests.command_line import invoke
 from tests.toy.toy_runs import ProcessRun
-from wire.messages import Telemetry
 
 pytestmark = pytest.mark.skipif(find_spec("gridlabd") is None, reason="the extra gridlabd is not installed")
 

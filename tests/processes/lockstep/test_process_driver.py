@@ -18,21 +18,21 @@ from typing import Any
 import msgspec
 import pytest
 
-from agents.agent_config import Control, LawChoice
-from scenarios.drivers import process_driver
-from scenarios.drivers.free_endpoint import ListenError, free_endpoint
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.process_driver import run_processes
-from scenarios.drivers.telemetry_client import TelemetryClient
-from scenarios.results.law_failures import law_failures
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.scenarios.drivers import process_driver
+from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
+from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.wire.codec import decode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Waiting
 from tests.toy import toy_plant
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.toy.toy_runs import ProcessRun, Rows, first_difference
-from wire.codec import decode
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.messages import Waiting
 
 LONG = 2000.0
 """An end (s) that no test waits for."""
@@ -215,7 +215,7 @@ def test_a_second_agent_of_a_name_is_refused_by_name(tmp_path: Path) -> None:
 
     def start_namesake() -> None:
         config = msgspec.structs.replace(agent_config("inv2"), connect=(endpoint,))
-        namesake = [sys.executable, "-P", "-m", "agents"]
+        namesake = [sys.executable, "-P", "-m", "gridpeers.agents"]
         refused.append(subprocess.run(namesake, input=msgspec.json.encode(config), capture_output=True, timeout=60))
 
     run.at(0.2, start_namesake)
@@ -244,7 +244,7 @@ def test_a_port_in_use_is_told_before_anything_starts(tmp_path: Path) -> None:
 PARENT = """
 import json, sys
 from pathlib import Path
-from scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.drivers.process_driver import run_processes
 from tests.toy.toy_configs import toy_configs
 plant, agents = toy_configs(3, end=2000.0)
 def told(children):
@@ -262,7 +262,7 @@ RECORDER = """
 import hashlib, sys
 from pathlib import Path
 import msgspec
-from scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.drivers.process_driver import run_processes
 from tests.toy.toy_configs import toy_configs
 plant, agents = toy_configs(12, end=60.0)
 rows = []
@@ -350,7 +350,7 @@ def test_the_end_of_the_parent_is_the_end_of_all(number: signal.Signals, tmp_pat
     assert left == {}
 
 
-@pytest.mark.parametrize("module", ["agents", "plant"])
+@pytest.mark.parametrize("module", ["gridpeers.agents", "gridpeers.plant"])
 def test_a_bad_configuration_is_refused(module: str) -> None:
     """Status 2 and what is wrong where, as msgspec says it."""
     done = subprocess.run(
@@ -365,7 +365,7 @@ def test_an_agent_alone_gives_up() -> None:
     """Without a rendezvous it says after its deadline what it waited for and where."""
     config = msgspec.structs.replace(agent_config("inv1", deadline=0.2), connect=("tcp/127.0.0.1:9",))
     done = subprocess.run(
-        [sys.executable, "-P", "-m", "agents"],
+        [sys.executable, "-P", "-m", "gridpeers.agents"],
         input=msgspec.json.encode(config),
         capture_output=True,
         timeout=60,
@@ -380,7 +380,8 @@ def test_an_agent_alone_gives_up() -> None:
 def test_an_agent_imports_nothing_heavy() -> None:
     """Nine agents start in the time of one: neither numpy nor numba are in them."""
     heavy = ("numpy", "scipy", "numba", "matplotlib", "asyncio")
-    code = f"import sys, agents.agent_process, wire.driver.process; print([m for m in {heavy} if m in sys.modules])"
+    code = "import sys, gridpeers.agents.agent_process, gridpeers.wire.driver.process"
+    code += f"; print([m for m in {heavy} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-P", "-c", code], capture_output=True, text=True, check=True)
 
     assert done.stdout == "[]\n"

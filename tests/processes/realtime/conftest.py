@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 CALM = """

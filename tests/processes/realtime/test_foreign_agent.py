@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.results.sharing_index import sharing_index
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.results.sharing_index import sharing_index
+from gridpeers.scenarios.schema import load_scenario
 from tests.toy.mixed import Mixed
 
-REAL = ("-m", "scenarios.emulation.emulated_plant")
+REAL = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 
 ISLANDED = 1.0
 """Time (s) of the scenario's first event."""

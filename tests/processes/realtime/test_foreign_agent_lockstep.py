@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import Control
-from plant.plant_config import SwitchEvent
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.agents.agent_config import Control
+from gridpeers.plant.plant_config import SwitchEvent
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 from tests.toy.mixed import PROGRAM, Mixed
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -31,7 +31,7 @@ def test_a_foreign_leader_and_follower_give_the_same_history(tmp_path: Path) -> 
     expected: Rows = []
     run_inprocess(plant, agents, lambda telemetry: expected.extend(telemetry.rows))
     run = Mixed(plant, agents, tmp_path, foreign=("inv1", "inv2"))
-    outcome = run(plant_command=("-m", "plant"))
+    outcome = run(plant_command=("-m", "gridpeers.plant"))
 
     assert outcome.broke == ""
     assert outcome.reproducible

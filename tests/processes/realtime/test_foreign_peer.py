@@ -7,10 +7,8 @@ import random
 from itertools import cycle, islice, pairwise
 from pathlib import Path
 
-from tests.hostile.cases import Truth, hostile
-from tests.toy.town import Town
-from wire.driver.session import Session
-from wire.messages import (
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.messages import (
     AgentStatus,
     Command,
     Leave,
@@ -23,6 +21,8 @@ from wire.messages import (
     Stop,
     Waiting,
 )
+from tests.hostile.cases import Truth, hostile
+from tests.toy.town import Town
 
 THREE = ("inv1", "inv2", "inv3")
 

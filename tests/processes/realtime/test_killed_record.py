@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.processes.commands.test_run_command import command
 from tests.processes.terminals import LIMITED
 from tests.record.full_disk import has_namespaces, kinds

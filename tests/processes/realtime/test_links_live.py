@@ -11,17 +11,17 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from netem.fault_schedule import Heal, replayed
-from netem.ledger import LinkTrace, Outcome
-from netem.models.delay import Normal
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.partition import Partition
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.results.link_record import LinkRecord
-from scenarios.schema import load_scenario
+from gridpeers.netem.fault_schedule import Heal, replayed
+from gridpeers.netem.ledger import LinkTrace, Outcome
+from gridpeers.netem.models.delay import Normal
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.schema import load_scenario
 from tests.processes.terminals import Desk
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs

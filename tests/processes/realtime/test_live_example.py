@@ -6,7 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 
 SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"
 

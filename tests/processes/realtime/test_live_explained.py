@@ -10,24 +10,24 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.explanation.explanation import explained
-from scenarios.explanation.law_step import law_step
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import RecordedDecision
-from scenarios.trace.flows import flows
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.explanation.explanation import explained
+from gridpeers.scenarios.explanation.law_step import law_step
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.scenarios.trace.flows import flows
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.journal import RejectedCount
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Ready, State, Telemetry
 from tests.hostile.cases import sealed
 from tests.processes.realtime.test_live_record import recorded
 from tests.toy.toy_configs import toy_configs
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import decode, encode
-from wire.driver.session import Session
-from wire.journal import RejectedCount
-from wire.keys import Keys
-from wire.messages import Ready, State, Telemetry
 
 
 def uses(decision: RecordedDecision, neighbour: str) -> bool:

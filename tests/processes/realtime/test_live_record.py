@@ -9,22 +9,22 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig
-from netem.models.delay import Normal
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.partition import Partition
-from plant.plant_config import PlantConfig
-from scenarios.drivers.process_driver import run_processes
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.recomputation import recomputed
-from scenarios.record.record_info import RecordInfo
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import Recorder
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.netem.models.delay import Normal
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.recomputation import recomputed
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.wire.journal import ProcessEvent, Token, WakeUp
+from gridpeers.wire.messages import Telemetry
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import TOY
-from wire.journal import ProcessEvent, Token, WakeUp
-from wire.messages import Telemetry
 
 
 def recorded(

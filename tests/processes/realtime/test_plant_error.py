@@ -9,15 +9,15 @@ from typing import Literal
 import pytest
 from msgspec.structs import replace
 
-from plant.plant_config import PlantConfig
-from plant.plant_process import run_plant
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_process import run_plant
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Command, Stop
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.codec import decode, encode
-from wire.driver.session import Session
-from wire.keys import Keys
-from wire.messages import Command, Stop
 
 HAS_ALL = Command(sender="visitor", epoch=1, seq=1, t=0.0, verb="telemetry", argument="99", reply_to="visitor")
 

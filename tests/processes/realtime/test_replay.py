@@ -13,12 +13,12 @@ from msgspec.structs import replace as replaced
 
 import gridpeers as gp
 from gridpeers.runs.result import Result
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.replay import replay
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.replay import replay
+from gridpeers.wire.journal import ProcessEvent
 from tests.command_line import invoke
 from tests.processes.terminals import Desk
 from tests.record.killed_commands import killed
-from wire.journal import ProcessEvent
 
 ISLANDING = {"label": "islanding", "t_s": 0.5, "open": ["13-152"]}
 ALL = {"secondary": "all", "graph": "full"}

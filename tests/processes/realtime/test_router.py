@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 CALM = '[time]\nend_s = 10.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n'

@@ -8,9 +8,9 @@ from time import monotonic
 
 import pytest
 
-from scenarios.drivers.free_endpoint import free_endpoint
-from wire.driver.lingering import tcp_sockets
-from wire.driver.session import Session, SessionError
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.wire.driver.lingering import tcp_sockets
+from gridpeers.wire.driver.session import Session, SessionError
 
 
 def test_a_port_in_use_is_explained() -> None:
@@ -67,7 +67,7 @@ HOLDER = """
 import signal
 import subprocess
 import sys
-from wire.driver.session import Session
+from gridpeers.wire.driver.session import Session
 session = Session("b", connect=(sys.argv[1],), gossip=False, clock="wall")
 session.subscribe("gridpeers/t/telemetry")
 session.hold_token("gridpeers/t/alive/b")
@@ -80,7 +80,7 @@ def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_o
     """A message that may not be dropped waits so long for a full link; then the link is closed.
 
     Zenoh makes it anew within 10 s, or much later on a busy machine: a node therefore renews a session that brings
-    nothing (`wire.timing.session_deadline`), which this bare one does not.
+    nothing (`gridpeers.wire.timing.session_deadline`), which this bare one does not.
     """
     endpoint = free_endpoint()
     sender = Session("a", listen=(endpoint,), clock="wall", rendezvous=True)
@@ -119,7 +119,7 @@ def test_only_in_wall_clock_time_a_link_may_be_given_up_early_and_newest_values_
 
 CROWD = """
 import sys
-from wire.driver.session import Session
+from gridpeers.wire.driver.session import Session
 plant = Session("plant", listen=(sys.argv[1],), clock="wall", rendezvous=True)
 others = [Session(name, listen=("tcp/127.0.0.1:0",), connect=(sys.argv[1],), clock="wall") for name in "abcd"]
 print("ready", flush=True)
@@ -177,7 +177,7 @@ def test_a_session_that_another_thread_opens_waits_until_left_links_are_ended(mo
         other.start()
         in_time.append(opened.wait(0.5))
 
-    monkeypatch.setattr("wire.driver.session.end_left_links", clearing)
+    monkeypatch.setattr("gridpeers.wire.driver.session.end_left_links", clearing)
     Session("a", listen=(free_endpoint(),)).close(replaced=True)
     other.join()
     for session in sessions:

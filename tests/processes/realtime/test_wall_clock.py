@@ -13,7 +13,7 @@ from time import monotonic
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import MAX_AGE
+from gridpeers.agents.agent_config import MAX_AGE
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun
@@ -118,7 +118,7 @@ def test_agents_of_one_process_live_and_leave_as_others_do(tmp_path: Path) -> No
     """Two agents behind one session tick, are asked to leave one by one, and leave together on SIGTERM."""
     with Town(4, tmp_path) as town:
         town.start("plant", "inv1", "inv4")
-        pair = town.add("pair", ["-m", "agents"], (town.agent_configs["inv2"], town.agent_configs["inv3"]))
+        pair = town.add("pair", ["-m", "gridpeers.agents"], (town.agent_configs["inv2"], town.agent_configs["inv3"]))
         town.together(FOUR)
         settled(town)
         town.command("stop", "inv2")
@@ -195,7 +195,7 @@ def test_a_second_agent_of_one_name_is_refused(tmp_path: Path) -> None:
     with Town(3, tmp_path).all() as town:
         first = town.children["inv2"]
         life = town.status["inv2"].epoch
-        second = town.add("second", ["-m", "agents"], town.agent_configs["inv2"])
+        second = town.add("second", ["-m", "gridpeers.agents"], town.agent_configs["inv2"])
         status = town.until_ended("second")
         since = town.t
         town.until(lambda: town.t > since + 0.6, "the run goes on")
@@ -247,7 +247,7 @@ def test_an_agent_without_a_plant_ends_after_its_deadline(tmp_path: Path) -> Non
     """One line with the run, the time and the endpoint; exit status 2."""
     with Town(3, tmp_path) as town:
         config = replace(town.agent_configs["inv1"], deadline=0.5)
-        lonely = town.add("inv1", ["-m", "agents"], config)
+        lonely = town.add("inv1", ["-m", "gridpeers.agents"], config)
 
         assert town.until_ended("inv1") == 2
         text = lonely.log.read_text()

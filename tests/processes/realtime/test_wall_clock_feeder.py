@@ -11,14 +11,14 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
-from scenarios.drivers.children import Child
-from scenarios.drivers.free_endpoint import free_endpoint
-from scenarios.drivers.outcome import Outcome
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.schema import load_scenario
 from tests.toy.toy_runs import ProcessRun
 
-REAL = ("-m", "scenarios.emulation.emulated_plant")
+REAL = ("-m", "gridpeers.scenarios.emulation.emulated_plant")
 
 
 class Feeder:
@@ -41,7 +41,9 @@ class Feeder:
         """Start an agent of a name while the run goes on."""
         assert self.run.children is not None
         log = self.folder / f"{name}-again.log"
-        child = Child(name, ["-m", "scenarios.emulation.emulated_agent"], self.agents[name], log, lambda child: None)
+        child = Child(
+            name, ["-m", "gridpeers.scenarios.emulation.emulated_agent"], self.agents[name], log, lambda child: None
+        )
         before = [child for child in self.run.children if child.name == name]
         for former in before:
             former.release()

@@ -12,7 +12,7 @@ from time import monotonic
 
 import pytest
 
-from scenarios.drivers.free_endpoint import free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from tests.processes.terminals import Desk
 
 pty = pytest.importorskip("pty")

@@ -6,14 +6,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control, GraphRule
-from agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control, GraphRule
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.wire.actions import Fetch, Listen, Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
 from tests.toy.toy_configs import agent_config
-from wire.actions import Fetch, Listen, Publish
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
 
 KEYS = Keys("toy")
 

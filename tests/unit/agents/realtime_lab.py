@@ -6,14 +6,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.laws.law import Law
-from agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.wire.actions import Fetch, Listen, Log, Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import AgentStatus, Measurement, Message, State
 from tests.toy.toy_configs import agent_config
-from wire.actions import Fetch, Listen, Log, Publish
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import AgentStatus, Measurement, Message, State
 
 KEYS = Keys("toy")
 T_C = 0.02

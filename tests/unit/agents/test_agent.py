@@ -6,12 +6,12 @@ from typing import Any, Literal
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control, DegradedCommunication
-from agents.laws.consensus import P_set_step, V_set_step
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control, DegradedCommunication
+from gridpeers.agents.laws.consensus import P_set_step, V_set_step
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.wire.messages import OFF, Measurement, Nameplate, State
 from tests.toy.toy_configs import ALL_FULL, agent_config
-from wire.messages import OFF, Measurement, Nameplate, State
 
 ROSTER = ("inv1", "inv2", "inv3")
 

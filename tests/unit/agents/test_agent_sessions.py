@@ -12,19 +12,19 @@ from typing import Any, cast
 import pytest
 from msgspec.structs import replace
 
-from agents import agent_sessions
-from agents.agent_process import run_agents
-from agents.agent_sessions import _opened, take_part
-from agents.realtime.realtime_agent import RealtimeAgent
-from agents.realtime.session_health import SessionHealth
+from gridpeers.agents import agent_sessions
+from gridpeers.agents.agent_process import run_agents
+from gridpeers.agents.agent_sessions import _opened, take_part
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime.session_health import SessionHealth
+from gridpeers.wire.codec import encode
+from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.session import Session, SessionError
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Measurement, Stop
+from gridpeers.wire.token_queue import Stamped
 from tests.toy.toy_configs import agent_config
-from wire.codec import encode
-from wire.driver.drive import StoppedError, StoppedOnLeashError
-from wire.driver.inbox import Inbox
-from wire.driver.session import Session, SessionError
-from wire.keys import Keys
-from wire.messages import Measurement, Stop
-from wire.token_queue import Stamped
 
 KEYS = Keys("toy")
 PLANT_TOKEN = KEYS.alive_plant(1)

@@ -8,10 +8,10 @@ from typing import Any, cast
 
 import pytest
 
-from agents.agent import Agent
-from agents.decision_journal import DecisionJournal
-from scenarios.record.journal_reader import entries_of
-from wire.journal import Decision, JournalBuffer
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.decision_journal import DecisionJournal
+from gridpeers.scenarios.record.journal_reader import entries_of
+from gridpeers.wire.journal import Decision, JournalBuffer
 
 NEIGHBOURS = ("inv2", "inv3", "inv4", "inv5")
 

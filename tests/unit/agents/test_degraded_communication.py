@@ -10,17 +10,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control, DegradedCommunication, Gains
-from agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
-from agents.island_detector import IslandDetector
-from agents.realtime.realtime_agent import RealtimeAgent
-from scenarios.schema import load_scenario
-from scenarios.sweep.sweep_case import run_one
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
+from gridpeers.agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
+from gridpeers.agents.island_detector import IslandDetector
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.sweep.sweep_case import run_one
+from gridpeers.wire.actions import Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.messages import Measurement, State
 from tests.toy.toy_configs import agent_config
-from wire.actions import Publish
-from wire.codec import decode, encode
-from wire.messages import Measurement, State
 
 T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0
 KAPPA, K_Q = M_P / Gains().k_p, Gains().k_q

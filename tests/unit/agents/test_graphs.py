@@ -5,14 +5,14 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control
-from agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
-from agents.topology import adjacency, in_neighbours, is_pairwise
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control
+from gridpeers.agents.graphs import GRAPHS, GraphError, make_graph, neighbours_by
+from gridpeers.agents.topology import adjacency, in_neighbours, is_pairwise
+from gridpeers.wire.messages import Measurement
+from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems
+from gridpeers.wire.plugins.registry import PluginError
 from tests.toy.toy_configs import agent_config
-from wire.messages import Measurement
-from wire.plugins.plugin import Plugin, plugin_of, plugin_problems
-from wire.plugins.registry import PluginError
 
 MODULE = '''
 from typing import Annotated

@@ -7,16 +7,16 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control
-from agents.graphs import RosterGraph
-from agents.known_agents import KnownAgents
-from agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control
+from gridpeers.agents.graphs import RosterGraph
+from gridpeers.agents.known_agents import KnownAgents
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.wire.actions import Fetch
+from gridpeers.wire.codec import encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Prepare
 from tests.toy.toy_configs import agent_config
-from wire.actions import Fetch
-from wire.codec import encode
-from wire.keys import Keys
-from wire.messages import Prepare
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 KEYS = Keys("toy")

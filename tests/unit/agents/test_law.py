@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from agents.agent_config import DegradedCommunication, Gains
-from agents.degraded_communication import gains_in_force
-from agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
-from wire.schema.table_schema import fields_of
+from gridpeers.agents.agent_config import DegradedCommunication, Gains
+from gridpeers.agents.degraded_communication import gains_in_force
+from gridpeers.agents.laws.consensus import Consensus, P_set_step, V_set_step, alpha_in_force, towards
+from gridpeers.wire.schema.table_schema import fields_of
 
 Matrix = NDArray[np.float64]
 

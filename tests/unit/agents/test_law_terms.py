@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.carriers.law_registry import LAWS
-from agents.carriers.time_limit import TimeLimited
-from agents.laws.call import decide
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.agents.carriers.law_registry import LAWS
+from gridpeers.agents.carriers.time_limit import TimeLimited
+from gridpeers.agents.laws.call import decide
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
 
 NAMES = ("consensus", "dapi", "event-triggered", "finite-time", "centralised", "resilient")
 

@@ -10,11 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from agents.agent_config import Control, GraphRule
+from gridpeers.agents.agent import Agent
+from gridpeers.agents.agent_config import Control, GraphRule
+from gridpeers.wire.messages import State, Waiting
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.lockstep_lab import KEYS, Lab, nameplate, ticking
-from wire.messages import State, Waiting
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")
 

@@ -5,11 +5,11 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.wire.messages import Leave, Stop
+from gridpeers.wire.plant_follower import MOST_PLANTS
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
-from wire.messages import Leave, Stop
-from wire.plant_follower import MOST_PLANTS
 
 
 def test_it_waits_visibly_for_a_plant_and_joins_when_it_measures() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
+from gridpeers.wire.messages import State
 from tests.unit.agents.realtime_lab import KEYS, T_C, running
-from wire.messages import State
 
 
 class Quiet(Law):

@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from agents.realtime.realtime_agent import FOUND_AGAIN
+from gridpeers.agents.realtime.realtime_agent import FOUND_AGAIN
+from gridpeers.wire.messages import Leave, State, Stop, Waiting
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
-from wire.messages import Leave, State, Stop, Waiting
 
 
 def test_an_agent_whose_plant_is_there_but_mute_begins_again_with_a_new_session() -> None:

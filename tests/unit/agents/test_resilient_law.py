@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.laws.consensus import Consensus
-from agents.laws.law import Neighbour, Own
-from agents.laws.resilient import Resilient
-from scenarios.predict.robustness import robustness
+from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.agents.laws.law import Neighbour, Own
+from gridpeers.agents.laws.resilient import Resilient
+from gridpeers.scenarios.predict.robustness import robustness
 
 T = 0.02
 

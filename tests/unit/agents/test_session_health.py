@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from agents.realtime.session_health import STAGGER, SessionHealth
-from wire.timing.session_deadline import PATIENCE
+from gridpeers.agents.realtime.session_health import STAGGER, SessionHealth
+from gridpeers.wire.timing.session_deadline import PATIENCE
 
 NAMES = tuple(f"inv{i}" for i in range(1, 10))
 

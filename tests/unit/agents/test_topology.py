@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agents.agent_config import Control, GraphRule
-from agents.topology import adjacency, in_neighbours, is_pairwise, laplacian, link_problems, natural_order
+from gridpeers.agents.agent_config import Control, GraphRule
+from gridpeers.agents.topology import adjacency, in_neighbours, is_pairwise, laplacian, link_problems, natural_order
 
 PAPER = {
     f"inv{i}": SimpleNamespace(kind="GFM" if i in (1, 4, 7) else "GFL", microgrid=f"mg{(i + 2) // 3}")

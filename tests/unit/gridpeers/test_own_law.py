@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from agents.carriers.law_registry import LAWS
-from scenarios.schema.plugin_keys import law_of
+from gridpeers.agents.carriers.law_registry import LAWS
+from gridpeers.scenarios.schema.plugin_keys import law_of
 
 MINE = '''
 from typing import Annotated

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.catalogue_files import CATALOGUE
 from tests.command_line import invoke
 
 PAGE = (Path(__file__).parents[3] / "docs" / "plugins.md").read_text(encoding="utf-8")

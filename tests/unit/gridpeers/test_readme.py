@@ -13,8 +13,8 @@ import pytest
 import typer
 
 from gridpeers.cli.root import app
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 
 README = Path(__file__).parents[3] / "README.md"

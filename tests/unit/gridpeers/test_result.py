@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 
 import gridpeers as gp
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.record import Recorder
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema.configs import configs
 from tests.command_line import invoke
 
 

@@ -14,7 +14,7 @@ import gridpeers as gp
 from gridpeers.cli.commands.run_command import run as command
 from gridpeers.runs.choices import Pace
 from gridpeers.runs.running import How
-from scenarios.run_request import Request
+from gridpeers.scenarios.run_request import Request
 
 TABLES = {
     "name": "mine",

@@ -12,23 +12,23 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lab.link_laws import LinkLaws, LinkTest, blocks_of, improbable, law, link_tests
-from netem.draws import RESTART
-from netem.fault_schedule import Heal
-from netem.ledger import LinkTrace
-from netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
-from netem.models.loss import GilbertElliott, Markov
-from netem.models.medium import Cut, Flap
-from netem.receiver import Receiver
-from netem.schema.fault import PROFILES, Fault
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link
-from scenarios.checks.check_registry import CHECKS
-from scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.lab.link_laws import LinkLaws, LinkTest, blocks_of, improbable, law, link_tests
+from gridpeers.netem.draws import RESTART
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
+from gridpeers.netem.models.loss import GilbertElliott, Markov
+from gridpeers.netem.models.medium import Cut, Flap
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.fault import PROFILES, Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.scenarios.checks.check_registry import CHECKS
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.wire.plugins.plugin import Plugin
 from tests.record.recorded_runs import recorded_run
 from tests.unit.netem.link_messages import MICROGRIDS, T_C
 from tests.unit.netem.test_loss import PATTERNS, probability
-from wire.plugins.plugin import Plugin
 
 LINK = Link("inv1", "inv2")
 LEVEL = 0.001

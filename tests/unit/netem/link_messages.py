@@ -7,11 +7,11 @@ from typing import Any
 
 from hypothesis import settings
 
-from netem.channel import Channel, Fate
-from netem.receiver import Receiver
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link
+from gridpeers.netem.channel import Channel, Fate
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link
 
 MICROGRIDS = {f"inv{i}": f"MG{(i + 2) // 3}" for i in range(1, 10)}
 """The nine inverters of the paper, three to a microgrid."""

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
+from gridpeers.netem.models.delay import Constant, Lognormal, Normal, Pareto, Trace, Uniform
 from tests.unit.netem.link_messages import T_C, channel, delays, fates, steady
 
 N = 4000

@@ -9,13 +9,13 @@ from typing import get_args
 
 import msgspec
 
-from netem.models.delay import AnyDelay
-from netem.models.lie import AnyLie
-from netem.models.loss import AnyLoss
-from netem.schema.fault import KINDS, PROFILES
-from netem.schema.netem import Netem
+from gridpeers.netem.models.delay import AnyDelay
+from gridpeers.netem.models.lie import AnyLie
+from gridpeers.netem.models.loss import AnyLoss
+from gridpeers.netem.schema.fault import KINDS, PROFILES
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.wire.schema.table_reading import read_table
 from tests.unit.netem.link_messages import MICROGRIDS
-from wire.schema.table_reading import read_table
 
 TEXT = (Path(__file__).parents[3] / "docs" / "netem.md").read_text(encoding="utf-8")
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.draws import RESTART, Chain, Stream
+from gridpeers.netem.draws import RESTART, Chain, Stream
 from tests.unit.netem.link_messages import steady
 
 N = 20_000

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from netem.channel import Channel
-from netem.fault_schedule import FaultSchedule
-from netem.models.delay import Constant
-from netem.models.medium import Cut, Duplicate, Flap, Rate, Slots
-from netem.schema.fault import Span
-from netem.schema.pattern import Link
+from gridpeers.netem.channel import Channel
+from gridpeers.netem.fault_schedule import FaultSchedule
+from gridpeers.netem.models.delay import Constant
+from gridpeers.netem.models.medium import Cut, Duplicate, Flap, Rate, Slots
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.pattern import Link
 from tests.unit.netem.link_messages import T_C, channel, fates, steady
 
 time = st.integers(0, 200).map(lambda k: k / 10)

@@ -6,11 +6,11 @@ from math import inf
 
 import pytest
 
-from netem.liar import HeardFrom, LieTime, LiveHearing, lies_about
-from netem.models.lie import Extreme, Freeze, Lie, Offset, Random, Replay, Scale
-from netem.schema.netem import Netem, NodeFault
-from wire.codec import decode, encode
-from wire.messages import State
+from gridpeers.netem.liar import HeardFrom, LieTime, LiveHearing, lies_about
+from gridpeers.netem.models.lie import Extreme, Freeze, Lie, Offset, Random, Replay, Scale
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.messages import State
 
 LIES: tuple[Lie, ...] = (
     Offset(P_set_W=5e4, Q_var=-1e9, V_set_V=-1e6),

@@ -12,9 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from netem.draws import RESTART, Stream
-from netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
-from netem.models.medium import Corrupt, Duplicate, flip
+from gridpeers.netem.draws import RESTART, Stream
+from gridpeers.netem.models.loss import Bernoulli, GilbertElliott, LossModel, Markov
+from gridpeers.netem.models.medium import Corrupt, Duplicate, flip
 from tests.unit.netem.link_messages import channel, fates, steady
 
 N = 20_000

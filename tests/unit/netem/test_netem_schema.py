@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netem.fault_schedule import Change, Heal, replayed, schedule_of
-from netem.models.delay import Constant, Lognormal, Normal
-from netem.models.loss import Bernoulli, GilbertElliott
-from netem.models.medium import Cut
-from netem.schema.fault import PROFILES, Fault
-from netem.schema.netem import Netem
-from netem.schema.partition import Partition
-from netem.schema.pattern import Link, links_among
+from gridpeers.netem.fault_schedule import Change, Heal, replayed, schedule_of
+from gridpeers.netem.models.delay import Constant, Lognormal, Normal
+from gridpeers.netem.models.loss import Bernoulli, GilbertElliott
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import PROFILES, Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.netem.schema.pattern import Link, links_among
+from gridpeers.wire.schema.table_reading import read_table
 from tests.unit.netem.link_messages import MICROGRIDS, steady
-from wire.schema.table_reading import read_table
 
 NAMES = list(MICROGRIDS)
 

@@ -7,18 +7,18 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from netem.channel import Channel
-from netem.fault_schedule import replayed
-from netem.models.own_fault import FAULTS, LinkFault
-from netem.receiver import Receiver
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.pattern import Link
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import LinkCommand
-from wire.plugins.plugin import Plugin, plugin_problems
-from wire.plugins.registry import PluginError
-from wire.schema.table_reading import read_table
+from gridpeers.netem.channel import Channel
+from gridpeers.netem.fault_schedule import replayed
+from gridpeers.netem.models.own_fault import FAULTS, LinkFault
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
+from gridpeers.wire.plugins.registry import PluginError
+from gridpeers.wire.schema.table_reading import read_table
 
 MODULE = '''
 from typing import Annotated

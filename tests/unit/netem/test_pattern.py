@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from netem.schema.pattern import Link, links_among, objections, parse
+from gridpeers.netem.schema.pattern import Link, links_among, objections, parse
 from tests.unit.netem.link_messages import MICROGRIDS, steady
 
 NAMES = list(MICROGRIDS)

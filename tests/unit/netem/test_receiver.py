@@ -11,17 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from netem.fault_schedule import MOST_SPANS, Heal
-from netem.ledger import LinkTrace
-from netem.models.delay import Lognormal, Uniform
-from netem.models.loss import GilbertElliott
-from netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
-from netem.receiver import Receiver
-from netem.schema.fault import Fault, Span
-from netem.schema.netem import Netem
-from netem.schema.partition import Partition
+from gridpeers.netem.fault_schedule import MOST_SPANS, Heal
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.netem.models.delay import Lognormal, Uniform
+from gridpeers.netem.models.loss import GilbertElliott
+from gridpeers.netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.fault import Fault, Span
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.wire.links import Arrival
 from tests.unit.netem.link_messages import MICROGRIDS, T_C, receiver, steady
-from wire.links import Arrival
 
 PAYLOAD = bytes(range(120))
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from netem.models.delay import Trace
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.trace_file import with_traces
+from gridpeers.netem.models.delay import Trace
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.trace_file import with_traces
 from tests.unit.netem.link_messages import MICROGRIDS
 
 NAMES = list(MICROGRIDS)

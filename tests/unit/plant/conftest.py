@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from plant.network import Network
-from plant.tables import read_feeder
+from gridpeers.plant.network import Network
+from gridpeers.plant.tables import read_feeder
 
 
 @pytest.fixture(scope="session")

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from plant.equipment import Bus, Feeder
-from plant.network import Network
+from gridpeers.plant.equipment import Bus, Feeder
+from gridpeers.plant.network import Network
 
 PAPER_ISLANDS = ("13-152", "sw1_2", "sw2_3")
 """Switches whose opening leaves three microgrids."""

@@ -7,16 +7,14 @@ from typing import Any, Literal
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from plant import unacknowledged_telemetry
-from plant.lockstep_plant import AGAIN, LockstepPlant
-from plant.plant_config import ScheduledAction
-from tests.toy.toy_configs import agent_config, toy_configs
-from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Publish
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import (
+from gridpeers.agents.agent import Agent
+from gridpeers.plant import unacknowledged_telemetry
+from gridpeers.plant.lockstep_plant import AGAIN, LockstepPlant
+from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.wire.actions import Fetch, Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import (
     Answer,
     Command,
     Measurement,
@@ -29,6 +27,8 @@ from wire.messages import (
     Telemetry,
     Waiting,
 )
+from tests.toy.toy_configs import agent_config, toy_configs
+from tests.toy.toy_plant import ToyPlant
 
 KEYS = Keys("toy")
 NAMES = ("inv1", "inv2", "inv3", "inv4")

@@ -5,11 +5,11 @@ from typing import Any
 
 import pytest
 
-from plant.telemetry_reporter import Reporter, measurement_of
+from gridpeers.plant.telemetry_reporter import Reporter, measurement_of
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.messages import Measurement, PlantEvent
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import Reading, ToyPlant
-from wire.codec import RejectedError, decode, encode
-from wire.messages import Measurement, PlantEvent
 
 CALM = Reading(5e4, 1e3, 277.0, 60.0, 5e4, 277.0, False, "inv1")
 

@@ -9,7 +9,7 @@ import pytest
 from rich.table import Table
 
 from gridpeers.cli.progress import progress
-from scenarios.console import terminal, text_of
+from gridpeers.scenarios.console import terminal, text_of
 
 ROOT = Path(__file__).parents[3]
 USERS = "law boom:Boom: [red]of[/red] [bus 7] C:\\feeders\\[a]"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.record import Recorder
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 Shown = tuple[np.ndarray[tuple[int, ...], np.dtype[np.float64]], dict[str, float], list[str]]
 

@@ -8,17 +8,17 @@ from typing import get_args
 import msgspec
 import pytest
 
-from agents.agent_config import DegradedCommunication, Gains
+from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.cli.commands.show import Topic
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.partition import Partition
-from plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
-from scenarios.field_docs import field_docs
-from scenarios.reference import TOPICS, page
-from scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
-from wire import keys, messages
-from wire.schema.table_schema import fields_of
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
+from gridpeers.scenarios.field_docs import field_docs
+from gridpeers.scenarios.reference import TOPICS, page
+from gridpeers.scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
+from gridpeers.wire import keys, messages
+from gridpeers.wire.schema.table_schema import fields_of
 
 DOCS = Path(__file__).parents[3] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (

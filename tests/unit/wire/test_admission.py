@@ -2,9 +2,9 @@ from __future__ import annotations
 
 import pytest
 
-from wire.admission import PERSISTENT, Admission
-from wire.codec import RejectedError
-from wire.messages import State
+from gridpeers.wire.admission import PERSISTENT, Admission
+from gridpeers.wire.codec import RejectedError
+from gridpeers.wire.messages import State
 
 
 def state(seq: int, epoch: int = 5, name: str = "inv2") -> State:

@@ -6,12 +6,12 @@ import threading
 
 import pytest
 
+from gridpeers.wire.backlog import BYTES, MOST_OF_ONE, ROOM, SMALL, Backlog, Loss, is_marked
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import KINDS, decode, encode
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.messages import MESSAGES, Message, State
 from tests.hostile.cases import packed, sound
-from wire.backlog import BYTES, MOST_OF_ONE, ROOM, SMALL, Backlog, Loss, is_marked
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import KINDS, decode, encode
-from wire.driver.inbox import Inbox
-from wire.messages import MESSAGES, Message, State
 
 LONG = bytes(LONGEST_MESSAGE)
 

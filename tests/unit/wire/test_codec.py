@@ -11,10 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import inspect
 
-from tests.hostile.cases import cases, packed, plain, sealed, sound
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import KINDS, RejectedError, RejectedMessages, decode, encode
-from wire.messages import (
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import KINDS, RejectedError, RejectedMessages, decode, encode
+from gridpeers.wire.messages import (
     MESSAGES,
     AgentStatus,
     AnyMessage,
@@ -25,6 +24,7 @@ from wire.messages import (
     State,
     Telemetry,
 )
+from tests.hostile.cases import cases, packed, plain, sealed, sound
 
 STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=3e5, V_set=277.0, Q=-1e4)
 
@@ -223,6 +223,8 @@ def test_telemetry_may_carry_what_is_not_finite() -> None:
 
 def test_a_process_that_decodes_ends_well() -> None:
     """Msgspec 0.22 corrupts memory over some unions of bounded types, which shows at the end of the process only."""
-    done = subprocess.run([sys.executable, "-c", "import wire.codec, scenarios.emulation.link_reports"], check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", "import gridpeers.wire.codec, gridpeers.scenarios.emulation.link_reports"], check=False
+    )
 
     assert done.returncode == 0

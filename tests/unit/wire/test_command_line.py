@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from wire.driver.command_line import command_line
+from gridpeers.wire.driver.command_line import command_line
 
-TOLD = "import sys\nsys.path.insert(0, {root!r})\nfrom wire.driver.command_line import command_line\n"
+TOLD = "import sys\nsys.path.insert(0, {root!r})\nsys.modules.pop('gridpeers', None)\n"
+TOLD += "from gridpeers.wire.driver.command_line import command_line\n"
 TOLD += "from pathlib import Path\nprint(command_line('run', 'a b'))\n"
 TOLD += (
     "print(command_line('run', within=Path('study')))\nprint(command_line(program='pytest', within=Path('study')))\n"

@@ -8,12 +8,12 @@ from typing import Any, cast
 
 import pytest
 
-import scenarios.drivers.telemetry_client as telemetry_client
-from scenarios.drivers.telemetry_client import TelemetryClient
-from wire.driver.drive import Core, drive
-from wire.driver.inbox import Inbox
-from wire.driver.session import Session
-from wire.token_queue import AT_ONCE, MOST_WAITING
+import gridpeers.scenarios.drivers.telemetry_client as telemetry_client
+from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
+from gridpeers.wire.driver.drive import Core, drive
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.session import Session
+from gridpeers.wire.token_queue import AT_ONCE, MOST_WAITING
 
 EXCESS = 5
 """Strangers' tokens for which there is no room."""

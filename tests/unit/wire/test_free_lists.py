@@ -8,7 +8,7 @@ import sys
 
 CODE = """
 import sys
-from wire.driver.free_lists import PERIOD, FreeLists
+from gridpeers.wire.driver.free_lists import PERIOD, FreeLists
 
 def tuples():
     sys.stderr.flush()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from wire.driver.host_addresses import LinkAddresses, host_addresses, listed_addresses
+from gridpeers.wire.driver.host_addresses import LinkAddresses, host_addresses, listed_addresses
 
 OLD, NEW, OTHER = "10.9.0.2", "10.9.0.77", "10.8.0.1"
 ANY = ("tcp/0.0.0.0:0",)

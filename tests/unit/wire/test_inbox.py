@@ -4,10 +4,10 @@ import threading
 
 import pytest
 
-import wire.driver.inbox
-from wire.backlog import BYTES, MOST_OF_ONE, ROOM
-from wire.bounds import LONGEST_MESSAGE
-from wire.driver.inbox import Inbox
+import gridpeers.wire.driver.inbox
+from gridpeers.wire.backlog import BYTES, MOST_OF_ONE, ROOM
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.driver.inbox import Inbox
 
 LONG = bytes(LONGEST_MESSAGE)
 
@@ -42,7 +42,7 @@ def test_fewer_messages_than_wanted_come_after_the_time() -> None:
 @pytest.mark.timeout(60)
 def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatch: pytest.MonkeyPatch) -> None:
     """None is forgotten, no more come in than there is room for, and the owner is woken though it wants more."""
-    monkeypatch.setattr(wire.driver.inbox, "HELD", 3600.0)
+    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 3600.0)
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: True
     each, senders = 4 * BYTES // LONGEST_MESSAGE // 8, 8
@@ -68,7 +68,7 @@ def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatc
 @pytest.mark.timeout(60)
 def test_senders_of_short_messages_wait_for_room_too(monkeypatch: pytest.MonkeyPatch) -> None:
     """On one key, beyond the room for all, as many wait as of one sender."""
-    monkeypatch.setattr(wire.driver.inbox, "HELD", 3600.0)
+    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 3600.0)
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: True
     count = 3 * ROOM
@@ -89,7 +89,7 @@ def test_senders_of_short_messages_wait_for_room_too(monkeypatch: pytest.MonkeyP
 
 def test_a_message_that_has_waited_too_long_for_room_comes_in(monkeypatch: pytest.MonkeyPatch) -> None:
     """In simulated time none may be lost; once taken out, all of the room is there again."""
-    monkeypatch.setattr(wire.driver.inbox, "HELD", 0.0)
+    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 0.0)
     inbox = Inbox(holds=True)
     inbox.is_known = lambda key, payload: key == "telemetry"
     room = BYTES // LONGEST_MESSAGE

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from scenarios.record.journal_reader import entries_of
-from wire.journal import LOT, ROOM, Entry, Exchange, JournalBuffer, ProcessEvent, SentMessage, Token
+from gridpeers.scenarios.record.journal_reader import entries_of
+from gridpeers.wire.journal import LOT, ROOM, Entry, Exchange, JournalBuffer, ProcessEvent, SentMessage, Token
 
 
 def read(parts: list[bytes]) -> list[Entry]:

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.keys import Keys, check_name, describe, is_token
-from wire.messages import MESSAGES
+from gridpeers.wire.keys import Keys, check_name, describe, is_token
+from gridpeers.wire.messages import MESSAGES
 
 zenoh = pytest.importorskip("zenoh")
 

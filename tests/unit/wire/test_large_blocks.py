@@ -9,7 +9,7 @@ import pytest
 
 _GROWN = """
 import sys
-from wire.driver.large_blocks import LARGE, keep_out_of_the_heap
+from gridpeers.wire.driver.large_blocks import LARGE, keep_out_of_the_heap
 
 def resident():
     with open("/proc/self/status") as file:
@@ -38,7 +38,7 @@ def test_a_large_block_leaves_no_hole() -> None:
 
 
 _FREED = """
-from wire.driver.large_blocks import give_back_freed
+from gridpeers.wire.driver.large_blocks import give_back_freed
 
 def resident():
     with open("/proc/self/status") as file:

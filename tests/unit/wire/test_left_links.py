@@ -10,8 +10,8 @@ from threading import Timer
 
 import pytest
 
-from wire.driver.left_links import QUIET, end_left_links
-from wire.driver.lingering import do_not_linger
+from gridpeers.wire.driver.left_links import QUIET, end_left_links
+from gridpeers.wire.driver.lingering import do_not_linger
 
 ZENOH = struct.pack("ii", 1, 10)
 

@@ -7,7 +7,7 @@ import pytest
 
 SCRIPT = """
 import threading
-from wire.driver.leftover import leave
+from gridpeers.wire.driver.leftover import leave
 threading.Thread(target=threading.Event().wait, name="forgotten", daemon={daemon}).start()
 leave(3, print)
 print("returned")

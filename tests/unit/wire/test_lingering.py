@@ -3,7 +3,7 @@ from __future__ import annotations
 import socket
 import struct
 
-from wire.driver.lingering import do_not_linger
+from gridpeers.wire.driver.lingering import do_not_linger
 
 
 def lingers(connection: socket.socket) -> bool:

@@ -9,13 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from agents.agent import Agent
+from gridpeers.agents.agent import Agent
+from gridpeers.wire.admission import Admission
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.codec import RejectedError
+from gridpeers.wire.membership import ASKED_AT_ONCE, MOST_PROCESSES, Membership
+from gridpeers.wire.messages import Nameplate
 from tests.toy.toy_configs import agent_config
-from wire.admission import Admission
-from wire.bounds import MOST_INVERTERS
-from wire.codec import RejectedError
-from wire.membership import ASKED_AT_ONCE, MOST_PROCESSES, Membership
-from wire.messages import Nameplate
 
 
 def nameplate(name: str = "inv2", epoch: int = 1) -> Nameplate:

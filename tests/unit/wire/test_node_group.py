@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
-from wire.codec import RejectedMessages
-from wire.node_group import NodeGroup
+from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.codec import RejectedMessages
+from gridpeers.wire.node_group import NodeGroup
 
 
 class Node:

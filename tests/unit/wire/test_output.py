@@ -7,7 +7,7 @@ import pytest
 
 SCRIPT = """
 import sys
-from wire.driver.output import speaking
+from gridpeers.wire.driver.output import speaking
 with speaking("gridpeers"):
     print("before")
     try:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from wire.packages import not_importable
+from gridpeers.wire.packages import not_importable
 
 
 def error_of(folder: Path, statement: str) -> ImportError:
@@ -15,7 +15,7 @@ def error_of(folder: Path, statement: str) -> ImportError:
     file = folder / "module_of_ours.py"
     file.write_text(statement)
     with pytest.raises(ImportError) as caught:
-        exec(compile(statement, str(file), "exec"), {"__name__": "plant.module_of_ours"})
+        exec(compile(statement, str(file), "exec"), {"__name__": "gridpeers.plant.module_of_ours"})
     return caught.value
 
 

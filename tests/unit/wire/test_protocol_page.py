@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from agents.agent_config import AgentConfig, Control
-from wire.codec import decode, encode
-from wire.keys import describe
-from wire.messages import (
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import describe
+from gridpeers.wire.messages import (
     Leave,
     LinkAcknowledgement,
     LinkRequest,

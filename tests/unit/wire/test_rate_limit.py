@@ -7,10 +7,10 @@ import re
 
 import pytest
 
+from gridpeers.wire.driver.log_limit import limit_log
+from gridpeers.wire.messages import PlantEvent, Telemetry
+from gridpeers.wire.rate_limit import RateLimit
 from tests.unit.plant.realtime.realtime_lab import running
-from wire.driver.log_limit import limit_log
-from wire.messages import PlantEvent, Telemetry
-from wire.rate_limit import RateLimit
 
 
 def counted(lines: list[str]) -> int:

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from wire.driver.scheduling import schedule_as_batch
+from gridpeers.wire.driver.scheduling import schedule_as_batch
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
 

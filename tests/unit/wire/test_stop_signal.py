@@ -6,8 +6,8 @@ import signal
 
 import pytest
 
-from wire.driver.drive import StoppedError
-from wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, stop_at_signals
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, stop_at_signals
 
 
 def test_what_follows_at_once_is_the_same_request() -> None:

@@ -1,6 +1,6 @@
 import pytest
 
-from wire.text_file import TextFileError, read_table_text, text_of
+from gridpeers.wire.text_file import TextFileError, read_table_text, text_of
 
 ENCODINGS = ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32"]
 

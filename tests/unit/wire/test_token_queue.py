@@ -10,9 +10,9 @@ from unittest.mock import patch
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.backlog import ROOM as ROOM_OF_ALL
-from wire.driver.inbox import Inbox
-from wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TOKENS, TokenEvent, TokenQueue
+from gridpeers.wire.backlog import ROOM as ROOM_OF_ALL
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.token_queue import AT_ONCE, MOST_WAITING, PAUSE, TOKENS, TokenEvent, TokenQueue
 
 ROOM, RATE = 5, 3
 """Strangers' tokens that may wait in the drawn sequences, and those that come in at once."""
@@ -110,7 +110,7 @@ STEP = st.one_of(
 @given(st.lists(STEP, max_size=100))
 def test_nobody_who_is_noted_goes_or_comes_unseen_whatever_strangers_do(steps: list[tuple[str, Any]]) -> None:
     """In any order of tokens and takes: no end is lost, no two change places, what waits is bounded, all is counted."""
-    with patch("wire.token_queue.MOST_WAITING", ROOM), patch("wire.token_queue.AT_ONCE", RATE):
+    with patch("gridpeers.wire.token_queue.MOST_WAITING", ROOM), patch("gridpeers.wire.token_queue.AT_ONCE", RATE):
         process = Process()
         for key in MEMBERS:
             process.flip(key)
@@ -220,7 +220,7 @@ def test_an_owner_that_has_said_nothing_of_whom_it_notes_loses_no_token() -> Non
     inbox = Inbox()
     for i in range(AT_ONCE + 1):
         inbox.put(("appeared", f"a{i}", b""))
-    with patch("wire.token_queue.MOST_WAITING", 1):
+    with patch("gridpeers.wire.token_queue.MOST_WAITING", 1):
         inbox.put(("appeared", "b", b""))
         inbox.put(("vanished", "c", b""))
     kinds = []

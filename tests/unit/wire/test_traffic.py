@@ -6,11 +6,11 @@ from typing import Any
 
 import pytest
 
-from scenarios.record.journal_reader import entries_of
-from wire.backlog import Loss
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import encode
-from wire.journal import (
+from gridpeers.scenarios.record.journal_reader import entries_of
+from gridpeers.wire.backlog import Loss
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import encode
+from gridpeers.wire.journal import (
     AT_ONCE,
     COUNTED_KEYS,
     LOT,
@@ -25,11 +25,18 @@ from wire.journal import (
     Token,
     WakeUp,
 )
-from wire.keys import Keys
-from wire.messages import Leave, Measurement, State
-from wire.node import Node
-from wire.token_queue import TOKENS
-from wire.traffic import REJECTED, REJECTED_INTERVAL, REJECTED_OF_TICK, SHOWN_PAYLOAD, TickTraffic, TimedTraffic
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Leave, Measurement, State
+from gridpeers.wire.node import Node
+from gridpeers.wire.token_queue import TOKENS
+from gridpeers.wire.traffic import (
+    REJECTED,
+    REJECTED_INTERVAL,
+    REJECTED_OF_TICK,
+    SHOWN_PAYLOAD,
+    TickTraffic,
+    TimedTraffic,
+)
 
 KEYS = Keys("toy")
 STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from wire.driver.session import Session, SessionError
-from wire.driver.zenoh_settings import ONE_THREAD, RUNTIME, runtime_objection
+from gridpeers.wire.driver.session import Session, SessionError
+from gridpeers.wire.driver.zenoh_settings import ONE_THREAD, RUNTIME, runtime_objection
 
 
 @pytest.mark.parametrize(

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.checks.check_registry import ALWAYS
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.checks.check_registry import ALWAYS
 from tests.command_line import invoke
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
@@ -285,12 +285,12 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
     elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The reason stands on the screen and in the folder; no history bears its name."""
-    import scenarios.drivers.inprocess
+    import gridpeers.scenarios.drivers.inprocess
 
     def broken(*_: object, **__: object) -> None:
         raise RuntimeError("no such luck")
 
-    monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", broken)
+    monkeypatch.setattr(gridpeers.scenarios.drivers.inprocess, "run_inprocess", broken)
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")
@@ -308,12 +308,12 @@ def test_a_run_that_breaks_is_exit_code_3_and_its_folder_says_so(
 
 def test_an_interrupted_run_is_exit_code_130(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C ends with one line, and the folder tells it."""
-    import scenarios.drivers.inprocess
+    import gridpeers.scenarios.drivers.inprocess
 
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(scenarios.drivers.inprocess, "run_inprocess", interrupted)
+    monkeypatch.setattr(gridpeers.scenarios.drivers.inprocess, "run_inprocess", interrupted)
     (elsewhere / "short.toml").write_text(SHORT)
 
     code, text = invoke("run", "short.toml", "--driver", "inprocess", "--out", "here")

@@ -13,9 +13,9 @@ import pytest
 
 from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.cli.commands import init
-from plant.tables import read_feeder
-from scenarios.checks.check_verdict import CheckVerdict
-from scenarios.proposal import feeder_proposal
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
 from tests.unit.plant.imports.gridlabd.glm_models import HEAD, LOADS
 

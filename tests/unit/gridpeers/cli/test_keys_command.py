@@ -82,7 +82,7 @@ def test_a_certificate_is_renewed_by_its_name_alone(elsewhere: Path) -> None:
 
 def test_show_says_to_the_minute_from_when_to_when_certificates_are_valid(elsewhere: Path) -> None:
     """One may end within hours, or begin later; where the file is not there, the list tells the end."""
-    from wire.trust.site_authority import issue
+    from gridpeers.wire.trust.site_authority import issue
 
     assert invoke("keys", "init", "lab")[0] == 0
     now = datetime.now(UTC)
@@ -132,8 +132,8 @@ def test_show_warns_of_a_key_that_is_not_that_of_the_certificate_beside_it(elsew
 
 def test_a_list_with_the_day_alone_is_read_as_the_whole_day() -> None:
     """Lists of sites that were made before have no time: such a certificate counts until the day is over."""
-    from wire.trust.certificate_validity import validity
-    from wire.trust.member import Member
+    from gridpeers.wire.trust.certificate_validity import validity
+    from gridpeers.wire.trust.member import Member
 
     member, day = Member(name="inv1", role="agent", expires="2027-11-23"), datetime(2027, 11, 23, 18, tzinfo=UTC)
 

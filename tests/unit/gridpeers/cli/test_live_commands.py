@@ -8,12 +8,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.agent_config import AgentConfig
+from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.cli.commands import options
-from plant.plant_config import PlantConfig
-from scenarios.live.client import run_address
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.schema import load_scenario
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.live.client import run_address
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 
 COMMANDS = ("plant", "agent", "up", "down", "status", "watch", "view", "stop", "event", "load")

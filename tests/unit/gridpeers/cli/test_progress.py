@@ -8,7 +8,7 @@ import pytest
 from rich.progress import Progress, ProgressColumn, TimeRemainingColumn
 
 from gridpeers.cli import progress, remaining
-from scenarios.console import terminal
+from gridpeers.scenarios.console import terminal
 
 
 def test_elsewhere_than_on_a_terminal_a_finished_case_is_a_line() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.load_law import LoadLaw
-from plant.plant_config import GflParameters, GfmParameters
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.plant_config import GflParameters, GfmParameters
 
 S_B = 200e3
 V_B = 277.1363

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics import Dynamics
-from plant.equipment.inverter_parameters import GflParameters
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, circuit, inverter, move_source
 
 UNEQUAL = V_B * BALANCED * np.array([1.0, 0.9, 1.05]) * np.exp(1j * np.radians([0.0, 4.0, -3.0]))

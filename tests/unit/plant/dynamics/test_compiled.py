@@ -14,12 +14,12 @@ import pytest
 from numba.core.caching import CacheImpl
 from numpy.typing import NDArray
 
-from plant.build import build_plant
-from plant.dynamics import Dynamics
-from plant.dynamics.kernel import compiled
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from scenarios.start_check import start_problem
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel import compiled
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.start_check import start_problem
 from tests.side_by_side import compile_once
 
 SOURCES = sorted(path for path in Path(compiled.__file__).parent.glob("*.py") if "\n@compiled\n" in path.read_text())
@@ -64,8 +64,8 @@ def test_another_process_loads_the_step_and_compiles_nothing() -> None:
     """A plant that has run on this machine starts in a second, where its compilation takes up to a minute."""
     compile_once()
     code = (
-        "from plant.loaded_kernels import load_kernels; load_kernels()\n"
-        "from plant.dynamics.kernel.step import run_steps\n"
+        "from gridpeers.plant.loaded_kernels import load_kernels; load_kernels()\n"
+        "from gridpeers.plant.dynamics.kernel.step import run_steps\n"
         "print(*(sum(of.values()) for of in (run_steps.stats.cache_hits, run_steps.stats.cache_misses)))"
     )
 

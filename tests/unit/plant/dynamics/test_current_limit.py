@@ -7,13 +7,13 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
-from plant.dynamics import Circuit, Dynamics, PlantError
-from plant.dynamics.load_law import LoadLaw
-from plant.equipment.inverter_parameters import GfmParameters
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings, Protection, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, loaded, lone
 
 I_B = S_B / (3.0 * V_B)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
-from plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
-from plant.dynamics.reduction.elimination import eliminated
+from gridpeers.plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
+from gridpeers.plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
+from gridpeers.plant.dynamics.reduction.elimination import eliminated
 
 NONE = np.zeros(0, complex)
 

@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.dynamics import Dynamics
-from plant.dynamics.kernel import gfl
-from plant.plant_config import GflParameters
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel import gfl
+from gridpeers.plant.plant_config import GflParameters
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, move_source, on_stiff_bus
 from tests.unit.plant.dynamics.test_gfm import crossing
 

@@ -7,7 +7,7 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.dynamics.kernel import gfm
+from gridpeers.plant.dynamics.kernel import gfm
 from tests.unit.plant.dynamics.circuits import GFM_A, GFM_D, S_B, V_B, Z_B, loaded, lone, on_stiff_bus, pair
 
 Series = NDArray[np.float64]

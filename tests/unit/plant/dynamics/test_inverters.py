@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.inverters import Inverters
 from tests.unit.plant.dynamics.circuits import GFL_D, GFM_D, S_B, inverter
 
 

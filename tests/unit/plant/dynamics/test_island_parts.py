@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from plant.dynamics import Circuit, Dynamics
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction import island_parts, on_all_cores, reduce_network
-from plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics import Circuit, Dynamics
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.reduction import island_parts, on_all_cores, reduce_network
+from gridpeers.plant.dynamics.reduction.reduced import Real
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5

@@ -9,14 +9,14 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual
-from plant.dynamics import Dynamics
-from plant.dynamics.reduction import reduce_network
-from plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
-from plant.feeder.circuits import circuit_of
-from plant.feeder.installed_inverters import installed_inverters
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
-from plant.plant_config import PlantSettings
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
 from tests.unit.plant import networks
 
 LARGEST = 1e-6

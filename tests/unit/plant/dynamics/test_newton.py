@@ -7,14 +7,14 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
-from plant.dynamics.island_newton import DenseIsland, solve_island
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction.reduced import Complex
-from plant.dynamics.reduction.reduction import DenseReduction
-from plant.dynamics.reduction.sparse_reduction import SparseIsland, SparseReduction
-from plant.feeder.circuits import Circuits
-from plant.network import Network, solve_power_flow
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics.island_newton import DenseIsland, solve_island
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.reduction.reduced import Complex
+from gridpeers.plant.dynamics.reduction.reduction import DenseReduction
+from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseIsland, SparseReduction
+from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.tables import read_feeder
 
 X, E = 0.5, 240.0
 

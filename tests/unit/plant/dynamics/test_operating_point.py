@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.dynamics.start import by_droop
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics.start import by_droop
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import read_feeder
 
 
 def start() -> Plant:

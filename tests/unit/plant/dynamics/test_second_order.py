@@ -10,12 +10,12 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from bench.validation.gfm_gfl import gfm_gfl_circuit
-from plant.dynamics import Dynamics
-from plant.dynamics.kernel import gfl, gfm
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import GflParameters, GfmParameters, Method, PlantSettings
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel import gfl, gfm
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, Method, PlantSettings
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import (
     BALANCED,
     GFL_D,

@@ -9,10 +9,10 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace as changed
 
-from plant.dynamics import Circuit, Dynamics, Inverter
-from plant.dynamics.load_law import LoadLaw
-from plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
-from plant.plant_config import Method
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
+from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone
 
 GFL_ON = changed(GFL_D, frequency_watt=True, volt_var=True)

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from plant.dynamics import live_network
-from plant.dynamics.kernel.constant_power import NO_NETWORK
-from plant.dynamics.reduction import reduce_network
-from plant.dynamics.start import power_flow
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import Method, PlantSettings, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import live_network
+from gridpeers.plant.dynamics.kernel.constant_power import NO_NETWORK
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics.start import power_flow
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import Method, PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 
 EVENTS = (
     SwitchEvent(t=0.1, switch="13-152", action="open"),

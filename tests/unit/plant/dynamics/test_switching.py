@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from plant.dynamics import Circuit, Dynamics
-from plant.dynamics.inverters import Inverters
-from plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics import Circuit, Dynamics
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.load_law import LoadLaw
 from tests.unit.plant.dynamics.circuits import (
     BALANCED,
     GFL_D,

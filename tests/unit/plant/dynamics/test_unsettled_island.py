@@ -7,10 +7,10 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
-from plant.dynamics import Circuit, Dynamics
-from plant.dynamics.load_law import LoadLaw
-from plant.dynamics.reduction import reduce_network
-from plant.dynamics.unsettled_island import unsettled_island
+from gridpeers.plant.dynamics import Circuit, Dynamics
+from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics.unsettled_island import unsettled_island
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 3

@@ -10,11 +10,11 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.dynamics import Dynamics
-from plant.dynamics.reduction.reduced import Real
-from plant.dynamics.start.by_droop import MOST_ROUNDS
-from plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
-from plant.plant_config import GflParameters
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics.start.by_droop import MOST_ROUNDS
+from gridpeers.plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
+from gridpeers.plant.plant_config import GflParameters
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
 
 VOLT_VAR = replace(GFL_D, volt_var=True, F_current=0.6, T_qf=0.1)

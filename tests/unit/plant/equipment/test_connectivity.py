@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment.connectivity import Connectivity
-from plant.tables import read_feeder
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.plant.tables import read_feeder
 
 
 @pytest.mark.parametrize("turned", [False, True])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.tables import read_feeder
+from gridpeers.plant.tables import read_feeder
 
 
 def test_the_tables_are_the_import_of_the_published_feeder_with_our_modifications() -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gridpeers.feeder import Feeder
-from plant.equipment.connectivity import Connectivity
-from plant.equipment.joined_copies import joined_copies
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.plant.equipment.joined_copies import joined_copies
+from gridpeers.plant.network import Network, solve_power_flow
 
 
 def test_copies_have_the_voltages_of_the_one(tmp_path: Path) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment import Load
-from plant.equipment.imported_equipment import LoadPart
-from plant.equipment.named_loads import load_name, named_loads, with_powers
+from gridpeers.plant.equipment import Load
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.equipment.named_loads import load_name, named_loads, with_powers
 from tests.unit.plant.networks import feeder, three_phase_bus
 
 

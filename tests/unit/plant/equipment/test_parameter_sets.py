@@ -8,17 +8,17 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
-from plant.build import build_plant
-from plant.equipment import Bus, Source
-from plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
-from plant.equipment.own_parameters import OwnParameters
-from plant.tables import FeederError, read_feeder
-from plant.tables.read import DATA
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.predict.inverter_group import inverter_group_of
-from scenarios.predict.response import response
-from scenarios.schema import ScenarioError, load_scenario
-from scenarios.schema.configs import configs
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.equipment import Bus, Source
+from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
+from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.plant.tables.read import DATA
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.predict.inverter_group import inverter_group_of
+from gridpeers.scenarios.predict.response import response
+from gridpeers.scenarios.schema import ScenarioError, load_scenario
+from gridpeers.scenarios.schema.configs import configs
 
 SETS = "set,key,value\nslow,T_pf_s,0.2\nslow,k_pPLL,40\nslow,volt_var,false\nstiff,P_max_pu,1.2\n"
 

@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
 
-from plant.dynamics import PlantError
-from plant.equipment import InverterRow, Load, Regulator, Switch
-from plant.feeder.circuits import Circuits
-from plant.network import Network
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment import InverterRow, Load, Regulator, Switch
+from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 
 

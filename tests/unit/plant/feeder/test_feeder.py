@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 
 T_C = 0.02
 

@@ -1,9 +1,9 @@
 import numpy as np
 
-from plant.dynamics.reduction.reduction import DenseReduction
-from plant.feeder.circuits import Circuits
-from plant.feeder.islands import Islands
-from plant.network import Network
+from gridpeers.plant.dynamics.reduction.reduction import DenseReduction
+from gridpeers.plant.feeder.circuits import Circuits
+from gridpeers.plant.feeder.islands import Islands
+from gridpeers.plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, opened
 
 

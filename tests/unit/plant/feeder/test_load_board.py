@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics import live_network
-from plant.dynamics.circuit import Circuit
-from plant.dynamics.foreseen_cache import OTHERS
-from plant.equipment.load_powers import set_power
-from plant.equipment.named_loads import named_loads, with_powers
-from plant.feeder import Plant
-from plant.feeder.load_board import LoadBoard
-from plant.network import Network
-from plant.plant_config import LoadEvent, PlantSettings, SwitchEvent
-from plant.tables import read_feeder
-from wire.messages import LoadSetting
+from gridpeers.plant.dynamics import live_network
+from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.foreseen_cache import OTHERS
+from gridpeers.plant.equipment.load_powers import set_power
+from gridpeers.plant.equipment.named_loads import named_loads, with_powers
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.load_board import LoadBoard
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import LoadEvent, PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
+from gridpeers.wire.messages import LoadSetting
 
 T_C = 0.02
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment.imported_equipment import LoadPart
-from plant.feeder import Plant
-from plant.feeder.load_limits import PAUSE, LoadLimits
-from plant.network import Network
-from plant.plant_config import PlantSettings, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.load_limits import PAUSE, LoadLimits
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.networks import feeder, three_phase_bus
 
 V_NOM = 2400.0

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from plant.dynamics import Dynamics
-from plant.feeder import Plant
-from plant.feeder.circuits import circuit_of
-from plant.feeder.installed_inverters import installed_inverters
-from plant.network import Network
-from plant.network.powerflow import solve_power_flow
-from plant.plant_config import PlantSettings, SwitchEvent
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.network import Network
+from gridpeers.plant.network.powerflow import solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from tests.unit.plant.imports.opendss.opendss_solutions import LETTERS, TOLERANCE
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")

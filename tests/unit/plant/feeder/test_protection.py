@@ -7,9 +7,9 @@ import pytest
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
-from plant.plant_config import Protection
-from plant.trip_settings import DEFAULTS
+from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
+from gridpeers.plant.plant_config import Protection
+from gridpeers.plant.trip_settings import DEFAULTS
 
 H = 0.002
 ON = np.array([True])

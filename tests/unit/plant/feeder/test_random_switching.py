@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 
 T_C, H, END = 0.02, 0.002, 5.0
 SWITCHES = ("13-152", "60-160", "sw1_2", "sw2_3")

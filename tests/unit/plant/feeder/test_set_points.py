@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics import Dynamics, PlantError
-from plant.dynamics.kernel import gfl
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import GflParameters, GfmParameters, PlantSettings
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Dynamics, PlantError
+from gridpeers.plant.dynamics.kernel import gfl
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, on_stiff_bus
 from tests.unit.plant.feeder.test_feeder import opened, plant, run
 

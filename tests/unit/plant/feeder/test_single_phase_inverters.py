@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics.reduction import reduce_network
-from plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import Method, PlantSettings, PowerLimit, Protection, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import Method, PlantSettings, PowerLimit, Protection, SwitchEvent
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.networks import feeder, three_phase_bus
 
 V_NOM = 2400.0

@@ -1,10 +1,10 @@
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment.imported_equipment import bus_behind
-from plant.feeder.switchboard import Switchboard
-from plant.network import Network
-from plant.plant_config import SwitchEvent
+from gridpeers.plant.equipment.imported_equipment import bus_behind
+from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import SwitchEvent
 
 H = 0.002
 

@@ -7,14 +7,14 @@ from math import degrees, pi
 import pytest
 from msgspec.structs import replace
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
-from plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.wire.actions import Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.messages import Answer, Command
 from tests.toy.toy_configs import toy_configs
-from wire.actions import Publish
-from wire.codec import decode, encode
-from wire.messages import Answer, Command
 
 T_C = 0.02
 ISLANDING = SwitchEvent(t=0.1, switch="13-152", action="open")

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics.switching import Trip
-from plant.equipment.inverter_parameters import GfmParameters
-from plant.feeder import Plant
-from plant.feeder.trips import trip_event
-from plant.network import Network
-from plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics.switching import Trip
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.trips import trip_event
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
+from gridpeers.plant.tables import read_feeder
+from gridpeers.wire.messages import OFF, PlantEvent
 from tests.unit.plant.feeder.test_feeder import T_C, opened, run
-from wire.messages import OFF, PlantEvent
 
 UNLIMITED = GfmParameters(I_max=1000.0)
 """GFM of any current: overloads, and black starts into the whole load, come to the functions that are tested here."""

@@ -7,12 +7,12 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from plant.dynamics import PlantError
-from plant.equipment import Feeder, InverterRow
-from plant.feeder import Plant
-from plant.imports.opendss import read_opendss
-from plant.network import Network
-from plant.plant_config import PlantSettings
+from gridpeers.plant.dynamics import PlantError
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 

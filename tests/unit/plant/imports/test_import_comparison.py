@@ -5,9 +5,9 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from plant.imports.import_comparison import difference, loads_without_ground
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.import_comparison import difference, loads_without_ground
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")

@@ -1,8 +1,8 @@
 """Names of an imported feeder that its tables cannot hold have others, each bus its own."""
 
-from plant.equipment import Bus, Feeder, Source, Switch
-from plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
-from plant.imports.plain_names import with_plain_names
+from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
+from gridpeers.plant.imports.plain_names import with_plain_names
 
 
 def feeder_of(*names: str, switched: str = "") -> tuple[Feeder, dict[str, str]]:

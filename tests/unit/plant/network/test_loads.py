@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from plant.equipment import Bus, Feeder, Load
-from plant.network import Network
-from plant.network.merging import Merge
-from plant.tables import read_feeder
+from gridpeers.plant.equipment import Bus, Feeder, Load
+from gridpeers.plant.network import Network
+from gridpeers.plant.network.merging import Merge
+from gridpeers.plant.tables import read_feeder
 
 V_NOM = 2400.0
 S = 30e3 + 10e3j

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from plant.network import Network
+from gridpeers.plant.network import Network
 
 
 def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:

@@ -3,8 +3,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from plant.equipment import Line, LineConfig, Transformer
-from plant.network import Network
+from gridpeers.plant.equipment import Line, LineConfig, Transformer
+from gridpeers.plant.network import Network
 from tests.unit.plant.networks import diagonal, feeder, three_phase_bus
 
 

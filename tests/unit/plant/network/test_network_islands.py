@@ -1,4 +1,4 @@
-from plant.network import Network
+from gridpeers.plant.network import Network
 from tests.unit.plant.networks import PAPER_ISLANDS, opened, zones
 
 

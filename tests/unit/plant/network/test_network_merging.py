@@ -2,9 +2,9 @@ import msgspec
 import numpy as np
 import pytest
 
-from plant.equipment import Line, LineConfig
-from plant.network import Network, solve_power_flow
-from plant.network.merging import merge_nodes
+from gridpeers.plant.equipment import Line, LineConfig
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network.merging import merge_nodes
 from tests.unit.plant.networks import PAPER_ISLANDS, diagonal, opened
 
 

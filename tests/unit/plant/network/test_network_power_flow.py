@@ -3,10 +3,10 @@ import pytest
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from plant.equipment import Line, LineConfig, Load, Source, Switch
-from plant.equipment.imported_equipment import LinearElement
-from plant.network import Network, solve_power_flow
-from plant.network.primitives import DELTA
+from gridpeers.plant.equipment import Line, LineConfig, Load, Source, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network.primitives import DELTA
 from tests.unit.plant.networks import diagonal, feeder, three_phase_bus
 
 

@@ -6,14 +6,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.agents.agent import Agent
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.wire.actions import Fetch, Publish
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, Command, Leave, Message, PlantEvent, State, Telemetry
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.actions import Fetch, Publish
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import Answer, Command, Leave, Message, PlantEvent, State, Telemetry
 
 KEYS = Keys("toy")
 T_C = 0.02

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from plant.realtime import kept_telemetry
-from plant.realtime.kept_telemetry import KeptTelemetry
-from scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
+from gridpeers.plant.realtime import kept_telemetry
+from gridpeers.plant.realtime.kept_telemetry import KeptTelemetry
+from gridpeers.scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
+from gridpeers.wire.messages import Answer, Command, LinkReport, Message, Telemetry
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
-from wire.messages import Answer, Command, LinkReport, Message, Telemetry
 
 
 class Link:

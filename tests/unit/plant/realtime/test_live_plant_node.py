@@ -5,12 +5,12 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from plant.plant_config import ScheduledAction
-from plant.realtime.live_plant_node import REFUSAL_INTERVAL, REFUSALS
+from gridpeers.agents.agent import Agent
+from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.plant.realtime.live_plant_node import REFUSAL_INTERVAL, REFUSALS
+from gridpeers.wire.messages import Measurement, Stop, Telemetry
 from tests.toy.toy_configs import agent_config
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
-from wire.messages import Measurement, Stop, Telemetry
 
 
 def test_who_leaves_takes_its_inverter_off_and_who_returns_puts_it_on() -> None:

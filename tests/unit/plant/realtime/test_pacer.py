@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from plant.realtime.pacer import FIRST, RealTimePacer, sentence
+from gridpeers.plant.realtime.pacer import FIRST, RealTimePacer, sentence
 
 
 def test_percentiles_are_those_of_the_delays() -> None:

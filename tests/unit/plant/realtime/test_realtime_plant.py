@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from plant.plant_node import MOST_RECORDERS
-from plant.realtime.realtime_plant import LEAD
+from gridpeers.plant.plant_node import MOST_RECORDERS
+from gridpeers.plant.realtime.realtime_plant import LEAD
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.messages import Measurement, Stop, Telemetry, Waiting
 from tests.toy.toy_configs import toy_configs
 from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
-from wire.driver.drive import StoppedError
-from wire.messages import Measurement, Stop, Telemetry, Waiting
 
 
 def test_it_begins_when_all_are_there() -> None:

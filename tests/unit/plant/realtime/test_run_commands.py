@@ -5,9 +5,9 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from plant.realtime.realtime_plant import COMMANDS
+from gridpeers.plant.realtime.realtime_plant import COMMANDS
+from gridpeers.wire.messages import Answer, Command, LoadSetting, Stop, Telemetry
 from tests.unit.plant.realtime.realtime_lab import KEYS, running
-from wire.messages import Answer, Command, LoadSetting, Stop, Telemetry
 
 
 def test_commands_are_done_and_answered() -> None:

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 import pytest
 from msgspec.structs import replace
 
-from plant.realtime.silence_detector import SilenceDetector
+from gridpeers.plant.realtime.silence_detector import SilenceDetector
+from gridpeers.wire.messages import AgentStatus
 from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
-from wire.messages import AgentStatus
 
 NAMES = ("inv1", "inv2", "inv3")
 MAX_AGE = 0.25

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from plant.equipment import Feeder
-from plant.tables import FeederError, feeders, read_feeder
-from plant.tables.read import DATA
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import FeederError, feeders, read_feeder
+from gridpeers.plant.tables.read import DATA
 
 
 @pytest.fixture

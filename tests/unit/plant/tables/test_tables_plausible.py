@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from plant.tables import FeederError, feeders, read_feeder
-from plant.tables.read import DATA
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError, feeders, read_feeder
+from gridpeers.plant.tables.read import DATA
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gridpeers.feeder import Feeder
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.network import Network, solve_power_flow
 
 
 @pytest.mark.parametrize("name", ["microgrid123", "standard123"])

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 import gridpeers as gp
-from scenarios.checks.check_registry import chosen_checks
-from scenarios.checks.check_verdict import CheckVerdict
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.communication_summary import SummaryPass
-from scenarios.checks.communication.record_content import RecordContent
-from scenarios.checks.judging import judge_by
-from scenarios.results.history import History
+from gridpeers.scenarios.checks.check_registry import chosen_checks
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
+from gridpeers.scenarios.checks.communication.record_content import RecordContent
+from gridpeers.scenarios.checks.judging import judge_by
+from gridpeers.scenarios.results.history import History
 
 
 @cache

@@ -15,18 +15,18 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
-from scenarios.checks import judging
-from scenarios.checks.check_registry import ALWAYS, CHECKS
-from scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.checks_file import read_verdicts, verdicts_json
-from scenarios.checks.judging import JudgingStop, judge_by
-from scenarios.record.record_reader import RunRecord
-from scenarios.run import run
-from scenarios.run_request import Request
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.checks import judging
+from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
+from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checks_file import read_verdicts, verdicts_json
+from gridpeers.scenarios.checks.judging import JudgingStop, judge_by
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.run import run
+from gridpeers.scenarios.run_request import Request
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from tests.unit.scenarios.checks.cases import ran
-from wire.plugins.plugin import Plugin, plugin_problems
 
 HERE = __name__
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from plant.plant_node import IDLE
-from scenarios.results.law_failures import law_failures
+from gridpeers.plant.plant_node import IDLE
+from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
-from wire.messages import PlantEvent
 
 
 def test_a_run_whose_laws_decide_to_the_end_passes() -> None:

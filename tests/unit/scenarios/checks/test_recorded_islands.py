@@ -7,11 +7,11 @@ from dataclasses import replace
 import pytest
 from msgspec.structs import replace as with_fields
 
-from plant.equipment.bus_islands import islands_after
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.results.switch_positions import closed_switches, switch_events
+from gridpeers.plant.equipment.bus_islands import islands_after
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.results.switch_positions import closed_switches, switch_events
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
-from wire.messages import PlantEvent
 
 
 def _islands(case: CheckedCase, label: str) -> set[tuple[str, ...]]:

@@ -7,7 +7,7 @@ from typing import cast
 
 import pytest
 
-from scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.children import Child, Children
 
 
 class Process:

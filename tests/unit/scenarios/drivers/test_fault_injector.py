@@ -6,10 +6,10 @@ from typing import Any
 
 import pytest
 
-from netem.schema.netem import Netem, NodeFault
-from scenarios.drivers import fault_injector
-from scenarios.drivers.fault_injector import FaultInjector
-from scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.scenarios.drivers import fault_injector
+from gridpeers.scenarios.drivers.fault_injector import FaultInjector
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"}
 

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 
 
 def test_a_port_in_use_is_told_before_anything_starts() -> None:
@@ -57,7 +57,8 @@ def _apart(code: str) -> str:
 def test_a_host_whose_loopback_is_down_is_told_before_anything_starts(text: str) -> None:
     """An address can be bound there, and nobody reaches it: a run would wait for its agents and never begin."""
     told = _apart(
-        f"from scenarios.drivers.free_endpoint import free_endpoint; free_endpoint({text!r}, option='--listen')"
+        f"from gridpeers.scenarios.drivers.free_endpoint import free_endpoint; "
+        f"free_endpoint({text!r}, option='--listen')"
     )
 
     assert f"ListenError: --listen: {text} is of no use: processes of this host cannot connect to each other" in told
@@ -67,8 +68,8 @@ def test_a_host_whose_loopback_is_down_is_told_before_anything_starts(text: str)
 def test_a_plant_is_not_waited_for_where_nothing_can_be_reached() -> None:
     """The search for one on the loopback ends at its first look, with the same advice."""
     told = _apart(
-        "from scenarios.live.client.run_address import address_of\n"
-        "from scenarios.live.client.run_client import RunClient\n"
+        "from gridpeers.scenarios.live.client.run_address import address_of\n"
+        "from gridpeers.scenarios.live.client.run_client import RunClient\n"
         "with RunClient(address_of('lab', None)) as client: client.find_plant(60.0)"
     )
 

@@ -5,18 +5,18 @@ from __future__ import annotations
 import pytest
 from msgspec.structs import replace
 
-from agents.agent import Agent
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.emulation.emulated_links import links_of
-from scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.agents.agent import Agent
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.wire.codec import encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import State
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
-from wire.codec import encode
-from wire.keys import Keys
-from wire.messages import State
 
 LATE = EmulationConfig(
     netem=Netem(links=(Fault(on="inv2 -> plant", delay=0.3),)),

@@ -11,6 +11,9 @@ from typing import Any
 
 import pytest
 
+from gridpeers.wire.actions import Fetch, Listen, Log
+from gridpeers.wire.codec import KINDS
+from gridpeers.wire.node import Node
 from tests.hostile.cases import hostile
 from tests.hostile.scenes import (
     EPOCH,
@@ -22,9 +25,6 @@ from tests.hostile.scenes import (
     RealtimePlantScene,
     Scene,
 )
-from wire.actions import Fetch, Listen, Log
-from wire.codec import KINDS
-from wire.node import Node
 
 TOKENS = tuple(
     f"gridpeers/toy/alive/{tail}"

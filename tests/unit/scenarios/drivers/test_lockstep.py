@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.agent_config import Control, GraphRule
-from plant.lockstep_plant import LockstepPlant
-from scenarios.drivers.inprocess import run_inprocess
+from gridpeers.agents.agent_config import Control, GraphRule
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import Ready, State, Stop, Telemetry
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import ToyPlant
-from wire.bounds import LONGEST_MESSAGE
-from wire.codec import encode
-from wire.messages import Ready, State, Stop, Telemetry
 
 SEEDS = st.integers(0, 2**32 - 1)
 

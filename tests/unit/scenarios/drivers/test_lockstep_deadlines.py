@@ -6,13 +6,13 @@ import random
 
 import msgspec
 
-from agents.lockstep_agent import LockstepAgent
-from plant.lockstep_plant import LockstepPlant
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import State
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import ToyPlant
-from wire.codec import encode
-from wire.messages import State
 
 
 def started(n: int = 2) -> LockstepPlant:

@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from agents.agent_config import AgentConfig, Control, GraphRule
-from plant.lockstep_plant import LockstepPlant
-from plant.plant_config import PlantConfig
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
+from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
+from gridpeers.plant.lockstep_plant import LockstepPlant
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.wire.actions import Publish
+from gridpeers.wire.codec import decode
+from gridpeers.wire.messages import Stop
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import M_P, ToyPlant
-from wire.actions import Publish
-from wire.codec import decode
-from wire.messages import Stop
 
 SEEDS = st.integers(0, 2**32 - 1)
 AWAY: Schedule = ((0.2, "inv2", "leave"), (0.3, "inv2", "join"))

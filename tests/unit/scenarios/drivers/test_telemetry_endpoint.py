@@ -4,12 +4,12 @@ from dataclasses import dataclass, field
 
 from msgspec.structs import replace
 
-from scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
-from wire.codec import encode
-from wire.keys import Keys
-from wire.messages import Answer, LinkReport, LinkRequest, Telemetry
-from wire.plant_follower import MOST_PLANTS
+from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
+from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
+from gridpeers.wire.codec import encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.plant_follower import MOST_PLANTS
 
 KEYS = Keys("demo")
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import pytest
 
-from netem import fault_schedule
-from netem.fault_schedule import MOST_SPANS, PAST, Heal, LinkSchedules
-from netem.models.medium import Cut
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.pattern import links_among
-from scenarios.emulation.emulated_links import EmulatedLinks
-from scenarios.emulation.emulation_config import EmulationConfig
-from wire.messages import State
+from gridpeers.netem import fault_schedule
+from gridpeers.netem.fault_schedule import MOST_SPANS, PAST, Heal, LinkSchedules
+from gridpeers.netem.models.medium import Cut
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.pattern import links_among
+from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.wire.messages import State
 
 PAUSE = NodeFault(name="inv1", from_s=1.7, to_s=2.7, pause=True)
 

@@ -10,26 +10,26 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from agents.realtime.link_command_receiver import LinkCommandReceiver
-from agents.realtime.realtime_agent import RealtimeAgent
-from netem import fault_schedule
-from netem.fault_schedule import Heal
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.pattern import links_among
-from plant.realtime.link_command_sender import LinkCommandSender
-from plant.realtime.realtime_plant import RealtimePlant
-from scenarios.emulation.emulated_links import EmulatedLinks
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.emulation.link_reports import decode_statuses
+from gridpeers.agents.realtime.link_command_receiver import LinkCommandReceiver
+from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.netem import fault_schedule
+from gridpeers.netem.fault_schedule import Heal
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.pattern import links_among
+from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.emulation.link_reports import decode_statuses
+from gridpeers.wire.codec import decode
+from gridpeers.wire.links import CommandEffect
+from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 from tests.unit.agents import realtime_lab as agent_side
 from tests.unit.plant.realtime import realtime_lab as plant_side
-from wire.codec import decode
-from wire.links import CommandEffect
-from wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State
 
 SETUP = EmulationConfig(netem=Netem(), microgrids={"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"})
 

@@ -6,15 +6,15 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
-from agents.agent_config import AgentConfig
-from agents.laws.call import decide
-from agents.laws.in_force import law_in_force
-from agents.laws.law import Law
-from agents.own_nameplate import nameplate_of
-from scenarios.record.record_reader import RunRecord
-from scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.laws.call import decide
+from gridpeers.agents.laws.in_force import law_in_force
+from gridpeers.agents.laws.law import Law
+from gridpeers.agents.own_nameplate import nameplate_of
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from gridpeers.wire.messages import Measurement, State
 from tests.toy.toy_configs import agent_config
-from wire.messages import Measurement, State
 
 T_C = 0.02
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from scenarios.explanation.explanation import explained
-from scenarios.record.message_index import on_wire
-from scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.scenarios.explanation.explanation import explained
+from gridpeers.scenarios.record.message_index import on_wire
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
-from wire.codec import encode
-from wire.messages import PlantEvent
 
 
 def told(decided: RecordedDecision, *events: PlantEvent, asked: float | None = None) -> Any:

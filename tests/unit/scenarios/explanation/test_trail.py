@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from agents.laws.law import Term
-from scenarios.explanation import trail as module
-from scenarios.explanation.law_step import LawStep, QuantityStep
-from scenarios.explanation.trail import TrailStep, trail
-from scenarios.record.record_reader import RecordFileError, RunRecord
-from scenarios.record.recorded_decision import RecordedDecision
+from gridpeers.agents.laws.law import Term
+from gridpeers.scenarios.explanation import trail as module
+from gridpeers.scenarios.explanation.law_step import LawStep, QuantityStep
+from gridpeers.scenarios.explanation.trail import TrailStep, trail
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from tests.toy.toy_configs import agent_config
 from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
 

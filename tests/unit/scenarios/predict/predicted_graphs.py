@@ -7,16 +7,16 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
-from agents.agent import Agent
-from plant.build import build_plant
-from plant.equipment import F_NOM, Feeder
-from plant.telemetry_reporter import measurement_of
-from scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from scenarios.results.history import Floats
-from scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
-from scenarios.schema import ScenarioModel, load_scenario
-from scenarios.schema.configs import configs
-from wire.messages import State
+from gridpeers.agents.agent import Agent
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.telemetry_reporter import measurement_of
+from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
+from gridpeers.scenarios.schema import ScenarioModel, load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.wire.messages import State
 
 N = tuple(f"inv{i}" for i in range(1, 10))
 RING = tuple((N[i], N[(i + 1) % 9]) for i in range(9))
@@ -83,7 +83,7 @@ def on_the_plant(
     still_voltage: bool = False,
     end_s: float = 7.0,
 ) -> Run:
-    """The real agents on the real plant, with delays in ticks as `scenarios.predict.linear_model.Ticks` means them.
+    """The real agents on the real plant, with delays in ticks: `gridpeers.scenarios.predict.linear_model.Ticks`.
 
     With `frequency_only` V and Q are measured at once, and V_set is held at once.
     """

@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from scenarios.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes
+from gridpeers.scenarios.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes
 from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, inverters
 
 TABLE = {

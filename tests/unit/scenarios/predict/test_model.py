@@ -8,12 +8,12 @@ import math
 import numpy as np
 import pytest
 
-from agents.agent_config import Gains
-from agents.laws.consensus import P_set_step
-from scenarios.predict.delay_limits import delay_limit, first_crossing
-from scenarios.predict.inverter_group import InverterGroup
-from scenarios.predict.linear_model import Loop, Ticks
-from scenarios.results.history import Floats
+from gridpeers.agents.agent_config import Gains
+from gridpeers.agents.laws.consensus import P_set_step
+from gridpeers.scenarios.predict.delay_limits import delay_limit, first_crossing
+from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.scenarios.predict.linear_model import Loop, Ticks
+from gridpeers.scenarios.results.history import Floats
 from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, inverters
 
 UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9)

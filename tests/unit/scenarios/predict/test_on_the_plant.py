@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from scenarios.predict.delay_limits import delay_limit
-from scenarios.predict.load_steps import load_steps
-from scenarios.predict.times import LoadStep, predicted_times
-from scenarios.predict.var_response import VarResponse, var_delay_limit, var_response
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.predict.delay_limits import delay_limit
+from gridpeers.scenarios.predict.load_steps import load_steps
+from gridpeers.scenarios.predict.times import LoadStep, predicted_times
+from gridpeers.scenarios.predict.var_response import VarResponse, var_delay_limit, var_response
+from gridpeers.scenarios.schema import load_scenario
 from tests.unit.scenarios.predict.predicted_graphs import inverters, on_the_plant, scenario_of
 
 T_C = 0.02

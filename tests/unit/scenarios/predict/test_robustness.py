@@ -8,7 +8,7 @@ from math import ceil
 import numpy as np
 import pytest
 
-from scenarios.predict.robustness import robustness
+from gridpeers.scenarios.predict.robustness import robustness
 from tests.unit.scenarios.predict.predicted_graphs import inverters
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gridpeers as gp
-from scenarios.proposal.droop_alone import unsteady
+from gridpeers.scenarios.proposal.droop_alone import unsteady
 
 
 @pytest.mark.parametrize(

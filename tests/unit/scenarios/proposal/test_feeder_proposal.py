@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from plant.equipment import Bus, Feeder, Source, Switch
-from plant.equipment.imported_equipment import LinearElement, LoadPart
-from scenarios.proposal.feeder_proposal import propose
-from scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
-from scenarios.results.plots.feeder_diagram import feeder_diagram
-from scenarios.results.plots.feeder_places import places
+from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
+from gridpeers.scenarios.proposal.feeder_proposal import propose
+from gridpeers.scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
+from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
+from gridpeers.scenarios.results.plots.feeder_places import places
 
 
 def series(name: str, start: str, end: str, phases: str) -> LinearElement:

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment import Bus, Feeder, Source, Switch
-from plant.equipment.imported_equipment import LoadPart
-from plant.tables import read_feeder
-from scenarios.proposal.feeder_proposal import RATING, propose
-from scenarios.proposal.feeder_walk import cut_off_sums
-from scenarios.proposal.inverter_groups import GROUP
-from scenarios.proposal.proposal_errors import NoProposalError
+from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.proposal.feeder_proposal import RATING, propose
+from gridpeers.scenarios.proposal.feeder_walk import cut_off_sums
+from gridpeers.scenarios.proposal.inverter_groups import GROUP
+from gridpeers.scenarios.proposal.proposal_errors import NoProposalError
 from tests.unit.scenarios.proposal.test_feeder_proposal import series
 
 

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from scenarios.record.journal_reader import entries_of, entry_of, raw_entries, whole_entries
-from wire.bounds import LONGEST_MESSAGE
-from wire.journal import Entry, Exchange, MessageReference, RejectedCount, SentMessage, Token
+from gridpeers.scenarios.record.journal_reader import entries_of, entry_of, raw_entries, whole_entries
+from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.journal import Entry, Exchange, MessageReference, RejectedCount, SentMessage, Token
 
 ENTRIES: list[Entry] = [
     Exchange(3, [b"measured", [1, 2.5, None]], [b"state", ["inv1", True]]),

@@ -7,8 +7,8 @@ from typing import Any, cast
 
 import pytest
 
-from scenarios.record.message_index import MessageIndex
-from scenarios.record.record_file import RecordFile
+from gridpeers.scenarios.record.message_index import MessageIndex
+from gridpeers.scenarios.record.record_file import RecordFile
 
 
 def index_of(clock: str, speed: float, T_c: float = 0.02) -> MessageIndex:

@@ -11,9 +11,9 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.writer import Writer
 
-from scenarios.record.record_file import RecordFile, RecordFileError
-from scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
-from scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
+from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE
+from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 

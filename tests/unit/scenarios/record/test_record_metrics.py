@@ -10,10 +10,10 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.runs.result import Result
-from scenarios.record.record_file import RecordFileError
-from scenarios.record.record_metrics import report_of
-from scenarios.record.record_reader import RunRecord
-from scenarios.results.record import Recorder
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_metrics import report_of
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.results.record import Recorder
 from tests.command_line import invoke
 from tests.unit.scenarios.record.test_record_writer import info_of
 
@@ -24,7 +24,7 @@ MEASURES = ("f_error_Hz", "MPSI", "V_error", "MQSI", "t_restore_s")
 def result(tmp_path_factory: pytest.TempPathFactory) -> Result:
     """The paper's case IV."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("scenarios.record.record_writer.CHUNK", 50_000)
+        patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", 50_000)
         return gp.load("islanding").run("IV", folder=tmp_path_factory.mktemp("run") / "here")
 
 

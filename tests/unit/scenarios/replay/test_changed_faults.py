@@ -7,11 +7,11 @@ from math import inf
 import pytest
 from msgspec.structs import replace
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.partition import Partition
-from scenarios.replay.changed_faults import lossless, spliced, without_loss
-from wire.plugins.plugin import plugin_of
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.scenarios.replay.changed_faults import lossless, spliced, without_loss
+from gridpeers.wire.plugins.plugin import plugin_of
 
 EARLY = Fault(on="* -> inv1", delay=0.1, to_s=2.0)
 LONG = Fault(on="* -> inv2", delay=0.1)

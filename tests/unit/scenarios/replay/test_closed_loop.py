@@ -12,18 +12,18 @@ from typing import Any, cast
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import Control, LawChoice
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.changes import ChangedRule, Changes
-from scenarios.replay.closed_loop import ClosedLoop
-from scenarios.replay.replay import replay
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.changes import ChangedRule, Changes
+from gridpeers.scenarios.replay.closed_loop import ClosedLoop
+from gridpeers.scenarios.replay.replay import replay
+from gridpeers.wire.messages import LinkReport, PlantEvent, Telemetry
 from tests.record.fake_clock import FakeClockRun, at_once, fake_clock_record
 from tests.toy.toy_configs import ALL_FULL
 from tests.toy.toy_plant import ToyPlant
-from wire.messages import LinkReport, PlantEvent, Telemetry
 
 Rows = list[tuple[float, ...]]
 

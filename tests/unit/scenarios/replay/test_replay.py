@@ -8,18 +8,18 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from scenarios.record.record_reader import RunRecord
-from scenarios.replay.difference import Difference, message_difference, row_difference
-from scenarios.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
-from scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
-from scenarios.replay.replay_error import ReplayError
-from scenarios.replay.replayed_process import agent_again, message_of
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
+from gridpeers.scenarios.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
+from gridpeers.scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
+from gridpeers.scenarios.replay.replay_error import ReplayError
+from gridpeers.scenarios.replay.replayed_process import agent_again, message_of
+from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
+from gridpeers.wire.messages import Measurement, State, Telemetry
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.toy.toy_plant import ISLANDING, ToyPlant
-from wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
-from wire.messages import Measurement, State, Telemetry
 
 STATE = State(sender="inv1", epoch=1, seq=3, t=0.06, P_set=5e4, V_set=277.0, Q=1e3, shared={"w": 0.5})
 

@@ -6,21 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.results.evaluation.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
-from scenarios.results.evaluation.claims import Claim, judge
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import Steady
-from scenarios.results.report import RunReport, plain
-from scenarios.schema import ScenarioError, load_scenario
-from scenarios.schema.loading import check_tables
-from scenarios.schema.scenario_errors import Problems
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
+from gridpeers.scenarios.results.evaluation.claims import Claim, judge
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.results.report import RunReport, plain
+from gridpeers.scenarios.schema import ScenarioError, load_scenario
+from gridpeers.scenarios.schema.loading import check_tables
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 
 MODULE = """
-from scenarios.results.evaluation.benchmark_registry import Benchmark
-from scenarios.results.evaluation.claims import Claim
-from scenarios.results.evaluation.benchmark_registry import Published
+from gridpeers.scenarios.results.evaluation.benchmark_registry import Benchmark
+from gridpeers.scenarios.results.evaluation.claims import Claim
+from gridpeers.scenarios.results.evaluation.benchmark_registry import Published
 
 PLACE = {"case": "IV", "event": "event1", "quantity": "MPSI"}
 MINE = Benchmark(

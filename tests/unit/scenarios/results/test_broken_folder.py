@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.results.broken_folder import TerminatedError, broken_if_ended
-from wire.driver.output import ReaderGoneError
+from gridpeers.scenarios.results.broken_folder import TerminatedError, broken_if_ended
+from gridpeers.wire.driver.output import ReaderGoneError
 
 
 @pytest.mark.parametrize(

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment import Feeder
-from plant.equipment.joined_copies import joined_copies
-from plant.tables import read_feeder
-from scenarios.results.plots.feeder_diagram import feeder_diagram
-from scenarios.results.plots.feeder_places import places
-from scenarios.results.plots.label_places import Label, label_sides
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.joined_copies import joined_copies
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
+from gridpeers.scenarios.results.plots.feeder_places import places
+from gridpeers.scenarios.results.plots.label_places import Label, label_sides
 
 Place = tuple[float, float]
 

@@ -8,11 +8,11 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.runs.choices import with_cases
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.results.file_sizes import file_sizes
-from scenarios.results.record import Recorder
-from scenarios.results.run_files import FolderError
-from scenarios.schema.configs import configs
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.results.file_sizes import file_sizes
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.results.run_files import FolderError
+from gridpeers.scenarios.schema.configs import configs
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 

@@ -8,8 +8,8 @@ from typing import IO, Any
 
 import pytest
 
-from scenarios.results import run_files
-from scenarios.results.run_files import FolderError, new_folder, set_broken, set_status, write_whole
+from gridpeers.scenarios.results import run_files
+from gridpeers.scenarios.results.run_files import FolderError, new_folder, set_broken, set_status, write_whole
 
 NOW = datetime(2026, 1, 2, 3, 4, 5, tzinfo=UTC)
 

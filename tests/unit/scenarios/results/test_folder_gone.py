@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.run import run
-from scenarios.run_request import BrokenRunError, Request
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.run import run
+from gridpeers.scenarios.run_request import BrokenRunError, Request
+from gridpeers.scenarios.schema import load_scenario
 from tests.scenario_files import written
 
 SHORT = '[time]\nend_s = 0.1\n[case.calm]\nsecondary = "all"\ngraph = "ring"\n'

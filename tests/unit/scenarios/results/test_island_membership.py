@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from scenarios.results.event_windows import Window
-from scenarios.results.island_membership import island_intervals, islands_at_end
-from scenarios.results.plots.case_figures import measured
-from scenarios.results.plots.drawing import drawing_of
-from scenarios.results.plots.run_figures import figures_of
-from scenarios.schema import load_scenario
-from wire.messages import PlantEvent
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end
+from gridpeers.scenarios.results.plots.case_figures import measured
+from gridpeers.scenarios.results.plots.drawing import drawing_of
+from gridpeers.scenarios.results.plots.run_figures import figures_of
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.wire.messages import PlantEvent
 
 TIE = {"inv1": ("inv1", "inv2", "inv3", "inv4", "inv5", "inv6"), "inv7": ("inv7", "inv8", "inv9")}
 """Islands that the open switch sw2_3 leaves, by name."""

@@ -9,15 +9,15 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from netem.ledger import LinkCounts
-from netem.models.medium import Corrupt, Duplicate
-from netem.receiver import Receiver
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from scenarios.emulation.link_reports import report_data
-from scenarios.results.link_record import COLUMNS, LinkRecord
-from scenarios.results.record import Recorder
-from wire.messages import LinkReport, Telemetry
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.netem.models.medium import Corrupt, Duplicate
+from gridpeers.netem.receiver import Receiver
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.emulation.link_reports import report_data
+from gridpeers.scenarios.results.link_record import COLUMNS, LinkRecord
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.wire.messages import LinkReport, Telemetry
 
 
 def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_message(tmp_path: Path) -> None:

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.results import metrics
-from scenarios.results.event_windows import Window
-from scenarios.results.history import History, Nameplates
-from scenarios.results.sharing_index import sharing_index
+from gridpeers.scenarios.results import metrics
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.sharing_index import sharing_index
 
 F_NOM = 60.0
 PLATES = Nameplates(

@@ -10,17 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.results.evaluation.benchmark_registry import CLAIMS
-from scenarios.results.evaluation.claims import Claim, judged
-from scenarios.results.evaluation.metric import ALWAYS, METRICS, make_metrics, measured, name_of
-from scenarios.results.evaluation.window_metrics import WindowData
-from scenarios.results.event_windows import Window
-from scenarios.results.findings import Findings
-from scenarios.results.history import History, Nameplates, read_only
-from scenarios.results.metrics import Steady
-from scenarios.sweep.column_labels import unit_of
-from wire.plugins.plugin import Plugin, plugin_problems
-from wire.plugins.registry import PluginError
+from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
+from gridpeers.scenarios.results.evaluation.claims import Claim, judged
+from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, make_metrics, measured, name_of
+from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.history import History, Nameplates, read_only
+from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.sweep.column_labels import unit_of
+from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
+from gridpeers.wire.plugins.registry import PluginError
 
 NAMES = ("inv1", "inv2")
 

@@ -7,8 +7,8 @@ import tracemalloc
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.results.packed_events import PackedEvents
-from wire.messages import PlantEvent
+from gridpeers.scenarios.results.packed_events import PackedEvents
+from gridpeers.wire.messages import PlantEvent
 
 EVENTS = st.builds(
     PlantEvent,

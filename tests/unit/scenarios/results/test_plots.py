@@ -9,14 +9,14 @@ import pytest
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from plant.tables import read_feeder
-from scenarios.results.history import History, Nameplates
-from scenarios.results.island_membership import Island, IslandInterval
-from scenarios.results.plots.drawing import Drawing, Mark
-from scenarios.results.plots.marks import GAP, LETTER, place_texts
-from scenarios.results.plots.run_figures import draw, draw_all
-from scenarios.results.plots.style import CASE_STYLES, SHARING, Format, case_style, from_zero, save
-from scenarios.schema import catalogue, load_scenario
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.island_membership import Island, IslandInterval
+from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
+from gridpeers.scenarios.results.plots.marks import GAP, LETTER, place_texts
+from gridpeers.scenarios.results.plots.run_figures import draw, draw_all
+from gridpeers.scenarios.results.plots.style import CASE_STYLES, SHARING, Format, case_style, from_zero, save
+from gridpeers.scenarios.schema import catalogue, load_scenario
 
 
 def drawing(*cases: str) -> Drawing:

@@ -5,11 +5,11 @@ import sys
 import pytest
 
 
-@pytest.mark.parametrize("module", ["scenarios.results.plots.run_figures", "scenarios.sweep.study"])
+@pytest.mark.parametrize("module", ["gridpeers.scenarios.results.plots.run_figures", "gridpeers.scenarios.sweep.study"])
 def test_figures_without_a_home_begin_with_no_warning(module: str) -> None:
     """Matplotlib says of a home that cannot be written what its user can do nothing about."""
     environment = {name: value for name, value in os.environ.items() if name not in ("MPLCONFIGDIR", "XDG_CONFIG_HOME")}
-    words = [sys.executable, "-c", f"import {module}, scenarios.sweep.sweep_plots"]
+    words = [sys.executable, "-c", f"import {module}, gridpeers.scenarios.sweep.sweep_plots"]
 
     done = subprocess.run(words, env=environment | {"HOME": "/proc/none"}, capture_output=True, text=True, check=True)
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from scenarios.results.history import History, history_of, read_history
-from scenarios.results.record import PARTIAL, Recorder, RecordError, csv_line
-from wire.messages import PlantEvent, Telemetry
+from gridpeers.scenarios.results.history import History, history_of, read_history
+from gridpeers.scenarios.results.record import PARTIAL, Recorder, RecordError, csv_line
+from gridpeers.wire.messages import PlantEvent, Telemetry
 
 Rows = tuple[tuple[float, ...], ...]
 

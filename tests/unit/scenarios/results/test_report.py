@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.paper_benchmarks import ISLANDING
-from papers.singhal2022.tables import tables_of
-from scenarios.console import terminal
-from scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK
-from scenarios.results.evaluation.claims import judge
-from scenarios.results.findings import Findings
-from scenarios.results.metrics import Steady
-from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.report import RunReport, plain, show
-from scenarios.schema import load_scenario
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.paper_benchmarks import ISLANDING
+from gridpeers.papers.singhal2022.tables import tables_of
+from gridpeers.scenarios.console import terminal
+from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK
+from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
+from gridpeers.scenarios.results.report import RunReport, plain, show
+from gridpeers.scenarios.schema import load_scenario
 
 
 def report(*, judged: bool = True, f_error: float = 0.137) -> RunReport:

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from papers.singhal2022.claims import CLAIMS
-from papers.singhal2022.paper_benchmarks import ISLANDING
-from scenarios.results.evaluation.claims import judge
-from scenarios.results.event_windows import Window
-from scenarios.results.findings import Findings
-from scenarios.results.history import History, Nameplates
-from scenarios.results.metrics import Steady, measure
-from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.report import RunReport, plain
-from scenarios.schema import load_scenario
+from gridpeers.papers.singhal2022.claims import CLAIMS
+from gridpeers.papers.singhal2022.paper_benchmarks import ISLANDING
+from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.event_windows import Window
+from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.history import History, Nameplates
+from gridpeers.scenarios.results.metrics import Steady, measure
+from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
+from gridpeers.scenarios.results.report import RunReport, plain
+from gridpeers.scenarios.schema import load_scenario
 
 PLATES = Nameplates(
     names=("inv1", "inv2"),

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 import gridpeers as gp
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import verdict
-from wire.messages import PlantEvent
 
 
 @pytest.fixture(scope="module")

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import pytest
 
-from plant.plant_config import ScheduledAction
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.results.event_windows import as_they_came, late_moves
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.participants import inverters_of
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.results.event_windows import as_they_came, late_moves
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.wire.messages import PlantEvent
 from tests.scenario_files import problems, written
-from wire.messages import PlantEvent
 
 PLUG = (CATALOGUE / "plug-n-play.toml").read_text(encoding="utf-8")
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from gridpeers.cli.usage import fail
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import load_scenario
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import load_scenario
 from tests.scenario_files import problems, written
 
 BASE = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

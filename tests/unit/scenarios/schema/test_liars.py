@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.schema import ScenarioError, load_scenario
-from scenarios.schema.liar_notes import liar_notes
+from gridpeers.scenarios.schema import ScenarioError, load_scenario
+from gridpeers.scenarios.schema.liar_notes import liar_notes
 
 LIARS = """
 [time]

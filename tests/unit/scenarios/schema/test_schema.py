@@ -7,13 +7,13 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from agents.agent_config import DegradedCommunication, Gains
-from plant.plant_config import GfmParameters, SwitchEvent, SyncCheck
-from plant.tables.read import DATA
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import catalogue, load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.agents.agent_config import DegradedCommunication, Gains
+from gridpeers.plant.plant_config import GfmParameters, SwitchEvent, SyncCheck
+from gridpeers.plant.tables.read import DATA
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import catalogue, load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import written
 
 SHORT = """

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import problems, written
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings, PowerLimit, SwitchEvent
-from plant.tables import read_feeder
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import load_scenario
-from scenarios.schema.configs import limits_of
-from scenarios.schema.scenario_writing import to_toml
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit, SwitchEvent
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.configs import limits_of
+from gridpeers.scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import problems, written
 
 CLOUDS = (CATALOGUE / "intermittency.toml").read_text(encoding="utf-8")

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from plant.tables.read import DATA
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import ScenarioError, load_scenario
+from gridpeers.plant.tables.read import DATA
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import ScenarioError, load_scenario
 from tests.scenario_files import problems, written
 
 ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")

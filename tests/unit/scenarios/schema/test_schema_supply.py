@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from plant.tables.read import DATA
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.schema import load_scenario
-from scenarios.schema.supply import supply_notes
+from gridpeers.plant.tables.read import DATA
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.supply import supply_notes
 from tests.command_line import invoke
 from tests.scenario_files import problems, written
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.sweep import workers
+from gridpeers.scenarios.sweep import workers
 from tests import command_line
 from tests.unit.scenarios.sweep.conftest import Write
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.schema import ScenarioError
-from scenarios.sweep.file import read_sweep, sweeps
-from scenarios.sweep.file.paths import PathError, put
+from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.sweep.file import read_sweep, sweeps
+from gridpeers.scenarios.sweep.file.paths import PathError, put
 from tests.unit.scenarios.sweep.conftest import Write
 
 

@@ -12,11 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.sweep.column_labels import label_of
-from scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, spread_of, values_of
-from scenarios.sweep.sweep_case import FATE
-from scenarios.sweep.sweep_plots import curves, draw_all, heat_maps
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.sweep.column_labels import label_of
+from gridpeers.scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, spread_of, values_of
+from gridpeers.scenarios.sweep.sweep_case import FATE
+from gridpeers.scenarios.sweep.sweep_plots import curves, draw_all, heat_maps
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pd.DataFrame:

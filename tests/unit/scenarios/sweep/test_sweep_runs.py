@@ -18,23 +18,23 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.stats import binomtest
 
-from plant.build import build_plant
-from plant.dynamics import Circuit
-from plant.dynamics.live_network import LiveNetwork
-from plant.dynamics.reduction.sparse_reduction import SparseReduction
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.drivers.outcome import Outcome
-from scenarios.results.record import Recorder
-from scenarios.results.run_files import FolderError
-from scenarios.schema.configs import configs
-from scenarios.schema.loading import load_scenario
-from scenarios.sweep import sweep_case
-from scenarios.sweep.file import read_sweep
-from scenarios.sweep.study import Summary, study
-from scenarios.sweep.sweep_case import plant_at_start
-from scenarios.sweep.sweep_folder import SweepFolder
+from gridpeers.plant.build import build_plant
+from gridpeers.plant.dynamics import Circuit
+from gridpeers.plant.dynamics.live_network import LiveNetwork
+from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.results.run_files import FolderError
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.loading import load_scenario
+from gridpeers.scenarios.sweep import sweep_case
+from gridpeers.scenarios.sweep.file import read_sweep
+from gridpeers.scenarios.sweep.study import Summary, study
+from gridpeers.scenarios.sweep.sweep_case import plant_at_start
+from gridpeers.scenarios.sweep.sweep_folder import SweepFolder
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.sweep.conftest import Write
-from wire.messages import PlantEvent
 
 MANY = '[grid]\n"gains.k_p" = [0.0005, 0.0007]\n'
 """With 20 seeds 40 runs: enough that a tenth of them is not the end."""
@@ -163,9 +163,9 @@ def test_links_with_faults_are_swept_and_accounted_for(sweep_file: Write, tmp_pa
 
 def test_a_row_is_the_run_that_the_scenario_would_give(sweep_file: Write, tmp_path: Path) -> None:
     """A sweep's sample, written as a scenario, has the history and the indexes of its row, with unit and parameters."""
-    from scenarios.run import run
-    from scenarios.run_request import Request
-    from scenarios.schema.scenario_writing import to_toml
+    from gridpeers.scenarios.run import run
+    from gridpeers.scenarios.run_request import Request
+    from gridpeers.scenarios.schema.scenario_writing import to_toml
 
     path = sweep_file('[grid]\n"gains.k_p" = [0.0005, 0.0011]\n')
     summary = done(path, tmp_path / "sweep")

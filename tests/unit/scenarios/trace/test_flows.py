@@ -8,14 +8,14 @@ from typing import Any, cast
 
 import pytest
 
-from netem.ledger import LinkTrace, Outcome
-from scenarios.record.message_index import on_wire
-from scenarios.record.record_reader import RunRecord
-from scenarios.trace.flows import Flow, flows
+from gridpeers.netem.ledger import LinkTrace, Outcome
+from gridpeers.scenarios.record.message_index import on_wire
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.trace.flows import Flow, flows
+from gridpeers.wire.codec import encode
+from gridpeers.wire.journal import SentMessage
 from tests.record.fake_clock import fake_clock_record
 from tests.unit.scenarios.explanation.decisions import state
-from wire.codec import encode
-from wire.journal import SentMessage
 
 
 def judged(*rows: tuple[float, Outcome], clock: str = "simulated") -> list[Flow]:

@@ -13,17 +13,17 @@ from typing import Any, Literal, get_args
 import msgspec
 import pytest
 
-from netem.schema.netem import Netem
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
-from scenarios.view.own_agents import OwnAgents
-from scenarios.view.page_actions import ActionClient, ActionKind, PageAction, command_line
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
+from gridpeers.scenarios.view.own_agents import OwnAgents
+from gridpeers.scenarios.view.page_actions import ActionClient, ActionKind, PageAction, command_line
+from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, AnyMessage, Command, LoadSetting, Pacing
 from tests.command_line import invoke
 from tests.toy.toy_configs import agent_config
-from wire.codec import decode, encode
-from wire.keys import Keys
-from wire.messages import Answer, AnyMessage, Command, LoadSetting, Pacing
 
 WHERE = RunAddress(run=RUN, connect=(ENDPOINT,))
 
@@ -84,8 +84,8 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[Command]:
     """What the plant is told by the page, or by a command that is typed."""
     told: list[Command] = []
     monkeypatch.setattr(Plant, "commands", told, raising=False)
-    monkeypatch.setattr("scenarios.view.page_actions.RunClient", Plant)
-    monkeypatch.setattr("scenarios.live.client.run_client.RunClient", Plant)
+    monkeypatch.setattr("gridpeers.scenarios.view.page_actions.RunClient", Plant)
+    monkeypatch.setattr("gridpeers.scenarios.live.client.run_client.RunClient", Plant)
     return told
 
 

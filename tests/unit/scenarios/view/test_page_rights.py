@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.view.page_rights import looks_only
-from wire.trust.key_folder import open_credentials
-from wire.trust.site_authority import make_site
+from gridpeers.scenarios.view.page_rights import looks_only
+from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.site_authority import make_site
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 

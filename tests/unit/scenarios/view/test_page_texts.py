@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any, cast
 
-from scenarios.view.page_server import texts
+from gridpeers.scenarios.view.page_server import texts
 
 
 class Socket:

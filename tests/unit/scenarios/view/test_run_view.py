@@ -7,14 +7,14 @@ from math import isclose
 import msgspec
 import pytest
 
-from netem.ledger import LinkCounts
-from scenarios.emulation.link_reports import LinkStatus
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.view.liveness import FROZEN
-from scenarios.view.run_view import Cursor, RunView
-from scenarios.view.strips import LENGTH, STEP
+from gridpeers.netem.ledger import LinkCounts
+from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.view.liveness import FROZEN
+from gridpeers.scenarios.view.run_view import Cursor, RunView
+from gridpeers.scenarios.view.strips import LENGTH, STEP
+from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 from tests.toy.toy_configs import agent_config
-from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 NAMES = ("inv1", "inv2")
 

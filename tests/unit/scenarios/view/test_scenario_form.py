@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from scenarios.schema import load_scenario
-from scenarios.schema.scenario_model import LoadChange, ScenarioModel
-from scenarios.view.page_actions import PageAction
-from scenarios.view.scenario_form import scenario_form
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.scenario_model import LoadChange, ScenarioModel
+from gridpeers.scenarios.view.page_actions import PageAction
+from gridpeers.scenarios.view.scenario_form import scenario_form
 from tests.scenario_files import written
 
 SCENARIO = """

@@ -5,17 +5,17 @@ from importlib import metadata
 
 import pytest
 
-from agents.graphs import GRAPHS, ring
-from wire.plugins import registry
-from wire.plugins.plugin import Plugin, made, plugin_problems
+from gridpeers.agents.graphs import GRAPHS, ring
+from gridpeers.wire.plugins import registry
+from gridpeers.wire.plugins.plugin import Plugin, made, plugin_problems
 
 
 @pytest.fixture
 def entry_points(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Two entry points in the group of graphs, one of which leads nowhere."""
     points = (
-        metadata.EntryPoint("round", "agents.graphs:ring", "gridpeers.graphs"),
-        metadata.EntryPoint("broken", "agents.graphs:nowhere", "gridpeers.graphs"),
+        metadata.EntryPoint("round", "gridpeers.agents.graphs:ring", "gridpeers.graphs"),
+        metadata.EntryPoint("broken", "gridpeers.agents.graphs:nowhere", "gridpeers.graphs"),
     )
     monkeypatch.setattr(metadata, "entry_points", lambda group: points if group == GRAPHS.group else ())
     registry.entry_points_of.cache_clear()
@@ -32,9 +32,9 @@ def test_an_entry_point_adds_to_a_registry(entry_points: None) -> None:
 
 def test_an_entry_point_that_leads_nowhere_is_told_where_it_is_used_and_listed(entry_points: None) -> None:
     """One line; the page of what there is still prints."""
-    from scenarios.reference import page
+    from gridpeers.scenarios.reference import page
 
     ((_, said),) = plugin_problems(GRAPHS, Plugin(use="broken"))
 
-    assert said.startswith('agents.graphs:nowhere: module agents.graphs has no "nowhere"')
-    assert "Cannot be used: agents.graphs:nowhere" in page("graphs")
+    assert said.startswith('gridpeers.agents.graphs:nowhere: module gridpeers.agents.graphs has no "nowhere"')
+    assert "Cannot be used: gridpeers.agents.graphs:nowhere" in page("graphs")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wire.timing.tick_barrier import STOOD_STILL, Awaited, TickBarrier
+from gridpeers.wire.timing.tick_barrier import STOOD_STILL, Awaited, TickBarrier
 
 
 def barrier() -> TickBarrier:

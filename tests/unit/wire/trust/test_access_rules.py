@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wire.keys import Keys, describe
-from wire.trust.access_rules import Rule, access_control, rules_between
-from wire.trust.member import Member, Role, with_inverters
+from gridpeers.wire.keys import Keys, describe
+from gridpeers.wire.trust.access_rules import Rule, access_control, rules_between
+from gridpeers.wire.trust.member import Member, Role, with_inverters
 
 PLANT, OPERATOR, VIEWER = (Member(name=role, role=role) for role in ("plant", "operator", "viewer"))
 INV1, INV2, INV3 = (Member(name=f"inv{k}", role="agent") for k in (1, 2, 3))

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wire.trust.credentials import Credentials
-from wire.trust.member import Member
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.member import Member
 
 INV1 = Member(name="inv1", role="agent")
 REVOKED = Member(name="eve", role="operator", revoked=True)

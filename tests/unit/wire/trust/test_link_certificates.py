@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from gridpeers.wire.trust.link_certificates import LinkCertificates
 from tests.unit.wire.trust.test_credentials import SHOWN
-from wire.trust.link_certificates import LinkCertificates
 
 
 class _Link(NamedTuple):

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from wire.trust.credentials import Credentials
-from wire.trust.member import Member
-from wire.trust.tls_refusal import tls_refusal
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.member import Member
+from gridpeers.wire.trust.tls_refusal import tls_refusal
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
@@ -25,7 +25,7 @@ PATIENCE = 60.0
 @pytest.fixture(scope="module")
 def sites(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The sites lab and far, another one of the name lab, and late: lab with a plant and an agent that have expired."""
-    from wire.trust.site_authority import issue, make_site
+    from gridpeers.wire.trust.site_authority import issue, make_site
 
     folder = tmp_path_factory.mktemp("sites")
     for name in ("lab", "far", "other/lab"):

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment import Feeder, Load
-from plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
-from plant.feeder import Plant
-from plant.gridlabd.model.export_glm import export_glm
-from plant.network import Network, solve_power_flow
-from plant.plant_config import PlantSettings
-from plant.tables import FeederError, read_feeder
+from gridpeers.plant.equipment import Feeder, Load
+from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.gridlabd.model.export_glm import export_glm
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError, read_feeder
 
 TOLERANCE = 1e-8
 """Largest difference (pu); GridLAB-D writes 1e-6 V, which is 4e-10 pu."""

@@ -5,10 +5,10 @@ from typing import Any, Literal, get_args, get_origin
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment.own_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
-from plant.gridlabd.model.glm_inverters import inverter_blocks
-from plant.gridlabd.model.unrepresentable import beyond_gridlabd
-from wire.schema.table_schema import Field, fields_of
+from gridpeers.plant.equipment.own_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
+from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks
+from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd
+from gridpeers.wire.schema.table_schema import Field, fields_of
 
 ROW = {"name": "inv1", "bus": "13", "P_rated_kW": "600", "m_p_pu": "0.01", "m_q_pu": "0.05"}
 

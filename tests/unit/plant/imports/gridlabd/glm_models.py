@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from plant.imports.gridlabd.glm_elements import letters_of
-from plant.imports.gridlabd.glm_text import GlmText
-from plant.imports.gridlabd.gridlabd_process import solved_model
-from plant.imports.gridlabd.read_glm import read_glm, voltage_of
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.gridlabd.glm_elements import letters_of
+from gridpeers.plant.imports.gridlabd.glm_text import GlmText
+from gridpeers.plant.imports.gridlabd.gridlabd_process import solved_model
+from gridpeers.plant.imports.gridlabd.read_glm import read_glm, voltage_of
+from gridpeers.plant.network import Network, solve_power_flow
 
 TOLERANCE = 1e-6
 """Largest difference that the tests allow (pu of nominal voltage)."""

@@ -4,13 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from plant.gridlabd.model.export_glm import export_glm
-from plant.imports.gridlabd.glm_loads import V_MIN
-from plant.imports.gridlabd.read_glm import read_glm
-from plant.network import Network, solve_power_flow
-from plant.plant_config import PlantSettings
-from plant.tables import read_feeder
-from plant.tables.write import write_feeder
+from gridpeers.plant.gridlabd.model.export_glm import export_glm
+from gridpeers.plant.imports.gridlabd.glm_loads import V_MIN
+from gridpeers.plant.imports.gridlabd.read_glm import read_glm
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.write import write_feeder
 from tests.unit.plant.imports.gridlabd.glm_models import (
     ASYMMETRIC,
     HEAD,

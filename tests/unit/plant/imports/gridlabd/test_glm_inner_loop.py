@@ -7,16 +7,16 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
-from plant.dynamics import Dynamics
-from plant.dynamics.reduction import reduce_network
-from plant.equipment import InverterRow
-from plant.feeder.circuits import circuit_of
-from plant.feeder.installed_inverters import installed_inverters
-from plant.gridlabd.model.export_glm import export_glm
-from plant.imports.gridlabd.read_glm import read_glm
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from plant.tables import read_feeder
+from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.equipment import InverterRow
+from gridpeers.plant.feeder.circuits import circuit_of
+from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.gridlabd.model.export_glm import export_glm
+from gridpeers.plant.imports.gridlabd.read_glm import read_glm
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.imports.gridlabd.glm_models import ASYMMETRIC, TOLERANCE, gridlabd_voltages, write
 
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.gridlabd.read_glm import read_glm
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.gridlabd.read_glm import read_glm
+from gridpeers.plant.network import Network, solve_power_flow
 from tests.unit.plant.imports.gridlabd.glm_models import HEAD, TOLERANCE, write
 
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")

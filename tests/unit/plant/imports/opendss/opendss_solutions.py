@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
 
 LETTERS = "ABC456789"
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
 from tests.unit.plant.imports.opendss.opendss_scripts import ELEMENTS, LINES, LOADS, TRANSFORMERS
 from tests.unit.plant.imports.opendss.opendss_solutions import (
     LINE,

@@ -7,7 +7,7 @@ import pytest
 
 from bench.validation.opendss_engines import solve_scripts
 from bench.validation.write_opendss import write_opendss
-from plant.tables import read_feeder
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.imports.opendss.opendss_scripts import (
     CONNECTIONS,
     ELEMENTS,

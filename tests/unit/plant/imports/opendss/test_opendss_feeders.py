@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from bench.validation.write_opendss import write_opendss
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
-from plant.tables import read_feeder
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.tables import read_feeder
 from tests.unit.plant.imports.opendss.opendss_solutions import TOLERANCE, engine_voltages, largest_difference
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
-from plant.tables import read_feeder
-from plant.tables.write import write_feeder
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.write import write_feeder
 from tests.unit.plant.imports.opendss.opendss_solutions import (
     LETTERS,
     LINE,

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import read_opendss
-from plant.tables import read_feeder
-from plant.tables.read import FeederError
-from plant.tables.write import write_feeder
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.read import FeederError
+from gridpeers.plant.tables.write import write_feeder
 from tests.unit.plant.imports.opendss.opendss_solutions import (
     LINE,
     SOURCE,

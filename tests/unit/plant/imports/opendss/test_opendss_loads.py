@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import read_opendss
-from plant.network import Network, solve_power_flow
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
 from tests.unit.plant.imports.opendss.opendss_scripts import CONNECTIONS, LOAD_CASES, MODELS, RANGES
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import dss_process, read_opendss
-from plant.imports.opendss.dss_circuit import ImportRequest
-from plant.tables.read import FeederError
+from gridpeers.plant.imports.opendss import dss_process, read_opendss
+from gridpeers.plant.imports.opendss.dss_circuit import ImportRequest
+from gridpeers.plant.tables.read import FeederError
 from tests.command_line import invoke
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, write
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import read_opendss
-from plant.tables.read import FeederError
+from gridpeers.plant.imports.opendss import read_opendss
+from gridpeers.plant.tables.read import FeederError
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, SOURCE, STEP_DOWN, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from plant.imports.opendss import read_opendss
+from gridpeers.plant.imports.opendss import read_opendss
 from tests.unit.plant.imports.opendss.opendss_solutions import LINE, STEP_DOWN, TOLERANCE, largest_difference, write
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from tests.unit.scenarios.checks.cases import ran
 
 

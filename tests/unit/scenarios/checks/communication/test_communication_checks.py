@@ -8,15 +8,15 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication import record_content
-from scenarios.checks.communication.communication_summary import SummaryPass
-from scenarios.checks.communication.record_sink import SentState
-from scenarios.record.record_file import RecordFile
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication import record_content
+from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
+from gridpeers.scenarios.checks.communication.record_sink import SentState
+from gridpeers.scenarios.record.record_file import RecordFile
+from gridpeers.wire.journal import Decision
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
 from tests.unit.scenarios.checks.communication.records import CUT, LOSSY, QUIET
-from wire.journal import Decision
 
 COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
 EVENT = [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]

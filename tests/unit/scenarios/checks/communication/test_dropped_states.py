@@ -12,19 +12,19 @@ from typing import Any, cast
 
 import pytest
 
-from scenarios.checks.check_verdict import NotJudgedError
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.communication.account_check import MessageAccount
-from scenarios.checks.communication.arrival_accounts import ArrivalAccounts
-from scenarios.checks.communication.communication_summary import summarise
-from scenarios.checks.communication.dropped_states import DroppedStates
-from scenarios.checks.communication.record_content import read_content
-from scenarios.checks.communication.record_sink import SentState
-from scenarios.record.record_info import FILE
+from gridpeers.scenarios.checks.check_verdict import NotJudgedError
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.communication.account_check import MessageAccount
+from gridpeers.scenarios.checks.communication.arrival_accounts import ArrivalAccounts
+from gridpeers.scenarios.checks.communication.communication_summary import summarise
+from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
+from gridpeers.scenarios.checks.communication.record_content import read_content
+from gridpeers.scenarios.checks.communication.record_sink import SentState
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.wire.journal import RecordLevel
 from tests.fuzz.journals import judged
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
 from tests.unit.scenarios.checks.communication.test_untrusted_journals import packed, sent
-from wire.journal import RecordLevel
 
 LOST = range(50, 60)
 """Numbers of the messages from inv1 to inv2 that never arrive: those of 1.0 to 1.2 s."""

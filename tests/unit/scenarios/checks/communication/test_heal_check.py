@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 import gridpeers as gp
-from scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
 from tests.unit.scenarios.checks.communication.records import CUT
 

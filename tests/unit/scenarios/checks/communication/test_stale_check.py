@@ -7,7 +7,7 @@ from dataclasses import replace
 import msgspec
 import pytest
 
-from scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.checked_case import CheckedCase
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
 
 

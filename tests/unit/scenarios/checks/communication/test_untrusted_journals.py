@@ -7,13 +7,13 @@ from typing import Any
 import msgspec
 import pytest
 
-from netem.ledger import LinkTrace
-from scenarios.checks.communication.record_sink import SentState
-from scenarios.checks.communication.state_window import KEPT, StateWindow
+from gridpeers.netem.ledger import LinkTrace
+from gridpeers.scenarios.checks.communication.record_sink import SentState
+from gridpeers.scenarios.checks.communication.state_window import KEPT, StateWindow
+from gridpeers.wire.bounds import MOST_COUNT
+from gridpeers.wire.codec import encode
+from gridpeers.wire.messages import State
 from tests.fuzz.journals import judged, link_report
-from wire.bounds import MOST_COUNT
-from wire.codec import encode
-from wire.messages import State
 
 DECISION = ["decision", 4, 1, ["inv2"], [1], [], []]
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from plant.equipment import Bus, Feeder, InverterRow
-from plant.equipment.imported_equipment import LinearElement, LoadPart
-from plant.feeder import Plant
-from plant.network import Network
-from plant.plant_config import PlantSettings
-from scenarios.checks.physics.island_power_flow import IslandBalance, IslandPowerFlow, NetworkState
+from gridpeers.plant.equipment import Bus, Feeder, InverterRow
+from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.scenarios.checks.physics.island_power_flow import IslandBalance, IslandPowerFlow, NetworkState
 from tests.unit.scenarios.proposal.test_feeder_proposal import series
 
 V_NOM = 2400.0

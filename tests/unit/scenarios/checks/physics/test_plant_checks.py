@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from scenarios.checks.checked_case import CheckedCase
-from scenarios.checks.physics.matrix_pencil import modes
+from gridpeers.scenarios.checks.checked_case import CheckedCase
+from gridpeers.scenarios.checks.physics.matrix_pencil import modes
+from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import changed, ran, ran_with, verdict
-from wire.messages import PlantEvent
 
 PLANT_CHECKS = (
     *("frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance"),

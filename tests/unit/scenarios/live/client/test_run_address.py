@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from scenarios.live.client.access import Access
-from scenarios.live.client.run_address import (
+from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.client.run_address import (
     RunAddress,
     UsageError,
     accepting,

@@ -7,14 +7,14 @@ from dataclasses import replace
 
 import pytest
 
-from scenarios.live.client import plant_search
-from scenarios.live.client import run_client as client
-from scenarios.live.client.run_address import address_of
-from scenarios.live.client.run_client import NobodyError, RunClient
-from wire.driver.inbox import Inbox
-from wire.keys import Keys
-from wire.trust.credentials import Credentials
-from wire.trust.member import Member
+from gridpeers.scenarios.live.client import plant_search
+from gridpeers.scenarios.live.client import run_client as client
+from gridpeers.scenarios.live.client.run_address import address_of
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.member import Member
 
 
 class Clock:

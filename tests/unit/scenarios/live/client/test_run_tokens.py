@@ -8,19 +8,19 @@ from typing import Any
 
 import pytest
 
-from scenarios.live.client import run_client as client
-from scenarios.live.client.run_address import address_of
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.client.run_tokens import RunTokens
-from scenarios.live.show.run_monitor import RunMonitor
-from scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.live.client import run_client as client
+from gridpeers.scenarios.live.client.run_address import address_of
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.client.run_tokens import RunTokens
+from gridpeers.scenarios.live.show.run_monitor import RunMonitor
+from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.membership import MOST_PROCESSES
+from gridpeers.wire.plant_follower import MOST_PLANTS
+from gridpeers.wire.token_queue import AT_ONCE, MOST_WAITING
 from tests.toy.toy_configs import agent_config
-from wire.bounds import MOST_INVERTERS
-from wire.driver.inbox import Inbox
-from wire.keys import Keys
-from wire.membership import MOST_PROCESSES
-from wire.plant_follower import MOST_PLANTS
-from wire.token_queue import AT_ONCE, MOST_WAITING
 
 LAB, MINE = Keys("lab"), Keys("mine")
 
@@ -64,7 +64,7 @@ def line(monkeypatch: pytest.MonkeyPatch) -> Line:
         return made.now
 
     monkeypatch.setattr(client, "Session", lambda *_, **__: made)
-    monkeypatch.setattr("wire.driver.inbox.monotonic", later)
+    monkeypatch.setattr("gridpeers.wire.driver.inbox.monotonic", later)
     return made
 
 

@@ -9,19 +9,19 @@ from typing import Any, cast
 import msgspec
 import pytest
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault
-from netem.schema.partition import Partition
-from scenarios.catalogue_files import CATALOGUE
-from scenarios.live.launch.ended_scenario import ended_scenario
-from scenarios.live.launch.live_folders import folders
-from scenarios.live.launch.live_processes import ProcessOutcome
-from scenarios.live.numbers import live_report
-from scenarios.results.metrics_file import RunMetrics
-from scenarios.results.record import Recorded
-from scenarios.schema import ScenarioModel, load_scenario
-from scenarios.schema.scenario_model import LONGEST_RUN
-from wire.timing.clock import rounded_up
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.scenarios.catalogue_files import CATALOGUE
+from gridpeers.scenarios.live.launch.ended_scenario import ended_scenario
+from gridpeers.scenarios.live.launch.live_folders import folders
+from gridpeers.scenarios.live.launch.live_processes import ProcessOutcome
+from gridpeers.scenarios.live.numbers import live_report
+from gridpeers.scenarios.results.metrics_file import RunMetrics
+from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.schema import ScenarioModel, load_scenario
+from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN
+from gridpeers.wire.timing.clock import rounded_up
 
 
 def islanding(**case: Any) -> ScenarioModel:

@@ -9,19 +9,19 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from agents.agent_config import MAX_AGE
-from netem.fault_schedule import Heal, schedule_of
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from netem.schema.partition import Partition
-from netem.schema.pattern import Link, links_among
-from scenarios.emulation.link_command import LinkCommand
-from scenarios.live.client.run_address import UsageError
-from scenarios.live.launch.link_log import LinkLog, check_new, replay_lines
-from scenarios.schema import find_scenario, load_scenario
-from scenarios.schema.netem_tables import netem_of, setup_of
-from wire.driver.drive import StoppedError
-from wire.messages import PLANT, LinkRequest
+from gridpeers.agents.agent_config import MAX_AGE
+from gridpeers.netem.fault_schedule import Heal, schedule_of
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
+from gridpeers.netem.schema.pattern import Link, links_among
+from gridpeers.scenarios.emulation.link_command import LinkCommand
+from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.scenarios.live.launch.link_log import LinkLog, check_new, replay_lines
+from gridpeers.scenarios.schema import find_scenario, load_scenario
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.messages import PLANT, LinkRequest
 
 
 def test_the_replayed_scenario_is_one_and_its_links_do_what_was_commanded(tmp_path: Path) -> None:

@@ -7,15 +7,15 @@ from contextlib import nullcontext
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import Control, LawChoice
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem
-from scenarios.emulation.emulation_config import EmulationConfig
-from scenarios.live.client.run_address import RunAddress, UsageError
-from scenarios.live.launch import live_processes
-from scenarios.live.requests.agent_configs import own_code
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError
+from gridpeers.scenarios.live.launch import live_processes
+from gridpeers.scenarios.live.requests.agent_configs import own_code
+from gridpeers.wire.plugins.plugin import Plugin
 from tests.toy.toy_configs import agent_config
-from wire.plugins.plugin import Plugin
 
 SETUP = EmulationConfig(
     netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"}

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from plant.start_words import COMPILING, LISTENING
-from scenarios.live.launch.live_processes import limited, meaning
+from gridpeers.plant.start_words import COMPILING, LISTENING
+from gridpeers.scenarios.live.launch.live_processes import limited, meaning
+from gridpeers.wire.rate_limit import BURST, RateLimit
 from tests.toy.toy_configs import toy_configs
-from wire.rate_limit import BURST, RateLimit
 
 
 def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:

@@ -8,10 +8,10 @@ from typing import Any, cast
 
 import pytest
 
-from scenarios.live.launch.live_processes import UNHEARD, _follow
-from scenarios.live.launch.live_recorder import LiveRecorder
-from wire.driver.drive import StoppedError
-from wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
+from gridpeers.scenarios.live.launch.live_processes import UNHEARD, _follow
+from gridpeers.scenarios.live.launch.live_recorder import LiveRecorder
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
 
 
 class CutRecorder:

@@ -9,24 +9,24 @@ from typing import Any
 import msgspec
 import pytest
 
-from netem.schema.fault import Fault
-from netem.schema.netem import Netem, NodeFault, Skew
-from plant.equipment import Feeder
-from plant.equipment.imported_equipment import LoadPart
-from scenarios.drivers.inprocess import run_inprocess
-from scenarios.live.numbers.departures import compare
-from scenarios.live.numbers.live_figures import live_drawing
-from scenarios.live.numbers.live_report import write_report
-from scenarios.results.event_windows import CaseRecord, windows
-from scenarios.results.findings import find
-from scenarios.results.history import History, history_of
-from scenarios.results.metrics_file import RunMetrics, metrics_json
-from scenarios.results.record import Recorded, Recorder
-from scenarios.results.report import plain
-from scenarios.schema import ScenarioModel, load_scenario
-from scenarios.schema.configs import configs
-from scenarios.schema.scenario_model import Event, LoadChange
-from wire.messages import PlantEvent
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem, NodeFault, Skew
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.live.numbers.departures import compare
+from gridpeers.scenarios.live.numbers.live_figures import live_drawing
+from gridpeers.scenarios.live.numbers.live_report import write_report
+from gridpeers.scenarios.results.event_windows import CaseRecord, windows
+from gridpeers.scenarios.results.findings import find
+from gridpeers.scenarios.results.history import History, history_of
+from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json
+from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.results.report import plain
+from gridpeers.scenarios.schema import ScenarioModel, load_scenario
+from gridpeers.scenarios.schema.configs import configs
+from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
+from gridpeers.wire.messages import PlantEvent
 
 
 def one_case(name: str) -> tuple[ScenarioModel, Feeder]:

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from scenarios.live.client.run_client import NobodyError
-from scenarios.live.requests.link_requests import link_states
-from scenarios.live.requests.run_requests import plant_status, request
-from wire.codec import decode
-from wire.keys import Keys
-from wire.messages import Answer, AnyMessage, Command, LinkAcknowledgement
+from gridpeers.scenarios.live.client.run_client import NobodyError
+from gridpeers.scenarios.live.requests.link_requests import link_states
+from gridpeers.scenarios.live.requests.run_requests import plant_status, request
+from gridpeers.wire.codec import decode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, AnyMessage, Command, LinkAcknowledgement
 
 
 class Client:

@@ -7,10 +7,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from scenarios.live.client.access import Access
-from scenarios.live.client.run_address import RUN, RunAddress
-from scenarios.live.client.run_client import NobodyError
-from scenarios.live.requests import agent_configs
+from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.client.run_address import RUN, RunAddress
+from gridpeers.scenarios.live.client.run_client import NobodyError
+from gridpeers.scenarios.live.requests import agent_configs
 
 
 @pytest.mark.parametrize(

@@ -8,15 +8,15 @@ from typing import cast
 import msgspec
 import pytest
 
-from scenarios.live.client.run_client import NobodyError, RunClient
-from scenarios.live.requests import agent_configs, run_requests
-from scenarios.live.requests.agent_configs import configuration, configurations
-from scenarios.live.requests.link_requests import links_of_run
-from scenarios.live.requests.run_requests import ask, plant_status
+from gridpeers.scenarios.live.client.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.requests import agent_configs, run_requests
+from gridpeers.scenarios.live.requests.agent_configs import configuration, configurations
+from gridpeers.scenarios.live.requests.link_requests import links_of_run
+from gridpeers.scenarios.live.requests.run_requests import ask, plant_status
+from gridpeers.wire.codec import decode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, AnyMessage, Command
 from tests.toy.toy_configs import agent_config
-from wire.codec import decode
-from wire.keys import Keys
-from wire.messages import Answer, AnyMessage, Command
 
 KEYS = Keys("demo")
 

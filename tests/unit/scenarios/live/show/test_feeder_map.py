@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import msgspec
 
-from plant.equipment.named_loads import named_loads
-from scenarios.live.launch.live_options import LiveOptions, configure
-from scenarios.live.show.feeder_map import FeederMap, feeder_map, read_feeder_map
-from scenarios.schema import load_scenario
+from gridpeers.plant.equipment.named_loads import named_loads
+from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.show.feeder_map import FeederMap, feeder_map, read_feeder_map
+from gridpeers.scenarios.schema import load_scenario
 
 
 def test_loads_are_on_the_map_as_the_run_has_them() -> None:

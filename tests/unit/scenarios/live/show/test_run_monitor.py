@@ -9,22 +9,22 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
-from netem.ledger import LinkCounts, LinkTrace
-from scenarios.emulation.link_reports import LinkReportData, encode_data
-from scenarios.live.client import run_client as client
-from scenarios.live.client.run_address import address_of
-from scenarios.live.client.run_client import RunClient
-from scenarios.live.requests.agent_configs import read_config
-from scenarios.live.show.render import plain
-from scenarios.live.show.run_monitor import RunMonitor
-from scenarios.live.show.watching import RunSubscriber
-from scenarios.results.link_record import LinkRecord
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.emulation.link_reports import LinkReportData, encode_data
+from gridpeers.scenarios.live.client import run_client as client
+from gridpeers.scenarios.live.client.run_address import address_of
+from gridpeers.scenarios.live.client.run_client import RunClient
+from gridpeers.scenarios.live.requests.agent_configs import read_config
+from gridpeers.scenarios.live.show.render import plain
+from gridpeers.scenarios.live.show.run_monitor import RunMonitor
+from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 from tests.hostile.cases import Truth, hostile
 from tests.toy.toy_configs import agent_config
-from wire.codec import RejectedError, decode, encode
-from wire.driver.inbox import Inbox
-from wire.keys import Keys
-from wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 
 KEYS = Keys("lab")
 NAMES = ("inv1", "inv2")

@@ -5,14 +5,14 @@ import io
 import pytest
 from msgspec.structs import replace
 
-from agents.agent_config import AgentConfig, Control
-from scenarios.console import terminal
-from scenarios.live.requests.plant_status import PlantStatus
-from scenarios.live.show.render import plain, table
-from scenarios.live.show.run_monitor import RunMonitor
-from scenarios.live.show.snapshot import InverterStatus, Snapshot
-from scenarios.short_names import short
-from wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.scenarios.console import terminal
+from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.show.render import plain, table
+from gridpeers.scenarios.live.show.run_monitor import RunMonitor
+from gridpeers.scenarios.live.show.snapshot import InverterStatus, Snapshot
+from gridpeers.scenarios.short_names import short
+from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 PACING = Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0)
 

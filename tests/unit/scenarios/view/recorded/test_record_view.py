@@ -9,11 +9,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from scenarios.record.record_reader import RunRecord
-from scenarios.view.recorded.record_view import RecordView
-from scenarios.view.run_view import Frame
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.view.recorded.record_view import RecordView
+from gridpeers.scenarios.view.run_view import Frame
+from gridpeers.wire.messages import PlantEvent
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
-from wire.messages import PlantEvent
 
 ISLANDED = """
 [time]
@@ -115,7 +115,7 @@ def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: Recor
 
 def test_all_links_of_a_healthy_record_carry_what_is_sent(tmp_path: Path) -> None:
     """Both ways of each link, whichever agent comes first, from the first second on; ages are those of `why`."""
-    from scenarios.explanation.explanation import explain
+    from gridpeers.scenarios.explanation.explanation import explain
 
     scenario = ISLANDED.partition("[[link]]")[0]
     (tmp_path / "it.toml").write_text(scenario, encoding="utf-8")
@@ -180,7 +180,7 @@ def test_switches_and_loads_of_an_old_record_are_read_from_its_words(
         return PlantEvent(t=t, kind=kind, subject=subject, text=text)
 
     for module in ("switchboard", "load_board"):
-        monkeypatch.setattr(f"plant.feeder.{module}.PlantEvent", in_words)
+        monkeypatch.setattr(f"gridpeers.plant.feeder.{module}.PlantEvent", in_words)
     view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
 
     positions = [view.frame(t).switches for t in (0.19, 0.2)]
@@ -202,7 +202,7 @@ def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
 
 def test_a_decision_is_explained(record: RunRecord, view: RecordView) -> None:
     """A page shows what `gridpeers why` prints."""
-    from scenarios.explanation.explanation import explain
+    from gridpeers.scenarios.explanation.explanation import explain
 
     assert view.decision("inv4", 0.7) == str(explain(record, "inv4", 0.7))
     assert "10 states since: 10 cut off by a cut link" in view.decision("inv4", 0.7)

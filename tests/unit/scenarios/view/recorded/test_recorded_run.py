@@ -11,11 +11,11 @@ from typing import Any
 import msgspec
 import pytest
 
-from scenarios.record.record_file import RecordFileError
-from scenarios.record.record_info import FILE
-from scenarios.record.record_reader import RunRecord
-from scenarios.view.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
-from scenarios.view.recorded.recorded_run import STILL, RecordedRun
+from gridpeers.scenarios.record.record_file import RecordFileError
+from gridpeers.scenarios.record.record_info import FILE
+from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.view.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
+from gridpeers.scenarios.view.recorded.recorded_run import STILL, RecordedRun
 from tests.record.recorded_runs import recorded_in_chunks
 
 ISLANDED = """
