@@ -1,0 +1,129 @@
+"""The wheel in an environment of its own, beside a distribution that has packages of our rooms' names.
+
+What the wheel depends on comes from the environment of the tests, as a folder on the path.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import venv
+from hashlib import sha256
+from importlib.metadata import Distribution
+from pathlib import Path
+from typing import NamedTuple
+from zipfile import ZipFile
+
+import pytest
+
+import gridpeers as gp
+from tests.golden.catalogue.pins import ran
+
+HOME = Path(gp.__file__).parent
+NEIGHBOUR = "openai-agents"
+"""A distribution with a package `agents`."""
+
+PIP = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--quiet")
+
+
+class Wheels(NamedTuple):
+    """Files of the wheels."""
+
+    gridpeers: Path
+    neighbour: Path
+
+
+class Environment(NamedTuple):
+    """A fresh virtual environment."""
+
+    folder: Path
+
+    @property
+    def python(self) -> Path:
+        """Its interpreter."""
+        return self.folder / "bin" / "python"
+
+    @property
+    def packages(self) -> Path:
+        """Where distributions are installed."""
+        (found,) = self.folder.glob("lib/python*/site-packages")
+        return found
+
+    def pip(self, *words: str | Path) -> None:
+        """Install or uninstall something."""
+        subprocess.run([*PIP, "--python", self.python, *words], check=True)
+
+    def installed(self, name: str) -> Distribution:
+        """Return a distribution in it."""
+        (found,) = self.packages.glob(f"{name.replace('-', '_')}-*.dist-info")
+        return Distribution.at(found)
+
+    def share_dependencies(self) -> None:
+        """Put what the tests' Python has behind what is installed here."""
+        folders = [folder for folder in sys.path if folder.endswith("site-packages")]
+        (self.packages / "dependencies.pth").write_text("\n".join(folders))
+
+
+@pytest.fixture(scope="module")
+def wheels(tmp_path_factory: pytest.TempPathFactory) -> Wheels:
+    """Build our wheel, and fetch the neighbour's."""
+    folder = tmp_path_factory.mktemp("wheels")
+    constraints = HOME.parent / "constraints.txt"
+    words = ["download", "--no-deps", "--dest", folder, "--constraint", constraints, NEIGHBOUR]
+    fetched = subprocess.run([*PIP, *words], capture_output=True, text=True, check=False)
+    if fetched.returncode:
+        pytest.skip(f"no package index gives {NEIGHBOUR}: {fetched.stderr.strip().splitlines()[-1]}")
+    subprocess.run([*PIP, "wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", folder, HOME.parent], check=True)
+    (ours,), (theirs,) = folder.glob("gridpeers-*.whl"), folder.glob("openai_agents-*.whl")
+    return Wheels(ours, theirs)
+
+
+@pytest.mark.parametrize("ours_first", [True, False])
+def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(
+    ours_first: bool, wheels: Wheels, tmp_path: Path
+) -> None:
+    """In either order no file is overwritten, a run has the same bytes, and it runs on when the other one is gone."""
+    venv.create(tmp_path / "venv", symlinks=True)
+    fresh = Environment(tmp_path / "venv")
+    for wheel in wheels if ours_first else reversed(wheels):
+        fresh.pip("install", "--no-deps", "--no-index", "--no-compile", wheel)
+    ours, theirs = (
+        {str(file) for file in fresh.installed(name).files or () if not str(file).startswith("..")}
+        for name in ("gridpeers", NEIGHBOUR)
+    )
+    elsewhere = tmp_path / "elsewhere"
+    (elsewhere / "scenarios").mkdir(parents=True)
+    (elsewhere / "scenarios" / "__init__.py").write_text("raise ImportError('a user has a package scenarios')")
+
+    assert ours & theirs == set()
+    assert any(file.startswith("agents/") for file in theirs)
+    assert {file.partition("/")[0].partition("-")[0] for file in ours} == {"gridpeers"}
+
+    fresh.share_dependencies()
+    words = ["-m", "gridpeers", "run", "islanding", "--case", "IV", "--out", "out"]
+    done = subprocess.run([fresh.python, *words], cwd=elsewhere, capture_output=True, text=True, check=False)
+
+    assert done.returncode == 0, done.stderr
+    recorded, _ = ran("islanding", "IV")
+    (history,) = (elsewhere / "out").rglob("history.csv")
+    assert sha256(history.read_bytes()).hexdigest() == recorded.sha256
+
+    fresh.pip("uninstall", "--yes", NEIGHBOUR)
+    subprocess.run([fresh.python, "-m", "gridpeers", "check", "islanding"], cwd=elsewhere, check=True)
+
+
+def test_the_wheel_has_every_file_of_every_room(wheels: Wheels, tmp_path: Path) -> None:
+    """Also of those that are linked, and the mark that says that its types can be checked."""
+    with ZipFile(wheels.gridpeers) as archive:
+        names = {name for name in archive.namelist() if name.startswith("gridpeers/")}
+    words = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(words, cwd=HOME.parent, capture_output=True, text=True, check=True)
+    rooms = {link.name for link in HOME.iterdir() if link.is_symlink()}
+    expected = {
+        name if name.startswith("gridpeers/") else f"gridpeers/{name}"
+        for name in listed.stdout.splitlines()
+        if name.partition("/")[0] in rooms | {"gridpeers"} and not (HOME.parent / name).is_symlink()
+    }
+
+    assert names == expected
+    assert "gridpeers/py.typed" in names
