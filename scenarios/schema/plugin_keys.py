@@ -19,7 +19,7 @@ from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
-from gridpeers.scenarios.checks.check_registry import CHECKS, check_name, chosen_checks, switched_off
+from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, check_name, chosen_checks, switched_off
 from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, CLAIMS
 from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
 from gridpeers.scenarios.schema.participants import with_agent
@@ -85,6 +85,11 @@ def checks_of(scenario: ScenarioModel) -> dict[str, Plugin]:
 def checks_off(scenario: ScenarioModel) -> tuple[str, ...]:
     """Return the names of the checks of every run that a scenario switches off."""
     return switched_off(scenario.checks)
+
+
+def judges_laws(scenario: ScenarioModel) -> bool:
+    """Whether a law that fails, fails the run: a scenario may switch that check off."""
+    return LAW_FAILED not in checks_off(scenario)
 
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:

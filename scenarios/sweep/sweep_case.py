@@ -20,7 +20,6 @@ from gridpeers.plant.build import build_plant
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.tables import read_feeder
-from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.findings import Findings, find
@@ -31,7 +30,7 @@ from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in, configs
-from gridpeers.scenarios.schema.plugin_keys import checks_off
+from gridpeers.scenarios.schema.plugin_keys import judges_laws
 from gridpeers.wire.printable import utf8
 
 KEPT_PLANTS = 4
@@ -105,7 +104,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
         stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
         return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke), None
     failed_laws = first_of(law_failures(outcome.events))
-    failed_check = bool(failed_laws) and LAW_FAILED not in checks_off(scenario)
+    failed_check = bool(failed_laws) and judges_laws(scenario)
     recorded = recorder.finish(scenario.time.end_s, scenario.time.record_s)
     links = recorded.links
     record = CaseRecord.of(scenario, feeder, case, recorded)

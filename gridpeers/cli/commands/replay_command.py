@@ -146,12 +146,11 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
-    from gridpeers.scenarios.checks.check_registry import LAW_FAILED
     from gridpeers.scenarios.replay.changes import changed_rule
     from gridpeers.scenarios.results.broken_folder import broken_if_ended
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.results.run_files import new_folder, shown, write_whole
-    from gridpeers.scenarios.schema.plugin_keys import checks_off
+    from gridpeers.scenarios.schema.plugin_keys import judges_laws
     from gridpeers.studies.replaying import counterfactual_in
 
     rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
@@ -168,7 +167,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     typer.echo(f"\nWhat would have been: {shown(folder)}/; figure: {shown(figure)}")
     if done.difference is not None:
         typer.echo(f"It is not to be trusted: before the change, {done.difference}")
-    failed = len(done.would_be.failures) > 0 and LAW_FAILED not in checks_off(rule.scenario)
+    failed = len(done.would_be.failures) > 0 and judges_laws(rule.scenario)
     return done.difference is not None or failed
 
 

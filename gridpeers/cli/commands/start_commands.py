@@ -91,7 +91,6 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
-        from gridpeers.scenarios.checks.check_registry import LAW_FAILED
         from gridpeers.scenarios.live.launch.link_log import LinkLog, check_new
         from gridpeers.scenarios.live.launch.live_folders import folders, live_record
         from gridpeers.scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
@@ -101,7 +100,7 @@ def _start(
         from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from gridpeers.scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
         from gridpeers.scenarios.results.metrics_file import RunMetrics
-        from gridpeers.scenarios.schema.plugin_keys import checks_off
+        from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
         check_new(record)
         spec = chosen(spec, chosen_case(spec, case), None)
@@ -152,7 +151,7 @@ def _start(
             elif outcome.failed_laws:
                 typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
         stopped = ended_by_a_law(spec.on_law_failure, outcome.failed_laws)
-        judged = bool(outcome.failed_laws) and LAW_FAILED not in checks_off(spec)
+        judged = bool(outcome.failed_laws) and judges_laws(spec)
         _finish(outcome, law_failed=stopped or (judged and not outcome.broke))
 
 
