@@ -6,6 +6,7 @@ import contextlib
 import threading
 from collections.abc import Callable, Collection
 from pathlib import Path
+from queue import SimpleQueue
 from time import monotonic
 
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
@@ -20,7 +21,7 @@ from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.rate_limit import RateLimit
 from gridpeers.wire.trust.credentials import Credentials
 
-_STOP, _CRASH = "stop", "crash/"
+_STOP, _CRASH = "stop", "crash"
 
 _ON = "; the run goes on without it"
 
@@ -73,6 +74,8 @@ class LiveRecorder:
         """By agent, the first failure of its law."""
         self.cut_short = ""
         """Why the plant's last message does not come, if that is known."""
+        self._crashes: SimpleQueue[tuple[str, str]] = SimpleQueue()
+        """Agent and end in words, one for each `_CRASH` that the thread is told."""
         self._limit = RateLimit()
         self._run, self._endpoint = run, endpoint
         self.client: TelemetryClient
@@ -101,7 +104,8 @@ class LiveRecorder:
 
     def note_crash(self, agent: str, end: str) -> None:
         """Note that the process of an agent crashed, with how it ended in words; from any thread."""
-        self.client.say(f"{_CRASH}{agent}/{end}")
+        self._crashes.put((agent, end))
+        self.client.say(_CRASH)
 
     def _say_all(self, *lines: str) -> None:
         for line in lines:
@@ -142,7 +146,7 @@ class LiveRecorder:
             for word in self.client.take(None):
                 if word == _STOP:
                     return
-                self.client.note_crash(*word.removeprefix(_CRASH).split("/", 1))
+                self.client.note_crash(*self._crashes.get())
             free_lists.tend(monotonic())
         self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
