@@ -25,10 +25,10 @@ from bench.peers.mesh import DEADLINE, HUB, WARM_UP, MeshMember
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""As ours (docs/protocol.md): with Zenoh's defaults the floor is higher."""
+"""Threads of Zenoh as gridpeers has them (docs/protocol.md); with the defaults a tick takes longer."""
 
 ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
-"""As the clients of our relay."""
+"""Threads of a member that reaches the others through the hub, as our agents do through the plant."""
 
 
 class ZenohTransport:

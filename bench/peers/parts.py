@@ -31,7 +31,7 @@ class Extent(NamedTuple):
 
 
 SHORT = Extent(rounds=1, end=0.2, mesh_rounds=5, runs=2, scale=((9, 100),))
-"""As much as a test needs."""
+"""The smallest extent that runs every part, for tests."""
 
 SCALED, SHORTEST = 600, 4
 """Agents times simulated seconds, and least simulated time (s), of a run of the part "scale"."""
@@ -116,4 +116,4 @@ PARTS: dict[str, Callable[[Extent], Sequence[Measure]]] = {
     "tick": tick,
     "scale": scale,
 }
-"""What makes the measures of each part, which take turns."""
+"""By part, the function that returns its measures; rivals of a part take turns."""

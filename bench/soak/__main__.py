@@ -5,11 +5,12 @@
 
 Agents leave, join, are killed and frozen; links are cut, healed and impaired; loads and a switch change: by the
 commands of a user, drawn from the seed. Two agents stay all the time. Measured are memory (anonymous, resident) and
-open files of every process, late steps of the plant with what explains them, and how long all takes.
+open files of every process, late steps of the plant, and how long all takes.
 
-SIGTERM or Ctrl-C ends the run after the disturbance that goes on, and what there is is judged. A second one ends all at
-once. Exit code: 0 all limits are kept, 1 one is not, 2 bad usage, 3 the run broke, 130 and 143 ended by Ctrl-C and
-SIGTERM.
+SIGTERM or Ctrl-C ends the run after the present disturbance; what was measured until then is judged. A second one
+ends all at once.
+
+Exit code: 0 all limits are kept, 1 one is not, 2 bad usage, 3 the run broke, 130 ended by Ctrl-C, 143 by SIGTERM.
 """
 
 from __future__ import annotations
@@ -56,7 +57,7 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.disturbing = False
-        """Whether the run is disturbed now: then the first signal ends it well, after the disturbance."""
+        """Whether a disturbance is under way; the first signal then waits for its end."""
         self.asked: signal.Signals | None = None
         """The signal that asked for it."""
 

@@ -85,7 +85,7 @@ AUTOTESTS = ValidationPart("autotests", ("gridlabd",), CASES, _run)
 
 
 TOLERANCE = 100.0
-"""Of the autotest (VA)."""
+"""Largest difference in power that the autotest lets pass (VA)."""
 
 
 def compare_published(folder: Path) -> int:

@@ -40,7 +40,7 @@ S_RATED = 4e6
 """Rating of storage and transformer (VA)."""
 
 Z_T = 0.005 + 0.05j
-"""Of the transformer (pu)."""
+"""Impedance of the transformer (pu)."""
 
 X_GFM = 1e-3 / sqrt(1.0625)
 """Reactance of OpenDSS's grid-forming source (pu): kV^2/kVA, taken as ohm; its resistance is a quarter of it."""

@@ -44,9 +44,9 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """One run: the events and limits that both plants go through; what is left out is the scenario's."""
 
     text: str
-    """What it is, in a few words."""
+    """Title in the table."""
     case: str
-    """Of the scenario."""
+    """Case of the scenario."""
     scenario: str = "islanding"
     """Scenario of the catalogue that it starts from."""
     gfl: GflParameters | None = None
@@ -57,7 +57,7 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reclosing: Reclosing | None = None
     """Instead of events."""
     single_phase: bool = False
-    """Whether it has the inverters of `ON_ONE_PHASE`, too."""
+    """Whether the inverters of `ON_ONE_PHASE` are added."""
     tolerance: float = 1e-8
     """Largest difference (Hz, pu) that passes."""
     in_tests: bool = True

@@ -274,9 +274,9 @@ class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
     edge: Exponent = 0.0
     """Exponent by which its current meets these limits."""
     V_off_pu: LimitOfV = 0.0
-    """Voltage around which it drops out below; 0: nowhere."""
+    """Voltage below which it drops out; 0: it never does."""
     V_off_above_pu: LimitOfV = 0.0
-    """Voltage around which it drops out above; 0: nowhere."""
+    """Voltage above which it drops out; 0: it never does."""
 
 
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):
