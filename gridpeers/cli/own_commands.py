@@ -48,7 +48,6 @@ OWN_COMMANDS = {
         ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
         ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
         ("watch", "live_commands:watch", "Watch a run as a live table; q quits."),
-        ("view", "view_command:view", "Show a run in the browser: feeder, links, strips and agents."),
         ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
         ("event", "live_commands:event", "Open or close a switch of a running plant."),
         ("load", "load_command:load", "Set a load of a running plant."),

@@ -139,9 +139,3 @@ def fail(lines: list[str], code: int) -> NoReturn:
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)
     raise SystemExit(code)
-
-
-def require_page() -> None:
-    """End with a clear line if the packages of the page are not installed."""
-    modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
-    require(modules, "install it: pip install 'gridpeers[view]'")

@@ -33,7 +33,7 @@ from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.show.link_table import links_text
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.record import Recorder, RecordError
-from gridpeers.scenarios.view.run_view import Cursor, RunView
+from gridpeers.viewer.run_view import Cursor, RunView
 from gridpeers.wire.codec import CRC, RejectedError, decode, encode
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry

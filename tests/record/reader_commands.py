@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.cli.own_commands import OWN_COMMANDS
+from gridpeers.cli.contributed import COMMANDS
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 
@@ -26,7 +26,7 @@ def assert_commands_read(record: RunRecord, agent: str = "inv4") -> None:
         "replay": (file,),
     }
     for name, arguments in commands.items():
-        if (command := name.split()[0]) not in OWN_COMMANDS:
+        if (command := name.split()[0]) not in COMMANDS.names:
             continue
         code, printed = invoke(command, *arguments)
         if not begun:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
 from gridpeers.cli.commands.options import Keys
-from gridpeers.cli.page_beside import page_beside, page_socket
 from gridpeers.cli.usage import (
     BAD_INPUT,
     BROKEN,
@@ -25,6 +25,7 @@ from gridpeers.cli.usage import (
     terminal,
 )
 from gridpeers.plant.simulator import Simulator
+from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:
     import socket
@@ -104,7 +105,7 @@ def run(
     if port is not None and not view:
         fail(["--port: goes with a page; add --view"], BAD_INPUT)
     pace = Pace(clock=clock, speed=speed, strict=strict, processes=processes, keys=keys)
-    page = page_socket(port) if view else None
+    page = ROOMS.resolve("page_socket")(port) if view else None
     chosen_cases = chosen(spec, case, seed)
     carry_out(chosen_cases, feeder, driver, out, pace, require_checks=require_checks, page=page)
 
@@ -189,7 +190,7 @@ def carry_out(
         explanation = RESTING
     request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, outside=outside, **pace)
     left = f"what came until then is in {shown(folder)}/"
-    with page_beside(folder, page, spec.name):
+    with ROOMS.resolve("page_beside")(folder, page, spec.name) if page else nullcontext():
         try:
             with ended_by_signals(left), progress(console, tuple(spec.cases), explanation) as tell:
                 report = run_scenario(request, tell)

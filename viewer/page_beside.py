@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, require_page
+from gridpeers.cli.usage import BAD_INPUT, fail, require
 
 if TYPE_CHECKING:
     import socket
@@ -18,11 +18,17 @@ HERE, PORT = "127.0.0.1", 8123
 """Where a page is opened if nothing else is said: on this host alone."""
 
 
+def require_page() -> None:
+    """End with a clear line if the packages of the page are not installed."""
+    modules = dict.fromkeys(("starlette", "uvicorn", "websockets"), "the page")
+    require(modules, "install it: pip install 'gridpeers[view]'")
+
+
 def page_socket(port: int | None) -> socket.socket:
     """Return a socket for the page; or end with a clear line, before anything is started."""
     require_page()
     from gridpeers.scenarios.live.client.run_address import UsageError
-    from gridpeers.scenarios.view.page_address import listen
+    from gridpeers.viewer.page_address import listen
 
     try:
         return listen(HERE, PORT if port is None else port)
@@ -31,14 +37,11 @@ def page_socket(port: int | None) -> socket.socket:
 
 
 @contextmanager
-def page_beside(folder: Path, listening: socket.socket | None, name: str) -> Iterator[None]:
-    """Open the page of a run folder, if there is a socket for it; after a run that ended well wait for Ctrl-C."""
-    if listening is None:
-        yield
-        return
+def page_beside(folder: Path, listening: socket.socket, name: str) -> Iterator[None]:
+    """Open the page of a run folder on a socket; after a run that ended well wait for Ctrl-C."""
     from gridpeers.cli.interruption import interruptible
-    from gridpeers.scenarios.view.page_address import url_of
-    from gridpeers.scenarios.view.recorded.page_process import PageProcess
+    from gridpeers.viewer.page_address import url_of
+    from gridpeers.viewer.recorded.page_process import PageProcess
 
     url = url_of(listening, HERE)
     with PageProcess(folder, listening) as page:

@@ -11,8 +11,8 @@ import msgspec
 
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-from gridpeers.scenarios.view.recorded.record_view import RecordView
-from gridpeers.scenarios.view.run_view import EventView
+from gridpeers.viewer.recorded.record_view import RecordView
+from gridpeers.viewer.run_view import EventView
 
 STILL = 3.0
 """Time (s) after which a record that does not grow is no longer followed: its writer has a chunk every 0.25 s."""

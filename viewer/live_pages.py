@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from gridpeers.scenarios.live.client.run_address import RunAddress
-from gridpeers.scenarios.view.own_agents import OwnAgents
-from gridpeers.scenarios.view.page_actions import ActionClient, PageAction, command_line
-from gridpeers.scenarios.view.page_rights import looks_only
-from gridpeers.scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
-from gridpeers.scenarios.view.run_follower import RunFollower
-from gridpeers.scenarios.view.run_view import Cursor
-from gridpeers.scenarios.view.scenario_form import scenario_form
+from gridpeers.viewer.own_agents import OwnAgents
+from gridpeers.viewer.page_actions import ActionClient, PageAction, command_line
+from gridpeers.viewer.page_rights import looks_only
+from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
+from gridpeers.viewer.run_follower import RunFollower
+from gridpeers.viewer.run_view import Cursor
+from gridpeers.viewer.scenario_form import scenario_form
 from gridpeers.wire.foreign_bytes import decode_foreign
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ import pytest
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.view.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
-from gridpeers.scenarios.view.recorded.recorded_run import STILL, RecordedRun
+from gridpeers.viewer.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
+from gridpeers.viewer.recorded.recorded_run import STILL, RecordedRun
 from tests.record.recorded_runs import recorded_in_chunks
 
 ISLANDED = """

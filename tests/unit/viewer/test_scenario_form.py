@@ -9,8 +9,8 @@ import pytest
 
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_model import LoadChange, ScenarioModel
-from gridpeers.scenarios.view.page_actions import PageAction
-from gridpeers.scenarios.view.scenario_form import scenario_form
+from gridpeers.viewer.page_actions import PageAction
+from gridpeers.viewer.scenario_form import scenario_form
 from tests.scenario_files import written
 
 SCENARIO = """

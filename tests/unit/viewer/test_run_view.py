@@ -10,9 +10,9 @@ import pytest
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.emulation.link_reports import LinkStatus
 from gridpeers.scenarios.live.requests.plant_status import PlantStatus
-from gridpeers.scenarios.view.liveness import FROZEN
-from gridpeers.scenarios.view.run_view import Cursor, RunView
-from gridpeers.scenarios.view.strips import LENGTH, STEP
+from gridpeers.viewer.liveness import FROZEN
+from gridpeers.viewer.run_view import Cursor, RunView
+from gridpeers.viewer.strips import LENGTH, STEP
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 from tests.toy.toy_configs import agent_config
 

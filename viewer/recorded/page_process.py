@@ -11,9 +11,9 @@ from types import TracebackType
 
 import msgspec
 
-from gridpeers.scenarios.view.page_server import PageOptions, PageServer
-from gridpeers.scenarios.view.recorded.record_pages import RecordPages
-from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
+from gridpeers.viewer.page_server import PageOptions, PageServer
+from gridpeers.viewer.recorded.record_pages import RecordPages
+from gridpeers.viewer.recorded.recorded_run import RecordedRun
 from gridpeers.wire.driver.process import LEASH
 
 LEAVING = 5.0
@@ -54,7 +54,7 @@ class PageProcess:
         descriptor = listening.fileno()
         config = PageConfig(path=str(folder), descriptor=descriptor, hosts=PageOptions().hosts)
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "gridpeers.scenarios.view.recorded", LEASH, "view"],
+            [sys.executable, "-P", "-m", "gridpeers.viewer.recorded", LEASH, "view"],
             stdin=subprocess.PIPE,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,

@@ -17,8 +17,8 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from gridpeers.scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
-from gridpeers.scenarios.view.own_agents import OwnAgents
-from gridpeers.scenarios.view.page_actions import ActionClient, ActionKind, PageAction, command_line
+from gridpeers.viewer.own_agents import OwnAgents
+from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, command_line
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, AnyMessage, Command, LoadSetting, Pacing
@@ -84,7 +84,7 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[Command]:
     """What the plant is told by the page, or by a command that is typed."""
     told: list[Command] = []
     monkeypatch.setattr(Plant, "commands", told, raising=False)
-    monkeypatch.setattr("gridpeers.scenarios.view.page_actions.RunClient", Plant)
+    monkeypatch.setattr("gridpeers.viewer.page_actions.RunClient", Plant)
     monkeypatch.setattr("gridpeers.scenarios.live.client.run_client.RunClient", Plant)
     return told
 

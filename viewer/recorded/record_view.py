@@ -18,14 +18,14 @@ from gridpeers.scenarios.live.requests.plant_status import PlantStatus
 from gridpeers.scenarios.live.show.feeder_map import FeederMap, feeder_map
 from gridpeers.scenarios.live.show.snapshot import InverterStatus
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.view.link_states import LinkView
-from gridpeers.scenarios.view.liveness import LivenessView
-from gridpeers.scenarios.view.recorded.agent_moments import AgentMoment, AgentMoments
-from gridpeers.scenarios.view.recorded.inverter_ring import feeder_of, inverter_ring
-from gridpeers.scenarios.view.recorded.link_faults import NO_MESSAGES, LinkFaults
-from gridpeers.scenarios.view.recorded.plant_rows import PlantRows
-from gridpeers.scenarios.view.run_view import Cursor, EventView, Frame, RunView
-from gridpeers.scenarios.view.strips import LENGTH
+from gridpeers.viewer.link_states import LinkView
+from gridpeers.viewer.liveness import LivenessView
+from gridpeers.viewer.recorded.agent_moments import AgentMoment, AgentMoments
+from gridpeers.viewer.recorded.inverter_ring import feeder_of, inverter_ring
+from gridpeers.viewer.recorded.link_faults import NO_MESSAGES, LinkFaults
+from gridpeers.viewer.recorded.plant_rows import PlantRows
+from gridpeers.viewer.run_view import Cursor, EventView, Frame, RunView
+from gridpeers.viewer.strips import LENGTH
 from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
 WINDOW = 1.0

@@ -11,13 +11,13 @@ from urllib.parse import quote
 import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
-from gridpeers.cli.page_beside import HERE, PORT
-from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require, require_page
+from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
 from gridpeers.scenarios.live.client.access import Access
+from gridpeers.viewer.page_beside import HERE, PORT, require_page
 from gridpeers.wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
-    from gridpeers.scenarios.view.page_server import Pages
+    from gridpeers.viewer.page_server import Pages
 
 Line = Callable[[str], str]
 """Makes the line that a command prints, from the address of its page."""
@@ -76,9 +76,9 @@ def _live(
 ) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a live run, and the line that tells their address."""
     with run_client(run, connect, wait, access, meet_agents=True, acts=control) as client:
-        from gridpeers.scenarios.view.live_pages import LivePages
-        from gridpeers.scenarios.view.page_rights import looks_only
-        from gridpeers.scenarios.view.run_follower import RunFollower
+        from gridpeers.viewer.live_pages import LivePages
+        from gridpeers.viewer.page_rights import looks_only
+        from gridpeers.viewer.run_follower import RunFollower
 
         rights = "" if control else f"; {looks_only(client.where.credentials)}"
         with RunFollower(client) as follower:
@@ -94,8 +94,8 @@ def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     require({"mcap": "the record of a run"})
     from gridpeers.scenarios.record.record_path import record_path
     from gridpeers.scenarios.record.record_reader import RecordFileError
-    from gridpeers.scenarios.view.recorded.record_pages import RecordPages
-    from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
+    from gridpeers.viewer.recorded.record_pages import RecordPages
+    from gridpeers.viewer.recorded.recorded_run import RecordedRun
 
     try:
         path = record_path(path, case).parent if case else path
@@ -110,12 +110,12 @@ def _serve(
 ) -> NoReturn:
     """Serve pages until a signal comes."""
     with usage_errors():
-        from gridpeers.scenarios.view.page_address import access, listen, url_of
+        from gridpeers.viewer.page_address import access, listen, url_of
 
         token, hosts = access(address, token)
         listening = listen(address, port)  # first: a port in use is told at once
     with listening, pages() as (shown, line):
-        from gridpeers.scenarios.view.page_server import PageOptions, PageServer
+        from gridpeers.viewer.page_server import PageOptions, PageServer
         from gridpeers.wire.driver.drive import StoppedError
 
         watch_readers(quits=False)

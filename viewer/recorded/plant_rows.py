@@ -9,8 +9,8 @@ from typing import NamedTuple
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.view.liveness import FROZEN
-from gridpeers.scenarios.view.strips import LENGTH, Point, next_due, point_of
+from gridpeers.viewer.liveness import FROZEN
+from gridpeers.viewer.strips import LENGTH, Point, next_due, point_of
 from gridpeers.wire.messages import Telemetry
 
 LENGTHS = (LENGTH / 4.0, LENGTH / 2.0, LENGTH)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from gridpeers.scenarios.schema.scenario_writing import inline
-from gridpeers.scenarios.view.page_actions import PageAction
+from gridpeers.viewer.page_actions import PageAction
 
 
 def scenario_form(action: PageAction) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from typing import Any, cast
 
-from gridpeers.scenarios.view.page_server import texts
+from gridpeers.viewer.page_server import texts
 
 
 class Socket:

@@ -13,10 +13,10 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.scenarios.record.record_reader import RecordFileError
-from gridpeers.scenarios.view.link_states import LinkView
-from gridpeers.scenarios.view.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
-from gridpeers.scenarios.view.recorded.record_view import RecordView
-from gridpeers.scenarios.view.recorded.recorded_run import RecordedRun
+from gridpeers.viewer.link_states import LinkView
+from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
+from gridpeers.viewer.recorded.record_view import RecordView
+from gridpeers.viewer.recorded.recorded_run import RecordedRun
 from gridpeers.wire.bounds import Text
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.foreign_bytes import decode_foreign

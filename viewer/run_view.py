@@ -17,9 +17,9 @@ from gridpeers.scenarios.live.requests.plant_status import PlantStatus
 from gridpeers.scenarios.live.show.feeder_map import FeederMap
 from gridpeers.scenarios.live.show.run_monitor import SILENT, RunMonitor
 from gridpeers.scenarios.live.show.snapshot import InverterStatus
-from gridpeers.scenarios.view.link_states import AGE_STEP, LinkStates, LinkView
-from gridpeers.scenarios.view.liveness import Liveness, LivenessView
-from gridpeers.scenarios.view.strips import Point, Strips
+from gridpeers.viewer.link_states import AGE_STEP, LinkStates, LinkView
+from gridpeers.viewer.liveness import Liveness, LivenessView
+from gridpeers.viewer.strips import Point, Strips
 from gridpeers.wire.messages import AgentStatus, PlantEvent, Telemetry
 
 KEPT = 200

@@ -15,7 +15,7 @@ from gridpeers.scenarios.live.client.run_client import RunClient
 from gridpeers.scenarios.live.requests.plant_status import PlantStatus
 from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.show.watching import RunSubscriber
-from gridpeers.scenarios.view.run_view import Cursor, Frame, RunView
+from gridpeers.viewer.run_view import Cursor, Frame, RunView
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry
 

@@ -16,7 +16,7 @@ pytest.importorskip("uvicorn", reason="the page needs the extra view")
 SERVER = """
 import asyncio, functools, socket, uvicorn
 uvicorn.Config = functools.partial(uvicorn.Config, ws_ping_interval=0.1, ws_ping_timeout=0.1)
-from gridpeers.scenarios.view.page_server import PageOptions, PageServer, send, texts
+from gridpeers.viewer.page_server import PageOptions, PageServer, send, texts
 class Pages:
     def begin(self): pass
     def end(self): pass

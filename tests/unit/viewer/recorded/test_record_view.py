@@ -10,8 +10,8 @@ import msgspec
 import pytest
 
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.view.recorded.record_view import RecordView
-from gridpeers.scenarios.view.run_view import Frame
+from gridpeers.viewer.recorded.record_view import RecordView
+from gridpeers.viewer.run_view import Frame
 from gridpeers.wire.messages import PlantEvent
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run
 
