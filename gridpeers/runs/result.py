@@ -12,6 +12,7 @@ import msgspec
 import pandas as pd
 
 from gridpeers.plant.equipment import Feeder
+from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import draw
@@ -37,7 +38,7 @@ from gridpeers.wire.schema.suggestion import suggestion
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from gridpeers.scenarios.explanation.explanation import Explanation
+    from gridpeers.lab.explanation.explanation import Explanation
     from gridpeers.scenarios.record.record_reader import RunRecord
 
 
@@ -273,9 +274,8 @@ class Result(_FromFolder):
         RecordFileError
             If the run was not recorded, there was no such agent, or it had not decided by then.
         """
-        from gridpeers.scenarios.explanation.explanation import explain
-
-        return explain(self.run_record, agent, t)
+        found: Explanation = ROOMS.resolve("explain")(self.run_record, agent, t)
+        return found
 
     @cached_property
     def sha256(self) -> str:

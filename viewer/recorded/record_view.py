@@ -13,7 +13,7 @@ from itertools import takewhile
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment.load_powers import set_power
-from gridpeers.scenarios.explanation.explanation import explain
+from gridpeers.rooms import ROOMS
 from gridpeers.scenarios.live.requests.plant_status import PlantStatus
 from gridpeers.scenarios.live.show.feeder_map import FeederMap, feeder_map
 from gridpeers.scenarios.live.show.snapshot import InverterStatus
@@ -135,7 +135,7 @@ class RecordView:
             If it had not decided, or the record does not have it.
         """
         self.events  # noqa: B018  reads them, if there are more
-        return str(explain(self.record, agent, t, tuple(self._plant_events)))
+        return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
 
     # ---------------------------------------------------------------- inner
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from gridpeers.scenarios.explanation.explanation import explain
+from gridpeers.lab.explanation.explanation import explain
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 from tests.processes.terminals import Desk, Terminal

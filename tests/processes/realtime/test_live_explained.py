@@ -10,12 +10,12 @@ import msgspec
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.lab.explanation.explanation import explained
+from gridpeers.lab.explanation.law_step import law_step
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
-from gridpeers.scenarios.explanation.explanation import explained
-from gridpeers.scenarios.explanation.law_step import law_step
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.trace.flows import flows

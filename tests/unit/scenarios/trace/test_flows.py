@@ -15,7 +15,7 @@ from gridpeers.scenarios.trace.flows import Flow, flows
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import SentMessage
 from tests.record.fake_clock import fake_clock_record
-from tests.unit.scenarios.explanation.decisions import state
+from tests.unit.lab.explanation.decisions import state
 
 
 def judged(*rows: tuple[float, Outcome], clock: str = "simulated") -> list[Flow]:

@@ -115,7 +115,7 @@ def test_the_links_are_as_the_decisions_have_them(record: RunRecord, view: Recor
 
 def test_all_links_of_a_healthy_record_carry_what_is_sent(tmp_path: Path) -> None:
     """Both ways of each link, whichever agent comes first, from the first second on; ages are those of `why`."""
-    from gridpeers.scenarios.explanation.explanation import explain
+    from gridpeers.lab.explanation.explanation import explain
 
     scenario = ISLANDED.partition("[[link]]")[0]
     (tmp_path / "it.toml").write_text(scenario, encoding="utf-8")
@@ -202,7 +202,7 @@ def test_a_page_gets_what_it_lacks(view: RecordView) -> None:
 
 def test_a_decision_is_explained(record: RunRecord, view: RecordView) -> None:
     """A page shows what `gridpeers why` prints."""
-    from gridpeers.scenarios.explanation.explanation import explain
+    from gridpeers.lab.explanation.explanation import explain
 
     assert view.decision("inv4", 0.7) == str(explain(record, "inv4", 0.7))
     assert "10 states since: 10 cut off by a cut link" in view.decision("inv4", 0.7)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from gridpeers.agents.laws.law import Term
-from gridpeers.scenarios.explanation.law_step import LawStep, law_step
+from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 

@@ -9,11 +9,11 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
-from gridpeers.scenarios.explanation import law_step as module
-from gridpeers.scenarios.explanation.law_step import LawStep, law_step
+from gridpeers.lab.explanation import law_step as module
+from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from tests.toy.toy_configs import ALL_FULL, agent_config
-from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of
+from tests.unit.lab.explanation.decisions import decision, neighbour, record_of
 
 
 class Counting(Law):

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from gridpeers.agents.laws.law import Term
-from gridpeers.scenarios.explanation import trail as module
-from gridpeers.scenarios.explanation.law_step import LawStep, QuantityStep
-from gridpeers.scenarios.explanation.trail import TrailStep, trail
+from gridpeers.lab.explanation import trail as module
+from gridpeers.lab.explanation.law_step import LawStep, QuantityStep
+from gridpeers.lab.explanation.trail import TrailStep, trail
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from tests.toy.toy_configs import agent_config
-from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
+from tests.unit.lab.explanation.decisions import decision, neighbour, record_of, state
 
 TERMS: dict[tuple[str, int], tuple[Term, ...]] = {
     ("inv1", 10): (Term("own", 0.1), Term("leads", -0.3, "inv2"), Term("follows", 0.2, "inv3")),

@@ -8,10 +8,10 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount
+from gridpeers.lab.explanation.law_step import QuantityStep
+from gridpeers.lab.explanation.trail import Quantity, TrailStep
 from gridpeers.scenarios.console import text_of as printed_text
-from gridpeers.scenarios.explanation.explanation import Explanation, NeighbourAccount
-from gridpeers.scenarios.explanation.law_step import QuantityStep
-from gridpeers.scenarios.explanation.trail import Quantity, TrailStep
 
 SHOWN = 12
 """Most terms that stand in a row of their own: the others are summed."""

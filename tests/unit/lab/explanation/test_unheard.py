@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.lab.explanation.unheard import WORDS, missed, reason, rejections, verdicts
 from gridpeers.netem.ledger import LinkTrace, Outcome
-from gridpeers.scenarios.explanation.unheard import WORDS, missed, reason, rejections, verdicts
 from gridpeers.scenarios.record.message_index import MessageOnWire, on_wire
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount
 from gridpeers.wire.messages import OFF
 from tests.toy.toy_configs import ALL_FULL, agent_config
-from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
+from tests.unit.lab.explanation.decisions import decision, neighbour, record_of, state
 
 EVERY = decision(neighbour("inv2", 5), state=None)
 NOBODY = record_of(messages=lambda *words, **more: iter(()))

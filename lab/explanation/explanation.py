@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gridpeers.agents.laws.law import Neighbour
-from gridpeers.scenarios.explanation.last_decision import aftermath
-from gridpeers.scenarios.explanation.law_step import LawStep, law_step
-from gridpeers.scenarios.explanation.unheard import absence, missed, reason, rejections, verdicts
+from gridpeers.lab.explanation.last_decision import aftermath
+from gridpeers.lab.explanation.law_step import LawStep, law_step
+from gridpeers.lab.explanation.unheard import absence, missed, reason, rejections, verdicts
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
 from gridpeers.scenarios.short_names import short
@@ -71,7 +71,7 @@ class Explanation:
 
     def __str__(self) -> str:
         """Return it in words and numbers."""
-        from gridpeers.scenarios.explanation.explanation_text import text_of
+        from gridpeers.lab.explanation.explanation_text import text_of
 
         return text_of(self)
 

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from gridpeers.scenarios.explanation.explanation import explained
+from gridpeers.lab.explanation.explanation import explained
 from gridpeers.scenarios.record.message_index import on_wire
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import PlantEvent
-from tests.unit.scenarios.explanation.decisions import decision, neighbour, record_of, state
+from tests.unit.lab.explanation.decisions import decision, neighbour, record_of, state
 
 
 def told(decided: RecordedDecision, *events: PlantEvent, asked: float | None = None) -> Any:
