@@ -28,7 +28,6 @@ OWN_COMMANDS = {
         ("predict", "predict:predict", "Predict from theory how a scenario will go."),
         ("compare", "compare_command:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "metrics_command:metrics", "Measure a run from its record, also one that was killed."),
-        ("trace", "trace_command:trace", "Write a run's messages as a Perfetto trace, or draw them."),
         ("replay", "replay_command:replay", "Replay a recorded run, or show what would have been."),
         ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
         (

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from gridpeers.lab.trace.flows import Flow, flows
+from gridpeers.lab.trace.space_time_diagram import space_time_diagram
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.results.plots.space_time_diagram import space_time_diagram
-from gridpeers.scenarios.trace.flows import Flow, flows
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 

@@ -12,13 +12,13 @@ from msgspec.structs import replace
 
 from gridpeers.lab.explanation.explanation import explained
 from gridpeers.lab.explanation.law_step import law_step
+from gridpeers.lab.trace.flows import flows
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
-from gridpeers.scenarios.trace.flows import flows
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.driver.session import Session

@@ -8,8 +8,8 @@ import matplotlib as mpl
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from gridpeers.lab.trace.flows import Flow
 from gridpeers.scenarios.results.plots.style import PAGE
-from gridpeers.scenarios.trace.flows import Flow
 
 SENT, LOST, REJECTED = "#0072b2", "#d55e00", "#cc79a7"
 """Colours of messages that arrived, were lost, and arrived but were rejected."""

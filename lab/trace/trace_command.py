@@ -71,7 +71,7 @@ def trace(
     try:
         record = RunRecord.open(run, case)
         if svg is None:
-            from gridpeers.scenarios.trace.perfetto_trace import write_perfetto_trace
+            from gridpeers.lab.trace.perfetto_trace import write_perfetto_trace
 
             target = out or record.path.with_name("trace.pftrace")
             arrows = write_perfetto_trace(record, target)
@@ -90,10 +90,10 @@ def trace(
 
 def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str) -> str:
     """Draw the messages of a window; return how many."""
-    from gridpeers.scenarios.results.plots.space_time_diagram import space_time_diagram
+    from gridpeers.lab.trace.flows import flows
+    from gridpeers.lab.trace.space_time_diagram import space_time_diagram
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.short_names import in_order, short
-    from gridpeers.scenarios.trace.flows import flows
 
     if since > record.t_end:
         fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)

@@ -8,10 +8,10 @@ from typing import Any, cast
 
 import pytest
 
+from gridpeers.lab.trace.flows import Flow, flows
 from gridpeers.netem.ledger import LinkTrace, Outcome
 from gridpeers.scenarios.record.message_index import on_wire
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.trace.flows import Flow, flows
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import SentMessage
 from tests.record.fake_clock import fake_clock_record
