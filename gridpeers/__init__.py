@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.checks.check_registry import CHECKS
     from gridpeers.scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
-    from gridpeers.scenarios.results.evaluation.claims import Claim
+    from gridpeers.scenarios.results.evaluation.claims import CLAIMS, Claim
     from gridpeers.scenarios.results.evaluation.metric import METRICS
     from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
     from gridpeers.scenarios.results.run_files import FolderError
@@ -76,7 +75,7 @@ _HOME = {
     "WindowData": "gridpeers.scenarios.results.evaluation.window_metrics",
     "catalogue": "gridpeers.scenarios.schema.loading",
     "check": "gridpeers.scenarios.checks.check_registry:CHECKS.register",
-    "claim": "gridpeers.scenarios.results.evaluation.benchmark_registry:CLAIMS.register",
+    "claim": "gridpeers.scenarios.results.evaluation.claims:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "counterfactual": "gridpeers.studies.replaying",
     "graph": "gridpeers.agents.graphs:GRAPHS.register",

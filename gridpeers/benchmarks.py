@@ -5,9 +5,17 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, Benchmark, Published, benchmark_of
-from gridpeers.scenarios.results.evaluation.claims import Claim, Judge, Verdict, judge
-from gridpeers.scenarios.results.evaluation.quantities import DIGITS, HEADINGS, UNITS, Quantity, label
+from gridpeers.scenarios.results.evaluation.claims import (
+    BENCHMARKS,
+    Benchmark,
+    Claim,
+    Judge,
+    Published,
+    Verdict,
+    benchmark_of,
+    judge,
+)
+from gridpeers.scenarios.results.evaluation.metric import DIGITS, HEADINGS, UNITS, Quantity, label
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 

@@ -25,7 +25,7 @@ from gridpeers.scenarios.checks import check_registry
 from gridpeers.scenarios.checks.check_registry import CHECKS
 from gridpeers.scenarios.field_docs import alias_docs, class_doc, field_docs, field_table, markdown_table
 from gridpeers.scenarios.results.evaluation import claims, metric
-from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
+from gridpeers.scenarios.results.evaluation.claims import CLAIMS
 from gridpeers.scenarios.results.evaluation.metric import METRICS
 from gridpeers.scenarios.schema.scenario_model import (
     Case,

@@ -16,12 +16,11 @@ from typing import TYPE_CHECKING, Any, TextIO
 import msgspec
 
 from gridpeers.plant.realtime.pacer import sentence
-from gridpeers.scenarios.results.broken_folder import broken_if_ended
-from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
 from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
 from gridpeers.scenarios.results.record import Recorded
-from gridpeers.scenarios.results.run_files import no_room, refusal, set_complete, shown, write_whole
+from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
 from gridpeers.scenarios.schema.plugin_keys import claims_of
@@ -110,12 +109,12 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             file=log,
             flush=True,
         )
+    from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.checks.checks_file import FILE, verdicts_json
     from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
     from gridpeers.scenarios.results.evaluation.claims import judge, judged
     from gridpeers.scenarios.results.findings import find
-    from gridpeers.scenarios.results.law_failures import law_failures
+    from gridpeers.scenarios.results.recorded_events import law_failures
     from gridpeers.scenarios.results.report import RunReport, plain
 
     cases = {case: CaseRecord.of(scenario, request.feeder, case, record) for case, record in recorded.items()}

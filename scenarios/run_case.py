@@ -17,8 +17,8 @@ from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.figure_processes import prepare_figures
-from gridpeers.scenarios.results.law_failures import ended_by_a_law
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.scenarios.results.recorded_events import ended_by_a_law
 from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of

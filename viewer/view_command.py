@@ -92,7 +92,7 @@ def _live(
 def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a record, and the line that tells their address."""
     require({"mcap": "the record of a run"})
-    from gridpeers.scenarios.record.record_path import record_path
+    from gridpeers.scenarios.record.record_file import record_path
     from gridpeers.scenarios.record.record_reader import RecordFileError
     from gridpeers.viewer.recorded.record_pages import RecordPages
     from gridpeers.viewer.recorded.recorded_run import RecordedRun

@@ -21,9 +21,8 @@ import gridpeers as gp
 from bench.harness import GRIDPEERS
 from bench.soak.judging import LAST_WORDS, ProcessSize
 from bench.soak.soak_monitor import HOLD, SoakMonitor
-from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
-from gridpeers.scenarios.checks.checks_file import FILE as CHECKS
-from gridpeers.scenarios.checks.checks_file import read_verdicts
+from gridpeers.scenarios.checks.check_verdict import FILE as CHECKS
+from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation, read_verdicts
 from gridpeers.scenarios.checks.communication.last_words_check import LastWords
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.live.client.run_address import RunAddress

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
-from gridpeers.scenarios.results.broken_folder import TerminatedError
+from gridpeers.scenarios.results.run_files import TerminatedError
 from gridpeers.wire.driver.stop_signal import StopSignal, ctrl_c_or
 
 

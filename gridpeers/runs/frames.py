@@ -10,8 +10,8 @@ from typing import Any
 import pandas as pd
 
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
-from gridpeers.scenarios.results.law_failures import LawFailure
 from gridpeers.scenarios.results.link_record import COLUMNS
+from gridpeers.scenarios.results.recorded_events import LawFailure
 from gridpeers.scenarios.sweep.column_labels import unit_of
 
 

@@ -16,20 +16,19 @@ from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
 from gridpeers.runs.showing import draw
-from gridpeers.scenarios.checks import checks_file
+from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.live.numbers.departures import compare
 from gridpeers.scenarios.live.numbers.live_figures import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
-from gridpeers.scenarios.results.evaluation.benchmark_registry import benchmark_of
-from gridpeers.scenarios.results.evaluation.claims import Verdict, judge, judged
+from gridpeers.scenarios.results.evaluation.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import History, read_history
-from gridpeers.scenarios.results.law_failures import law_failures
 from gridpeers.scenarios.results.plots.drawing import Drawing, drawing_of
+from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import PlantEvent
@@ -106,8 +105,8 @@ class Results(_FromFolder, Mapping[str, "Result"]):
     def check_verdicts(self, case: str) -> tuple[CheckVerdict, ...]:
         """Return the verdicts of the checks on a case; on a run without them, those that it would get now."""
         if self._checks is None:
-            file = self.folder / checks_file.FILE
-            self._checks = self._folder.read(file.name, checks_file.read_verdicts) if file.exists() else {}
+            file = self.folder / check_verdict.FILE
+            self._checks = self._folder.read(file.name, check_verdict.read_verdicts) if file.exists() else {}
         if case not in self._checks:
             self._checks[case] = judge_case(self[case].checked_case)
         return self._checks[case]

@@ -13,7 +13,7 @@ from gridpeers.runs.choices import Pace, check_how, with_cases
 from gridpeers.runs.result import Result, Results
 from gridpeers.runs.run_folder import RunFolder, as_folder, new_home
 from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
-from gridpeers.scenarios.results.law_failures import first_of
+from gridpeers.scenarios.results.recorded_events import first_of
 from gridpeers.scenarios.results.run_files import FolderError, is_complete
 from gridpeers.scenarios.run import run as run_request
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, Progress, Request

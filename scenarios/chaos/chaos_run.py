@@ -21,7 +21,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.record import Recorded
-from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel

@@ -11,8 +11,8 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.bus_islands import bus_islands
 from gridpeers.scenarios.chaos.chaos_checks import RESTORED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
-from gridpeers.scenarios.results.switch_positions import closed_switches
-from gridpeers.scenarios.results.tripped_inverters import tripped_by
+from gridpeers.scenarios.results.island_membership import closed_switches
+from gridpeers.scenarios.results.recorded_events import tripped_by
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
 

@@ -1,14 +1,19 @@
-"""The verdict of a check on a run: its status, and each violation with time, agent, value, unit and limit."""
+"""The verdict of a check on a run: its status, each violation with time, agent, value, unit, limit; checks.json."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import msgspec
 
+from gridpeers.scenarios.results.history import History
+from gridpeers.wire.schema.plausible import Plausible, Unit
+
 if TYPE_CHECKING:
     from gridpeers.scenarios.checks.checked_case import CheckedCase
+
 
 CheckStatus = Literal["passed", "failed", "not judged", "off"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario
@@ -121,3 +126,57 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
     ended = [verdict.check for verdict in verdicts if verdict.status == "not judged" and verdict.reason == INTERRUPTED]
     late = [f"{', '.join(ended)} not judged: {INTERRUPTED}"] if ended else []
     return "; ".join([line, *late, *(verdict.sentence for verdict in failed)])
+
+
+FILE = "checks.json"
+"""Name of the file in the run folder."""
+
+Verdicts = Mapping[str, tuple[CheckVerdict, ...]]
+"""Verdicts of a run by case, in the order of the checks."""
+
+_decoder = msgspec.json.Decoder(dict[str, tuple[CheckVerdict, ...]])
+
+
+def verdicts_json(verdicts: Verdicts) -> str:
+    """Return the text of checks.json."""
+    return msgspec.json.format(msgspec.json.encode(verdicts), indent=1).decode() + "\n"
+
+
+def read_verdicts(path: Path) -> dict[str, tuple[CheckVerdict, ...]]:
+    """Read a checks.json.
+
+    Raises
+    ------
+    ValueError
+        If it is none.
+    """
+    return _decoder.decode(path.read_bytes())
+
+
+Since = Annotated[float, Unit("s"), Plausible("a time of the run", 0.0, 86_400.0)]
+"""Run time (s) from which on a check judges: events open windows, the ends of faults of links and agents open none."""
+
+
+def require_time(history: History, since_s: float) -> None:
+    """Raise NotJudgedError if a run ends before a check begins to judge: it would pass unjudged."""
+    end = float(history.t[-1])
+    if since_s > end:
+        raise NotJudgedError(f"the run ends at {end:g} s, before since_s = {since_s:g} s")
+
+
+def require_longer(judged_s: float, limit: str, limit_s: float) -> None:
+    """Raise NotJudgedError if nothing in a run is long enough to break a limit of time: it would pass unjudged.
+
+    Parameters
+    ----------
+    judged_s : float
+        Time of the run that a check judges (s).
+    limit : str
+        Name of the limit.
+    limit_s : float
+        The limit (s).
+    """
+    if judged_s <= limit_s + 1e-9:
+        raise NotJudgedError(
+            f"the run is shorter than needed: it has {judged_s:g} s to judge, and {limit} = {limit_s:g} s"
+        )

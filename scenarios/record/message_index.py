@@ -11,8 +11,8 @@ from math import inf
 from typing import Any, TypeVar
 
 from gridpeers.scenarios.record.journal_reader import entries_of, message_of, values_of
-from gridpeers.scenarios.record.record_channels import Topic
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
+from gridpeers.scenarios.record.record_info import Topic
 from gridpeers.wire.codec import encode, sound
 from gridpeers.wire.journal import Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
 from gridpeers.wire.journal_keys import kind_of, name_of, sender_of

@@ -1,4 +1,4 @@
-"""Read the file of a record, whole or cut off, without trusting anything in it.
+"""Read the file of a record, whole or cut off, without trusting anything in it; and find it.
 
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
 half written, and no index at the end. So no chunk is found by the index: the reader goes from record to record, which
@@ -23,9 +23,9 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Header, Message, Metadata
 from mcap.stream_reader import breakup_chunk
 
-from gridpeers.scenarios.record.record_channels import Topic
-from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo
+from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo, Topic
 from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.schema.suggestion import suggestion
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
@@ -293,3 +293,45 @@ class RecordFile:
             raise ValueError("its length is not known, or too large")
         if chunk.compression == "lz4" and not 0 < lz4.frame.get_frame_info(chunk.data)["content_size"] <= MOST_CHUNK:
             raise ValueError("its length is not known, or too large")
+
+
+def record_path(path: str | Path, case: str = "") -> Path:
+    """Return the file of a record, which may not be there.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file, the folder of a case, or the folder of a run.
+    case : str, optional
+        Case of the run; needed if it has several.
+
+    Raises
+    ------
+    RecordFileError
+        If the folder has no record, none of that case, or those of several cases and none is chosen; one sentence.
+    """
+    if not isinstance(path, str | Path):
+        raise RecordFileError(f'{path!r:.60}: needs the path of a record, as "runs/islanding/latest/IV"')
+    path = Path(path)
+    if not path.exists():
+        return path
+    if path.is_file() or (path / FILE).exists():
+        file = path if path.is_file() else path / FILE
+        if case and case != file.resolve().parent.name:
+            raise RecordFileError(
+                f'{path}: it is the record of one case, and "{case}" is another one; leave --case out'
+            )
+        return file
+    found = {file.parent.name: file for file in sorted(path.glob(f"*/{FILE}"))}
+    if not found:
+        raise RecordFileError(f"{path}: there is no {FILE}: the run was not recorded, or this is no folder of a run")
+    if case:
+        if case not in found:
+            raise RecordFileError(f'{path}: no record of case "{case}"; {suggestion(case, found, "cases")}')
+        return found[case]
+    if len(found) == 1:
+        return next(iter(found.values()))
+    raise RecordFileError(
+        f"{path}: it has a record of each case, {', '.join(found)}; choose one with --case "
+        f"{next(iter(found))}, or give its folder, {next(iter(found.values())).parent}"
+    )

@@ -17,7 +17,7 @@ from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_the
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.results.island_membership import taken_part
-from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport
 from gridpeers.scenarios.results.steadiness import STEADY
 from gridpeers.scenarios.schema import ScenarioError, ScenarioModel

@@ -20,8 +20,7 @@ from gridpeers.scenarios.record.decision_entries import DecisionEntries
 from gridpeers.scenarios.record.decision_reader import DecisionReader
 from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
-from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError
-from gridpeers.scenarios.record.record_path import record_path
+from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.short_names import short

@@ -23,8 +23,7 @@ from mcap.data_stream import RecordBuilder
 from mcap.records import ChunkIndex
 from mcap.writer import CompressionType, Writer
 
-from gridpeers.scenarios.record.record_channels import RecordChannel, Topic
-from gridpeers.scenarios.record.record_info import METADATA, PROFILE, RecordInfo
+from gridpeers.scenarios.record.record_info import METADATA, PROFILE, RecordChannel, RecordInfo, Topic
 
 SYNC = 0.9
 """Time (s) between two calls that have the disk keep all against a loss of power; other files wait meanwhile."""

@@ -22,10 +22,9 @@ from gridpeers.scenarios.replay.no_difference import no_difference
 from gridpeers.scenarios.replay.replay import ComparedRows
 from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_of
-from gridpeers.scenarios.results.broken_folder import broken_if_ended
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
-from gridpeers.scenarios.results.run_files import set_status, write_whole
+from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
 from gridpeers.scenarios.run_request import Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gridpeers.plant.equipment import F_NOM, Feeder
-from gridpeers.scenarios.results.evaluation.benchmark_registry import Published
-from gridpeers.scenarios.results.evaluation.metric import Measured
-from gridpeers.scenarios.results.evaluation.quantities import label
+from gridpeers.scenarios.results.evaluation.claims import Published
+from gridpeers.scenarios.results.evaluation.metric import Measured, label
 from gridpeers.scenarios.results.evaluation.window_metrics import own_measures
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.history import Nameplates

@@ -1,13 +1,17 @@
-"""The run folder: its place, that it is empty, and the state of its run."""
+"""The run folder: its place, that it is empty and one command's, and the state of its run."""
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import fcntl
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+
+from gridpeers.wire.driver.output import OutputLostError
 
 RUNS = Path("runs")
 """Parent of the run folders that the user does not name, seen from the working directory."""
@@ -214,3 +218,57 @@ def _point_latest(folder: Path) -> None:
     with contextlib.suppress(OSError):
         new.symlink_to(folder.name)
         new.replace(latest)
+
+
+LOCK = ".lock"
+
+
+def locked(folder: Path, option: str, command: str) -> int:
+    """Lock a folder for this process; the system opens the lock however the process ends.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    option, command : str
+        The option that names it, and the command, for the error.
+
+    Returns
+    -------
+    int
+        Descriptor whose closing opens the lock.
+
+    Raises
+    ------
+    FolderError
+        If another process has locked it.
+    """
+    handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        os.close(handle)
+        raise FolderError(
+            f"{option} {shown(folder)}: another `gridpeers {command}` is at work in it; let it end"
+        ) from None
+    return handle
+
+
+class TerminatedError(KeyboardInterrupt):
+    """Somebody ended the command by SIGTERM; it closes as after Ctrl-C."""
+
+
+@contextmanager
+def broken_if_ended(folder: Path) -> Iterator[None]:
+    """Set the status of a run folder to "broken: why" if what is inside does not come to its end."""
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        set_broken(folder, f"interrupted {'by SIGTERM' if isinstance(error, TerminatedError) else 'from the keyboard'}")
+        raise
+    except OSError as error:
+        set_broken(folder, refusal(folder, error))
+        raise
+    except (Exception, OutputLostError) as error:
+        set_broken(folder, str(error) or type(error).__name__)
+        raise

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gridpeers.scenarios.results.evaluation.quantities import DIGITS, UNITS, Measure
+from gridpeers.scenarios.results.evaluation.metric import DIGITS, UNITS, Measure
 from gridpeers.scenarios.results.history import Flags, Floats
 
 STEADY = 0.2

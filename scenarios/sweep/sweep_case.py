@@ -24,10 +24,10 @@ from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import History
-from gridpeers.scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.metrics import SHARING, SHARING_OF_ISLANDS
 from gridpeers.scenarios.results.record import Recorder
+from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.plugin_keys import judges_laws

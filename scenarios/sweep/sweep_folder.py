@@ -12,8 +12,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
-from gridpeers.scenarios.results.folder_lock import LOCK, locked
-from gridpeers.scenarios.results.run_files import RUNS, FolderError, set_status, shown, write_whole
+from gridpeers.scenarios.results.run_files import LOCK, RUNS, FolderError, locked, set_status, shown, write_whole
 from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.file import Plan

@@ -14,7 +14,7 @@ from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
 from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
 from gridpeers.scenarios.chaos.chaos_run import ChaosRow
 from gridpeers.scenarios.chaos.disturbance import Disturbance
-from gridpeers.scenarios.results.folder_lock import LOCK, locked
+from gridpeers.scenarios.results.run_files import LOCK, locked
 from gridpeers.scenarios.results.run_journal import journal_line
 from gridpeers.scenarios.run_request import BrokenRunError
 from tests.chaos.bases import base_in

@@ -172,7 +172,7 @@ def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) 
 
 def _lock(context: typer.Context, folder: Path, option: str) -> None:
     """Lock the campaign's folder until the command ends."""
-    from gridpeers.scenarios.results.folder_lock import locked
+    from gridpeers.scenarios.results.run_files import locked
 
     handle = locked(folder, option, "chaos")
     context.call_on_close(lambda: os.close(handle))

@@ -147,9 +147,8 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.scenarios.replay.changes import changed_rule
-    from gridpeers.scenarios.results.broken_folder import broken_if_ended
     from gridpeers.scenarios.results.plots.style import save
-    from gridpeers.scenarios.results.run_files import new_folder, shown, write_whole
+    from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole
     from gridpeers.scenarios.schema.plugin_keys import judges_laws
     from gridpeers.studies.replaying import counterfactual_in
 

@@ -98,8 +98,8 @@ def _start(
         from gridpeers.scenarios.live.numbers.live_report import conclude
         from gridpeers.scenarios.record.record_info import LIVE
         from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
-        from gridpeers.scenarios.results.law_failures import ended_by_a_law, first_of, law_failures
         from gridpeers.scenarios.results.metrics_file import RunMetrics
+        from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of, law_failures
         from gridpeers.scenarios.schema.plugin_keys import judges_laws
 
         check_new(record)

@@ -6,12 +6,11 @@ from collections.abc import Iterator
 from typing import Annotated
 
 from gridpeers.netem.ledger import LinkCounts
-from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation, require_longer
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
 from gridpeers.scenarios.checks.communication.link_accounts import Missing
 from gridpeers.scenarios.checks.communication.record_sink import Link
-from gridpeers.scenarios.checks.judged_time import require_longer
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
 

@@ -7,9 +7,8 @@ from math import inf
 from typing import Annotated
 
 from gridpeers.agents.agent_config import MAX_AGE
-from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Since, Violation, require_time
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.judged_time import Since, require_time
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
 

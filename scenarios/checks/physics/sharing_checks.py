@@ -7,9 +7,8 @@ from typing import Annotated
 
 import numpy as np
 
-from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Since, Violation
 from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
-from gridpeers.scenarios.checks.judged_time import Since
 from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
 from gridpeers.scenarios.results.sharing_index import NO_LOAD, sharing_index
 from gridpeers.scenarios.results.steadiness import ends_of

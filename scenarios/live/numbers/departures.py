@@ -15,7 +15,7 @@ from gridpeers.scenarios.live.numbers.expected_silence import ExpectedSilence
 from gridpeers.scenarios.live.numbers.live_windows import NEAR, LiveWindows, live_events, live_windows
 from gridpeers.scenarios.live.show.snapshot import line_of
 from gridpeers.scenarios.results.event_windows import Window, windows
-from gridpeers.scenarios.results.switch_positions import is_closed
+from gridpeers.scenarios.results.island_membership import is_closed
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.netem_tables import netem_of
 from gridpeers.wire.messages import PlantEvent

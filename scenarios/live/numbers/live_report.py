@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.checks_file import FILE, verdicts_json
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.launch.live_folders import Folders
 from gridpeers.scenarios.live.launch.live_processes import ProcessOutcome
 from gridpeers.scenarios.live.numbers.departures import Departures, compare, few
 from gridpeers.scenarios.live.numbers.live_figures import live_drawing
-from gridpeers.scenarios.results.evaluation.benchmark_registry import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window, late_moves
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.island_membership import taken_part
-from gridpeers.scenarios.results.law_failures import law_failures
 from gridpeers.scenarios.results.metrics_file import RunMetrics, case_facts, metrics_json
 from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport, plain, show
 from gridpeers.scenarios.results.run_files import shown, write_whole
 from gridpeers.scenarios.schema import ScenarioModel

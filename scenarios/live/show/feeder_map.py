@@ -6,7 +6,7 @@ import msgspec
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import named_loads
-from gridpeers.scenarios.results.plots.feeder_places import has_coordinates, places
+from gridpeers.scenarios.results.plots.places import has_coordinates, places
 from gridpeers.wire.foreign_bytes import decode_foreign
 
 

@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder, Switch
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.scenarios.results.plots.feeder_places import Places, has_coordinates, places
-from gridpeers.scenarios.results.plots.label_places import Label, label_sides
+from gridpeers.scenarios.results.plots.places import Label, Places, has_coordinates, label_sides, places
 from gridpeers.wire.counted import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")

@@ -24,7 +24,7 @@ from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
-from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.codec import decode
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.keys import Keys

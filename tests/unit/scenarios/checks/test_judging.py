@@ -17,9 +17,16 @@ from msgspec.structs import replace
 import gridpeers as gp
 from gridpeers.scenarios.checks import judging
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
-from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict, NotJudgedError, Violation, summary
+from gridpeers.scenarios.checks.check_verdict import (
+    SHOWN_VIOLATIONS,
+    CheckVerdict,
+    NotJudgedError,
+    Violation,
+    read_verdicts,
+    summary,
+    verdicts_json,
+)
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.checks_file import read_verdicts, verdicts_json
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_by
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.run import run

@@ -9,7 +9,7 @@ from msgspec.structs import replace as with_fields
 
 from gridpeers.plant.equipment.bus_islands import islands_after
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.results.switch_positions import closed_switches, switch_events
+from gridpeers.scenarios.results.island_membership import closed_switches, switch_events
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
 

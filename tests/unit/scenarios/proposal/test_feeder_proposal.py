@@ -9,7 +9,7 @@ from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.scenarios.proposal.feeder_proposal import propose
 from gridpeers.scenarios.proposal.proposal_errors import NoProposalError, NoSwitchError
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
-from gridpeers.scenarios.results.plots.feeder_places import places
+from gridpeers.scenarios.results.plots.places import places
 
 
 def series(name: str, start: str, end: str, phases: str) -> LinearElement:

@@ -14,9 +14,8 @@ import pytest
 from mcap.reader import make_reader
 
 from gridpeers.scenarios.record import record_writer
-from gridpeers.scenarios.record.record_channels import channels
 from gridpeers.scenarios.record.record_file import RecordFile
-from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.record.record_info import RecordInfo, channels
 from gridpeers.scenarios.record.record_writer import RecordWriter
 from tests.toy.toy_configs import toy_configs
 

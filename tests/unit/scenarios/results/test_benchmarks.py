@@ -7,8 +7,14 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.results.evaluation.benchmark_registry import BENCHMARKS, NO_BENCHMARK, Benchmark, benchmark_of
-from gridpeers.scenarios.results.evaluation.claims import Claim, judge
+from gridpeers.scenarios.results.evaluation.claims import (
+    BENCHMARKS,
+    NO_BENCHMARK,
+    Benchmark,
+    Claim,
+    benchmark_of,
+    judge,
+)
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.results.report import RunReport, plain
@@ -18,9 +24,9 @@ from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 
 MODULE = """
-from gridpeers.scenarios.results.evaluation.benchmark_registry import Benchmark
+from gridpeers.scenarios.results.evaluation.claims import Benchmark
 from gridpeers.scenarios.results.evaluation.claims import Claim
-from gridpeers.scenarios.results.evaluation.benchmark_registry import Published
+from gridpeers.scenarios.results.evaluation.claims import Published
 
 PLACE = {"case": "IV", "event": "event1", "quantity": "MPSI"}
 MINE = Benchmark(

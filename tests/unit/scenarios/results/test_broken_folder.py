@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.scenarios.results.broken_folder import TerminatedError, broken_if_ended
+from gridpeers.scenarios.results.run_files import TerminatedError, broken_if_ended
 from gridpeers.wire.driver.output import ReaderGoneError
 
 

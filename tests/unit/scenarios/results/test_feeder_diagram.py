@@ -13,8 +13,7 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.joined_copies import joined_copies
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
-from gridpeers.scenarios.results.plots.feeder_places import places
-from gridpeers.scenarios.results.plots.label_places import Label, label_sides
+from gridpeers.scenarios.results.plots.places import Label, label_sides, places
 
 Place = tuple[float, float]
 

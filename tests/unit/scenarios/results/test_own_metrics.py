@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gridpeers.scenarios.results.evaluation.benchmark_registry import CLAIMS
-from gridpeers.scenarios.results.evaluation.claims import Claim, judged
+from gridpeers.scenarios.results.evaluation.claims import CLAIMS, Claim, judged
 from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, make_metrics, measured, name_of
 from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
 from gridpeers.scenarios.results.event_windows import Window

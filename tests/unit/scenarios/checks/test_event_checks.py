@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from gridpeers.plant.plant_node import IDLE
-from gridpeers.scenarios.results.law_failures import law_failures
+from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import ran, verdict
 

@@ -1,4 +1,4 @@
-"""Check of returns: inverters that have tripped are in service again at the end of a run."""
+"""Checks of events: no law fails, and inverters that have tripped are in service again at the end."""
 
 from __future__ import annotations
 
@@ -7,7 +7,19 @@ from collections.abc import Iterator
 
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.results.recorded_events import law_failures, tripped_by, tripped_inverters
+
+
+class LawFailed(Check):
+    """No agent's law, and no graph of a user, fails: its inverter would go on on primary droop."""
+
+    def __call__(self, case: CheckedCase) -> Iterator[Violation]:
+        """Yield each failure."""
+        failures = law_failures(case.events)
+        if not failures and case.scenario.cases[case.case].secondary == "none":
+            raise NotJudgedError("no inverter runs a law")
+        for failure in failures:
+            yield Violation(text=failure.why, t=failure.t, agent=failure.agent)
 
 
 class Returned(Check):

@@ -6,7 +6,7 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.results.tripped_inverters import tripped_by, tripped_inverters
+from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.checks.cases import verdict
 

@@ -1,12 +1,86 @@
-"""Where labels of marks stand on a drawing: on as few lines, marks and other labels as can be. Pure."""
+"""Places on the one-line diagram of a feeder: of its buses by coordinates or as a tree, and of labels. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from gridpeers.plant.equipment import Feeder
+
+Places = Mapping[str, tuple[float, float]]
+"""Place of each bus (drawing units)."""
+
+
+def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
+    """Return where each bus is drawn: its coordinates, else beside a neighbour; a tree if the feeder has none."""
+    if not has_coordinates(feeder):
+        return _tree(feeder)
+    known = {bus.name: (bus.x, bus.y) for bus in feeder.buses if (bus.x, bus.y) != (0.0, 0.0)}
+    neighbours = _neighbours(feeder)
+    waiting = list(known)
+    for bus in waiting:  # it grows while buses without coordinates take those of a neighbour
+        for other in neighbours[bus]:
+            if other not in known:
+                known[other] = known[bus]
+                waiting.append(other)
+    return {bus.name: known.get(bus.name, (bus.x, bus.y)) for bus in feeder.buses}
+
+
+def has_coordinates(feeder: Feeder) -> bool:
+    """Whether a feeder is drawn on its coordinates: more than a quarter of its buses stand apart."""
+    return len({(bus.x, bus.y) for bus in feeder.buses}) > len(feeder.buses) // 4
+
+
+def _neighbours(feeder: Feeder) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
+    ends = [(a, b) for a, b, _ in feeder.branches()]
+    for a, b in (*ends, *((switch.from_bus, switch.to_bus) for switch in feeder.switches)):
+        found[a].append(b)
+        found[b].append(a)
+    return found
+
+
+def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
+    """Place each bus by its distance from the substation, and its branches side by side: none crosses another."""
+    neighbours = _neighbours(feeder)
+    first = feeder.source.bus if feeder.source else feeder.buses[0].name
+    depth: dict[str, int] = {}
+    children: dict[str, list[str]] = {bus: [] for bus in neighbours}
+    order: list[str] = []
+    for root in (first, *neighbours):  # a section that nothing connects has a root of its own
+        if root in depth:
+            continue
+        depth[root] = 0
+        reached = [root]
+        for bus in reached:
+            for other in neighbours[bus]:
+                if other not in depth:
+                    depth[other] = depth[bus] + 1
+                    children[bus].append(other)
+                    reached.append(other)
+        order += _depth_first(root, children)
+    height: dict[str, float] = {}
+    leaves = 0
+    for bus in reversed(order):
+        below = [height[child] for child in children[bus]]
+        if not below:
+            leaves += 1
+        height[bus] = float(np.mean(below)) if below else float(leaves)
+    return {bus: (float(depth[bus]), height[bus]) for bus in order}
+
+
+def _depth_first(root: str, children: Mapping[str, list[str]]) -> list[str]:
+    """Return the buses of a tree, each before all that are behind it, one branch after the other."""
+    order, waiting = [], [root]
+    while waiting:
+        bus = waiting.pop()
+        order.append(bus)
+        waiting += reversed(children[bus])
+    return order
+
 
 Points = NDArray[np.float64]
 
