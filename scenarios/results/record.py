@@ -19,7 +19,6 @@ from typing import TYPE_CHECKING, BinaryIO
 import msgspec
 
 from gridpeers.scenarios.results.link_record import LinkRecord
-from gridpeers.scenarios.results.packed_events import PackedEvents
 from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.packages import not_importable
@@ -176,7 +175,7 @@ class Recorder:
         """Time of the last row (s)."""
         self.missing: list[tuple[float, float]] = []
         """See `Recorded.missing`."""
-        self._events = PackedEvents()
+        self._events: list[PlantEvent] = []
         self.quiet: list[tuple[float, int]] = []
         """See `Recorded.quiet`."""
         self.reproducible = True
