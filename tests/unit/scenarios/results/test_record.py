@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gridpeers.scenarios.results.history import History, history_of, read_history
-from gridpeers.scenarios.results.record import PARTIAL, Recorder, RecordError, csv_line
+from gridpeers.scenarios.results.record import PARTIAL, Recorder, RecordError
 from gridpeers.wire.messages import PlantEvent, Telemetry
 
 Rows = tuple[tuple[float, ...], ...]
@@ -165,9 +165,3 @@ def test_columns_go_to_the_quantity_they_name() -> None:
 
     assert (history.t[0], history.f[0].tolist(), history.V_set[0].tolist()) == (0.5, [0.0, 6.0], [5.0, 11.0])
     assert (history.P[0].tolist(), history.Q[0].tolist(), history.V[0].tolist()) == ([1, 7], [2, 8], [3, 9])
-
-
-@given(st.lists(st.floats() | st.floats(-1e-3, 1e-3), min_size=1, max_size=8))
-def test_a_line_of_the_history_has_the_texts_of_repr(numbers: list[float]) -> None:
-    """Every number, infinite ones and NaN too, is written as Python writes it: pinned bytes depend on it."""
-    assert csv_line(tuple(numbers)) == (",".join(map(repr, numbers)) + "\n").encode()
