@@ -175,7 +175,7 @@ class Counterfactual:
 
     def plot(self) -> Figure:
         """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
-        from gridpeers.scenarios.results.plots.counterfactual_figure import counterfactual_figure
+        from gridpeers.scenarios.replay.counterfactual_figure import counterfactual_figure
 
         shown_in_notebooks()
         since = self.changes.since if self.changes else 0.0

@@ -94,6 +94,7 @@ def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str
     from gridpeers.lab.trace.space_time_diagram import space_time_diagram
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.short_names import in_order, short
+    from gridpeers.lab.trace.space_time_diagram import space_time_diagram
 
     if since > record.t_end:
         fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)

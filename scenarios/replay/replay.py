@@ -20,9 +20,9 @@ from gridpeers.agents.carriers.make import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.record.recomputation import recomputed
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
+from gridpeers.scenarios.replay.recomputation import recomputed
 from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
 from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.replay.replayed_process import (

@@ -17,9 +17,9 @@ from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
-from gridpeers.scenarios.record.recomputation import recomputed
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.scenarios.replay.recomputation import recomputed
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.journal import ProcessEvent, Token, WakeUp
 from gridpeers.wire.messages import Telemetry
