@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import How
     from gridpeers.scenarios.run_request import Driver
-    from gridpeers.scenarios.sweep.file.paths import Tree
+    from gridpeers.scenarios.sweep.paths import Tree
 
 
 def as_scenario(it: Scenario | str | Path) -> Scenario:
@@ -141,7 +141,7 @@ class Scenario:
             raise ScenarioError(
                 [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
             )
-        from gridpeers.scenarios.sweep.file.paths import (  # with numpy, which a run starts without
+        from gridpeers.scenarios.sweep.paths import (  # with numpy, which a run starts without
             PathError,
             put,
             remove,
@@ -169,8 +169,8 @@ class Scenario:
         ScenarioError
             If the feeder has no operating point to start from.
         """
+        from gridpeers.scenarios.schema.check_notes import start_problem
         from gridpeers.scenarios.schema.supply import supply_notes
-        from gridpeers.scenarios.start_check import start_problem
 
         if problem := start_problem(self._spec, self._feeder):
             raise ScenarioError([f"{self.name}: the plant cannot start: {problem}"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gridpeers.scenarios.catalogue_files import SWEEPS
 from gridpeers.scenarios.schema.loading import read_toml
-from gridpeers.scenarios.sweep.file import Plan, read_sweep
+from gridpeers.scenarios.sweep.sweep_reading import Plan, read_sweep
 
 __all__ = ["Plan", "read_sweep", "sweep_title"]
 

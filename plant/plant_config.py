@@ -222,4 +222,4 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     on_law_failure: OnLawFailure = "droop"
     """What follows when the law of an agent fails."""
     feeder_map: dict[str, Any] = {}
-    """Wall-clock: the one-line diagram (`gridpeers.scenarios.live.show.feeder_map`) as a tree, for clients."""
+    """Wall-clock: the one-line diagram (`gridpeers.scenarios.live.feeder_map`) as a tree, for clients."""

@@ -22,17 +22,16 @@ from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_case import run_case
-from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
+from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request, version_of, versions
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.versions import version_of, versions
 from gridpeers.wire.driver.open_files import too_few_files
 from gridpeers.wire.driver.output import OutputLostError
 from gridpeers.wire.messages import Pacing
 from gridpeers.wire.packages import not_importable
 
 if TYPE_CHECKING:
-    from gridpeers.scenarios.live.numbers.departures import Departures
+    from gridpeers.scenarios.live.departures import Departures
     from gridpeers.scenarios.results.report import RunReport
 
 
@@ -177,7 +176,7 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
     """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
     if request.clock == "simulated":
         return {}
-    from gridpeers.scenarios.live.numbers.departures import compare
+    from gridpeers.scenarios.live.departures import compare
 
     scenario = request.scenario
     return {

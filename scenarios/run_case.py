@@ -14,15 +14,13 @@ import msgspec
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.figure_processes import prepare_figures
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
-from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Progress, Request
+from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request, versions
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of
-from gridpeers.scenarios.versions import versions
 from gridpeers.wire.messages import Telemetry
 
 if TYPE_CHECKING:

@@ -1,13 +1,61 @@
-"""A request for a run: scenario, folder and options."""
+"""A run as it is asked for and as its driver ends it, and the versions of what decides its numbers."""
 
 from __future__ import annotations
 
+import platform
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
 from gridpeers.scenarios.results.metrics_file import RunMetrics
+from gridpeers.wire.messages import Pacing, PlantEvent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """The outcome of a run. Its rows went to the callback as they came."""
+
+    broke: str
+    """Why the run broke, with the last log lines of the process that broke it; "" if it reached its end."""
+    reproducible: bool
+    """False once something unscripted (a dead agent) has entered the run."""
+    events: tuple[PlantEvent, ...]
+    """All events of the plant and of the roster."""
+    notes: tuple[str, ...]
+    """Notes for a person though the run went on: processes that died, messages that were dropped."""
+    ticks: int
+    """Last tick that was reported."""
+    start_s: float
+    """Wall time (s) until the first row."""
+    run_s: float
+    """Wall time (s) from the first row to the end."""
+    pacing: Pacing | None = None
+    """How well the plant kept real time; only in wall-clock time."""
+
+
+_VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
+
+
+def versions() -> dict[str, str]:
+    """Versions of everything that has a part in the numbers of a run."""
+    return {"python": platform.python_version()} | {name: version_of(name) for name in _VERSIONS}
+
+
+@cache
+def version_of(package: str) -> str:
+    """Version of an installed package; one process does not need all of them."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "not installed"
+
+
+SPEEDS = (0.1, 50.0)
+"""Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""
+
 
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from gridpeers.scenarios.live.client.run_address import RunAddress
+from gridpeers.scenarios.live.run_address import RunAddress
 from gridpeers.viewer.own_agents import OwnAgents
 from gridpeers.viewer.page_actions import ActionClient, PageAction, command_line
 from gridpeers.viewer.page_rights import looks_only

@@ -8,7 +8,7 @@ import sys
 import tempfile
 from typing import IO
 
-from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError, check_name
+from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_name
 
 LEAVING = 5.0
 """Time (s) that an agent has to leave by itself."""

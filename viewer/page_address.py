@@ -7,7 +7,7 @@ import ipaddress
 import secrets
 import socket
 
-from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.scenarios.live.run_address import UsageError
 
 LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this host's loopback in the address of a page."""

@@ -27,7 +27,7 @@ def require_page() -> None:
 def page_socket(port: int | None) -> socket.socket:
     """Return a socket for the page; or end with a clear line, before anything is started."""
     require_page()
-    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.live.run_address import UsageError
     from gridpeers.viewer.page_address import listen
 
     try:

@@ -11,10 +11,10 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.emulation.link_reports import decode_statuses
-from gridpeers.scenarios.live.client.run_client import RunClient
-from gridpeers.scenarios.live.requests.plant_status import PlantStatus
-from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
-from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.live.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.run_monitor import PlantStatus
+from gridpeers.scenarios.live.watching import RunSubscriber
 from gridpeers.viewer.run_view import Cursor, Frame, RunView
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry

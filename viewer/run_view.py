@@ -13,10 +13,8 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.emulation.link_reports import LinkStatus
-from gridpeers.scenarios.live.requests.plant_status import PlantStatus
-from gridpeers.scenarios.live.show.feeder_map import FeederMap
-from gridpeers.scenarios.live.show.run_monitor import SILENT, RunMonitor
-from gridpeers.scenarios.live.show.snapshot import InverterStatus
+from gridpeers.scenarios.live.feeder_map import FeederMap
+from gridpeers.scenarios.live.run_monitor import SILENT, InverterStatus, PlantStatus, RunMonitor
 from gridpeers.viewer.link_states import AGE_STEP, LinkStates, LinkView
 from gridpeers.viewer.liveness import Liveness, LivenessView
 from gridpeers.viewer.strips import Point, Strips

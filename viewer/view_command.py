@@ -12,7 +12,7 @@ import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
-from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.run_address import Access
 from gridpeers.viewer.page_beside import HERE, PORT, require_page
 from gridpeers.wire.driver.output import watch_readers
 

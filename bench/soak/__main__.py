@@ -41,7 +41,7 @@ from bench.soak.judging import (
 from bench.soak.soak_actions import soak_actions
 from bench.soak.soak_run import SoakRun
 from bench.soak.watched_run import PATIENCE, SoakEnd, SoakError
-from gridpeers.scenarios.live.client.run_client import NobodyError
+from gridpeers.scenarios.live.run_client import NobodyError
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PLANT
 

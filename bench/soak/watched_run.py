@@ -25,9 +25,9 @@ from gridpeers.scenarios.checks.check_verdict import FILE as CHECKS
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation, read_verdicts
 from gridpeers.scenarios.checks.communication.last_words_check import LastWords
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.live.client.run_address import RunAddress
-from gridpeers.scenarios.live.client.run_client import RunClient
-from gridpeers.scenarios.live.show.watching import RunSubscriber
+from gridpeers.scenarios.live.run_address import RunAddress
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.watching import RunSubscriber
 from gridpeers.scenarios.record.record_info import FILE as RECORD
 from gridpeers.wire.messages import PLANT
 

@@ -12,7 +12,7 @@ import pandas as pd
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.scenarios.results.link_record import COLUMNS
 from gridpeers.scenarios.results.recorded_events import LawFailure
-from gridpeers.scenarios.sweep.column_labels import unit_of
+from gridpeers.scenarios.sweep.sweep_table import unit_of
 
 
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:

@@ -20,8 +20,8 @@ from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import judge_case
-from gridpeers.scenarios.live.numbers.departures import compare
-from gridpeers.scenarios.live.numbers.live_figures import live_drawing
+from gridpeers.scenarios.live.departures import compare
+from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.results.evaluation.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, windows

@@ -16,7 +16,7 @@ from gridpeers.runs.showing import shown_in_notebooks
 from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.sweep.file.paths import flatten
+from gridpeers.scenarios.sweep.paths import flatten
 from gridpeers.wire.counted import counted
 from gridpeers.wire.driver.command_line import command_line
 

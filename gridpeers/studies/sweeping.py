@@ -17,13 +17,10 @@ from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.plugin_keys import check_portable, metrics_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
-from gridpeers.scenarios.sweep.column_labels import unit_of
-from gridpeers.scenarios.sweep.file.plan import Plan
-from gridpeers.scenarios.sweep.file.samples import BaseScenario
-from gridpeers.scenarios.sweep.file.sweep_model import Sweep
-from gridpeers.scenarios.sweep.file.sweep_reading import plan_of
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow, run_one, run_with_history
-from gridpeers.scenarios.sweep.sweep_table import results_frame
+from gridpeers.scenarios.sweep.sweep_model import Sweep
+from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
+from gridpeers.scenarios.sweep.sweep_table import results_frame, unit_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
 from gridpeers.values import plain
 from gridpeers.wire.schema.suggestion import suggestion

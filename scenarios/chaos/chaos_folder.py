@@ -20,7 +20,7 @@ from gridpeers.scenarios.chaos.schedule_report import schedule_lines
 from gridpeers.scenarios.results.run_files import FolderError, shown, write_whole
 from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from gridpeers.scenarios.run_request import Driver
-from gridpeers.scenarios.schema.relative_folders import with_relative_folders
+from gridpeers.scenarios.schema.plugin_keys import with_relative_folders
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.wire.driver.command_line import command_line
 

@@ -19,15 +19,14 @@ from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
 from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
 from gridpeers.scenarios.chaos.feasible_supply import FeasibleSupply
-from gridpeers.scenarios.schema.checks import check_switches
-from gridpeers.scenarios.schema.load_changes import check_loads
+from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
 from gridpeers.scenarios.schema.netem_tables import check_netem, netem_of
 from gridpeers.scenarios.schema.participants import check_agentless, check_schedule
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.schema.time_checks import check_times
+from gridpeers.scenarios.schema.supply import check_loads
 from gridpeers.wire.timing.clock import rounded_up
 
 _LISTS = ("open", "close", "leave", "join")

@@ -9,10 +9,10 @@ from typing import NamedTuple
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.named_loads import named_loads
-from gridpeers.scenarios.schema.load_changes import powers_after
 from gridpeers.scenarios.schema.netem_tables import netem_of
 from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import Event, ScenarioModel
+from gridpeers.scenarios.schema.supply import powers_after
 
 MOST_LOAD, LEAST_LOAD = 0.97, 0.05
 """Load of an island, as parts of the ratings of its inverters that control: above, losses and vars take what is left,

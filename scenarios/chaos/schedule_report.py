@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
 from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase, merged_events
-from gridpeers.scenarios.schema.absences import AgentEvent, why_away
+from gridpeers.scenarios.schema.check_notes import AgentEvent, why_away
 from gridpeers.scenarios.schema.participants import inverters_of
 
 

@@ -1,8 +1,9 @@
-"""Driver without processes: plant and agents in one thread, on a bus that delivers in order.
+"""Driver without processes: plant and agents in one thread, with the same cores and so the same bytes as the processes.
 
-Every message is encoded and decoded, and discovery, roster and ticks are those of `LockstepAgent` and
-`LockstepPlant`; so the result is that of the processes, byte by byte, and is the reference for them. Where messages
-decide nothing, `gridpeers.scenarios.drivers.direct` gives the same result without them, in a fraction of the time.
+Where messages decide something, a bus delivers them in order: each is encoded and decoded, and discovery, roster and
+ticks are those of `LockstepAgent` and `LockstepPlant`. In all other runs `run_direct` takes the same decisions without
+messages, in a fraction of the time: each tick the plant measures, all agents decide, and the plant holds their
+set-points and advances.
 """
 
 from __future__ import annotations
@@ -17,19 +18,64 @@ from time import perf_counter
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, Control
+from gridpeers.agents.agent_group import AgentGroup
 from gridpeers.agents.carriers.make import close_laws, make_law
 from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.plant.direct_plant import DirectPlant
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
-from gridpeers.scenarios.drivers.direct import messages_decide, run_direct
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.emulation.emulated_links import links_of
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
+
+
+def messages_decide(plant: PlantConfig, agents: Sequence[AgentConfig]) -> bool:
+    """Return whether a message may miss its receiver: by an emulated link, or as an agent joins, leaves or dies."""
+    emulated = plant.links or any(config.links for config in agents)
+    return bool(emulated or plant.schedule or {config.name for config in agents} != set(plant.agents))
+
+
+def run_direct(
+    config: PlantConfig,
+    agents: Sequence[AgentConfig],
+    laws: Sequence[Law],
+    plant: PlantLike,
+    on_telemetry: Callable[[Telemetry], None],
+    on_journal: Callable[[Journal], None] = lambda journal: None,
+) -> DirectPlant:
+    """Run to the end; return the plant's core.
+
+    Parameters
+    ----------
+    config : PlantConfig
+        The plant.
+    agents : Sequence[AgentConfig]
+        The agents.
+    laws : Sequence[Law]
+        Law of each.
+    plant : PlantLike
+        The plant at t = 0.
+    on_telemetry : Callable[[Telemetry], None]
+        Takes the plant's telemetry.
+    on_journal : Callable[[Journal], None], optional
+        Takes the journals, if the configurations ask for them.
+    """
+    core = DirectPlant(config, plant, on_telemetry, on_journal)
+    place = {name: i for i, name in enumerate(config.agents)}
+    order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
+    group = AgentGroup([agents[i] for i in order], [laws[i] for i in order])
+    while not core.finished:
+        core.end_tick(group.tick(core.begin_tick()))
+        for journal in group.take_journals():
+            on_journal(journal)
+        core.take_actions()  # words to agents, who are not there to hear them
+    return core
+
 
 SHOWN = 5
 """Missing messages that an error names."""

@@ -17,10 +17,10 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.start_words import READY
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import LOOK, RECORDER, TelemetryClient, with_recorder
 from gridpeers.scenarios.drivers.telemetry_stream import Recordable
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0

@@ -8,8 +8,7 @@ from time import monotonic
 from msgspec.structs import replace
 
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from gridpeers.scenarios.drivers.telemetry_stream import Recordable, TelemetryStream
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable, TelemetryEndpoint, TelemetryStream
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.driver.zenoh_settings import Clock

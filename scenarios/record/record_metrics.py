@@ -10,7 +10,7 @@ import msgspec
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import FeederError, read_feeder
-from gridpeers.scenarios.live.numbers.departures import compare
+from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, messages_saved, windows

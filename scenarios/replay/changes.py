@@ -29,7 +29,7 @@ from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.sweep.file.paths import PathError, Tree, put, steps
+from gridpeers.scenarios.sweep.paths import PathError, Tree, put, steps
 from gridpeers.wire.schema.suggestion import suggestion
 
 OF_CASE = ("secondary", "graph", "links", "without")

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.live.numbers.live_report import write_report
+from gridpeers.scenarios.live.live_report import write_report
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.changed_scenario import unwritten
@@ -25,10 +25,9 @@ from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_o
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
-from gridpeers.scenarios.run_request import Progress
+from gridpeers.scenarios.run_request import Progress, versions
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.versions import versions
 from gridpeers.wire.messages import LinkReport, Telemetry
 
 

@@ -13,11 +13,11 @@ from gridpeers.plant.plant_config import (
     SwitchEvent,
 )
 from gridpeers.plant.tables.feeder_changes import changed
-from gridpeers.scenarios.schema.load_changes import load_events
 from gridpeers.scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
 from gridpeers.scenarios.schema.participants import inverters_of, schedule_of, with_agent
 from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of
 from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
+from gridpeers.scenarios.schema.supply import load_events
 
 
 def configs(

@@ -21,12 +21,13 @@ from gridpeers.scenarios.schema.checks import (
     check_names,
     check_protection,
     check_start,
+    check_step,
     check_switches,
+    check_times,
     name_of,
 )
 from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.gridlabd_checks import check_gridlabd
-from gridpeers.scenarios.schema.load_changes import check_loads
 from gridpeers.scenarios.schema.netem_tables import check_netem, with_delays
 from gridpeers.scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
 from gridpeers.scenarios.schema.plugin_keys import (
@@ -38,8 +39,7 @@ from gridpeers.scenarios.schema.plugin_keys import (
 )
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from gridpeers.scenarios.schema.supply import check_supply
-from gridpeers.scenarios.schema.time_checks import check_step, check_times
+from gridpeers.scenarios.schema.supply import check_loads, check_supply
 from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.text_file import TextFileError, text_of
 

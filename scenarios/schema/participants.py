@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.helics.helics_settings import settings_problems
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
-from gridpeers.scenarios.schema.time_checks import multiple
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:

@@ -1,10 +1,8 @@
-"""The keys of a scenario that name something plugged in: its laws, graphs, metrics, claims, checks, faults, benchmark.
-
-Such a key is a text, or a table with `use` (a law also with `command` or `fmu`), `folder` and parameters.
-"""
+"""The keys of a scenario that name plug-ins: laws, graphs, metrics, claims, checks, faults and their folders."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, get_args
@@ -314,3 +312,38 @@ def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dic
         if event.leave or event.join:
             present = (present - set(event.leave)) | set(event.join)
             yield {row.name: row for row in rows if row.name in present}
+
+
+def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
+    """Return a checked scenario as it is written into a file that can be moved together with what stands beside it.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        Checked, so with absolute folders of what is its own: laws, graphs, metrics, claims, checks, faults, feeder.
+    folder : Path
+        Folder of the file to be written.
+    """
+    here = folder.resolve()
+
+    def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
+        table = table_of(key)
+        return table | {"folder": relative(str(table["folder"]), here)} if table.get("folder") else key
+
+    plant = replace(scenario.plant, feeder=relative(scenario.plant.feeder, here))
+    return with_keys(replace(scenario, plant=plant), change)
+
+
+def relative(place: str, here: Path) -> str:
+    """Return a folder as it is named from another one; the same where they have nothing but the root in common.
+
+    Examples
+    --------
+    >>> relative("/home/eva/study", Path("/home/eva/found/failures")), relative("/opt/laws", Path("/home/eva/found"))
+    ('../../study', '/opt/laws')
+    >>> relative("microgrid123", Path("/home/eva"))
+    'microgrid123'
+    """
+    if not Path(place).is_absolute() or os.path.commonpath([place, here]) == os.sep:
+        return place
+    return os.path.relpath(place, here)

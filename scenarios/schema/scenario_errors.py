@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.relations import MultipleOf
 from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import Problem
@@ -120,6 +121,24 @@ class Problems:
             shorter = re.sub(r"(\.[^.\[]+|\[\d+\]|^[^.\[]+)$", "", path)
             path = shorter if shorter != path else path[:-1]  # a quoted key may have any sign in it
         return 0
+
+
+def multiple(path: str, value: float, of: str, step: float, rule: str, problems: Problems) -> None:
+    """Note a time (s) that is no whole multiple of a step (s).
+
+    Parameters
+    ----------
+    path, of : str
+        Keys of the time and of the step; where a problem is noted at one of them, nothing is said.
+    value, step : float
+        Both (s).
+    rule : str
+        What takes place at such times, as an end of the sentence.
+    problems : Problems
+        Takes the problem.
+    """
+    if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, of.rpartition(".")[2], rule)):
+        problems.add(path, text)
 
 
 def lines_of_keys(text: str) -> dict[str, int]:

@@ -2,18 +2,158 @@
 
 from __future__ import annotations
 
+import contextlib
+import json
+import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
 
-from gridpeers.scenarios.results.run_files import refusal, set_broken, set_status
-from gridpeers.scenarios.sweep.file import Plan
-from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.scenarios.sweep.sweep_folder import SweepFolder
+from gridpeers.scenarios.results.run_files import (
+    LOCK,
+    RUNS,
+    FolderError,
+    locked,
+    refusal,
+    set_broken,
+    set_status,
+    shown,
+    write_whole,
+)
+from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
+from gridpeers.scenarios.run_request import versions
+from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.sweep.sweep_case import SweepRow, run_one
+from gridpeers.scenarios.sweep.sweep_reading import Plan
 from gridpeers.scenarios.sweep.sweep_table import as_written, results_frame, write_table
 from gridpeers.scenarios.sweep.workers import on_workers
+
+MANIFEST = "sweep.json"
+
+
+def folder_of(out: Path | None, name: str) -> Path:
+    """Return the folder of a sweep: the same every time, so that the same command resumes it."""
+    return RUNS / "sweeps" / name if out is None else out
+
+
+class SweepFolder:
+    """The folder of one sweep, locked while it is open.
+
+    Parameters
+    ----------
+    folder : Path
+        New, empty, or this sweep's from before.
+    plan : Plan
+        The sweep.
+
+    Raises
+    ------
+    FolderError
+        If it belongs to something else, was begun with other versions, or is in use. Nothing is changed then.
+    """
+
+    def __init__(self, folder: Path, plan: Plan) -> None:
+        self.path, self._size = folder, len(plan.runs)
+        self.done: dict[int, SweepRow] = {}
+        """Finished runs by number."""
+        whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
+        try:
+            _check(folder, whole)
+            folder.mkdir(parents=True, exist_ok=True)
+            self._lock = locked(folder, "--out", "sweep")
+            try:
+                if not _check(folder, whole):  # once more: another sweep may have begun there before the lock
+                    write_whole(folder / "sweep.toml", plan.text)
+                    write_whole(folder / "scenario.toml", to_toml(plan.base, {"driver": "inprocess"} | versions()))
+                    write_whole(folder / MANIFEST, json.dumps(whole, indent=2) + "\n")
+                self.done = self._kept_rows()
+                set_status(folder, "running")
+                self._journal = open_journal(folder)
+            except BaseException:
+                os.close(self._lock)
+                raise
+        except OSError as error:
+            raise FolderError(
+                f"{folder}: cannot be made or written: {error.strerror}; give another folder by --out"
+            ) from None
+
+    def __enter__(self) -> SweepFolder:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError):  # a run that found no room; those that are kept are on the disk already
+            self._journal.close()
+        os.close(self._lock)
+
+    @property
+    def kept(self) -> int:
+        """Number of finished runs that will be found again; Ctrl-C can come between keeping a run and counting it."""
+        return len(self._kept_rows())
+
+    def add(self, done: SweepRow) -> None:
+        """Keep a finished run."""
+        self._journal.write(journal_line(done))
+        self._journal.flush()
+        os.fsync(self._journal.fileno())
+        self.done[done.number] = done
+
+    def _kept_rows(self) -> dict[int, SweepRow]:
+        """Return the finished runs in the journal."""
+        journal = self.path / JOURNAL
+        if journal.exists() and not journal.is_file():  # to read a pipe would take for ever
+            raise FolderError(f"{shown(journal)}: is no file; remove it, or give another folder by --out")
+        return rows_in(self.path, SweepRow, self._problem) if journal.exists() else {}
+
+    def _problem(self, row: SweepRow) -> str:
+        """Return why a run is none of this sweep; "" if it is one."""
+        last = self._size - 1
+        return "" if 0 <= row.number <= last else f"this sweep has runs 0 to {last}, none {row.number}; remove the line"
+
+
+def _check(folder: Path, whole: Mapping[str, object]) -> bool:
+    """Return whether the folder is this sweep's from before; FolderError if it is something else's."""
+    where = f"--out {shown(folder)}"
+    if folder.exists() and not folder.is_dir():
+        raise FolderError(f"{where}: this is a file; give a folder")
+    manifest = folder / MANIFEST
+    if not manifest.is_file():
+        rest = (
+            [path.name for path in folder.iterdir() if path.name not in (LOCK, "sweep.toml", "scenario.toml")]
+            if (folder.is_dir())
+            else []
+        )
+        if any(not name.endswith(".partial") for name in rest):
+            raise FolderError(f"{where}: there are other things in it ({min(rest)}); give a new folder, or a sweep's")
+        return False
+    try:
+        found = json.loads(manifest.read_text(encoding="utf-8"))
+        name, runs, mark, made_with = (found[key] for key in ("name", "runs", "fingerprint", "versions"))
+    except (ValueError, KeyError, TypeError):
+        raise FolderError(f"{where}: its {MANIFEST} cannot be read; give another folder by --out") from None
+    if mark != whole["fingerprint"]:
+        same = "as it was before its file, its scenario or its feeder was changed" if name == whole["name"] else "now"
+        raise FolderError(
+            f'{where}: holds the sweep "{name}" of {runs} runs {same}, not "{whole["name"]}" of {whole["runs"]}; '
+            "give another folder by --out, or remove this one"
+        )
+    now = _versions()
+    other = [f"{key} {was}, here is {now.get(key, 'none')}" for key, was in made_with.items() if now.get(key) != was]
+    if other:
+        raise FolderError(
+            f"{where}: was begun with {'; '.join(other)}: rows of both would not compare to the last digit; go on with "
+            "the same versions, or begin in another folder by --out"
+        )
+    return True
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions that the numbers depend on; Zenoh has no part in a run in one process."""
+    return {name: version for name, version in versions().items() if name != "eclipse-zenoh"}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,22 +1,129 @@
-"""The results of a sweep: a pandas table with a row per run, and the Parquet file with every parameter and index.
-
-Rows are in the order of the plan whatever order they were finished in, and columns depend on the plan and the rows
-alone; so the same sweep gives an equal table, undisturbed or resumed, here or on a cluster.
-"""
+"""The table of a sweep, and units and words for its columns."""
 
 from __future__ import annotations
 
 import json
+import re
+import typing
 from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import msgspec
 import pandas as pd
 
+from gridpeers.scenarios.run_request import versions
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.sweep.column_labels import unit_of
-from gridpeers.scenarios.sweep.file import Plan
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
-from gridpeers.scenarios.versions import versions
+from gridpeers.scenarios.sweep.sweep_reading import Plan
+from gridpeers.wire.schema.table_schema import INLINE, Field, Label, fields_of
+
+_SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
+
+
+class IndexAxis(NamedTuple):
+    """The axis of an index."""
+
+    label: str
+    """Words instead of the index's name."""
+    least: float
+    """Least length, in the index's unit: smaller differences are rounding, or too small to see.
+
+    Settled indexes have the last digit that the paper prints, times a usual control period.
+    """
+
+
+INDEXES = {
+    "f_error_Hz": IndexAxis("settled abs(f - f_nom) (Hz)", 0.01),
+    "MPSI": IndexAxis("settled power sharing index, MPSI", 0.01),
+    "V_error": IndexAxis("settled mean abs(V - 1) (pu)", 0.001),
+    "MQSI": IndexAxis("settled var sharing index, MQSI", 0.01),
+    "t_restore_s": IndexAxis("time to restore f and sharing (s)", 0.02),
+    "t_load_s": IndexAxis("time to take over the load (s)", 0.02),
+    "t_f_s": IndexAxis("time to restore f (s)", 0.02),
+    "t_share_s": IndexAxis("time to share power (s)", 0.02),
+    "f_swing_Hz": IndexAxis("swing of f at the end (Hz)", 0.001),
+    "V_swing_pu": IndexAxis("swing of V at the end (pu)", 0.0001),
+    "f_off_Hz": IndexAxis("largest abs(f - f_nom) at the end (Hz)", 0.01),
+    "S_max_pu": IndexAxis("largest apparent power at the end (pu)", 0.01),
+    "V_min_pu": IndexAxis("least voltage at the end (pu)", 0.001),
+    "V_max_pu": IndexAxis("largest voltage at the end (pu)", 0.001),
+    "steady": IndexAxis("steady at the end (1: yes, 0: no)", 1.0),
+}
+"""Axes of the project's own indexes."""
+
+GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
+"""Axis labels for the parameters of drawn graphs, which no scenario file has."""
+
+
+def unit_of(name: str) -> str:
+    """Return the unit of a column: of a key of the scenario its own, of an index the end of its name.
+
+    Examples
+    --------
+    >>> unit_of("event1.t_restore_s"), unit_of("case.IV.gains.k_p"), unit_of("event1.p.inv1"), unit_of("event1.MPSI")
+    ('s', 's', 'pu', '')
+    """
+    field = _field_at(_apart(name)[0])
+    if field is not None and field.unit:
+        return field.unit
+    parts = name.split(".")
+    if parts[-1] == "V_error" or parts[-2:-1] == ["p"]:
+        return "pu"
+    suffix = parts[-1].rpartition("_")[2]
+    return suffix if suffix in _SUFFIXES and suffix != parts[-1] else ""
+
+
+def label_of(name: str) -> str:
+    """Return words for an axis, with the unit.
+
+    A key whose field has no `Label` is named by its last part and its table.
+
+    Examples
+    --------
+    >>> label_of("time.T_c_s"), label_of("case.IV.gains.k_p"), label_of("link[1].delay")
+    ('control period, T_c (s)', 'gain of P_set, k_p (s), case IV', 'delay of the links (s)')
+    >>> label_of("degraded_communication.T_age_s"), label_of("plant.gfm.k_pp")
+    ('T_age of [degraded_communication] (s)', 'k_pp of [plant.gfm] (rad/s per pu)')
+    """
+    if (index := name.rpartition(".")[2]) in INDEXES:
+        return INDEXES[index].label
+    key, case = _apart(name)
+    field, unit = _field_at(key), unit_of(key)
+    label = field.mark(Label) if field else None
+    table, _, last = key.rpartition(".")
+    words = last.removesuffix("_" + unit) + (f" of [{table}]" if table else "")
+    words = label.text if label else GRAPH_WORDS.get(key, words)
+    return words + (f" ({unit})" if unit else "") + (f", case {case}" if case else "")
+
+
+def _apart(name: str) -> tuple[str, str]:
+    """Return the key of a column without its case and its numbers in lists, and the case."""
+    case = re.match(r"case\.([^.]+)\.", name)
+    return re.sub(r"\[\d+\]", "", name[case.end() :] if case else name), case[1] if case else ""
+
+
+def _field_at(key: str) -> Field | None:
+    """Return the field of the scenario file at a key, None if there is none."""
+    struct: Any = ScenarioModel
+    found = None
+    for step in key.split("."):
+        fields = fields_of(struct) if struct is not None else ()
+        inline = (inner for field in fields if INLINE in field.marks for inner in fields_of(field.type))
+        found = next((field for field in (*fields, *inline) if step in (field.key, field.name)), None)
+        if found is None:
+            return None
+        struct = _struct_in(found.type)
+    return found
+
+
+def _struct_in(annotation: Any) -> type[msgspec.Struct] | None:
+    """Return the struct that a field is, or has in a list or as an option."""
+    if isinstance(annotation, type) and issubclass(annotation, msgspec.Struct):
+        return annotation
+    return next((found for part in typing.get_args(annotation) if (found := _struct_in(part))), None)
+
 
 FILE = "results.parquet"
 

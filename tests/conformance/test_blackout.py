@@ -5,10 +5,10 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.results.event_windows import as_they_came, windows
 from gridpeers.scenarios.results.history import History, Nameplates
 from gridpeers.scenarios.results.metrics import measure
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.scenario_writing import to_toml

@@ -9,8 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control, DegradedCommunication, GraphRule, LawChoice
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.drivers.direct import messages_decide
-from gridpeers.scenarios.drivers.inprocess import InprocessBus, run_inprocess
+from gridpeers.scenarios.drivers.inprocess import InprocessBus, messages_decide, run_inprocess
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.messages import PlantEvent, Telemetry

@@ -13,7 +13,7 @@ import pytest
 from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
 from gridpeers.plant.plant_config import PlantConfig, SwitchEvent
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from tests.toy.toy_configs import Schedule, toy_configs

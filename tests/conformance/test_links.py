@@ -9,9 +9,9 @@ import pytest
 
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 

@@ -13,7 +13,6 @@ import pytest
 from gridpeers.lab.trace.flows import Flow, flows
 from gridpeers.lab.trace.space_time_diagram import space_time_diagram
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.lab.trace.space_time_diagram import space_time_diagram
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
 

@@ -22,15 +22,14 @@ from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from gridpeers.scenarios.drivers.telemetry_stream import TelemetryStream
+from gridpeers.scenarios.drivers.telemetry_stream import TelemetryEndpoint, TelemetryStream
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.emulation.link_reports import data_of, decode_statuses
-from gridpeers.scenarios.live.client.run_client import RunClient
-from gridpeers.scenarios.live.requests.plant_status import PlantStatus
-from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
-from gridpeers.scenarios.live.show.link_table import links_text
+from gridpeers.scenarios.live.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.link_requests import links_text
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.viewer.run_view import Cursor, RunView

@@ -13,8 +13,8 @@ import pytest
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.emulation.link_command import LinkCommand
 from gridpeers.scenarios.emulation.link_reports import data_of, decode_statuses
-from gridpeers.scenarios.live.requests.agent_configs import read_config
-from gridpeers.scenarios.live.show.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.feeder_map import read_feeder_map
+from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.run_files import FolderError
 from gridpeers.scenarios.results.run_journal import JOURNAL, rows_in

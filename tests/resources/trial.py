@@ -13,7 +13,7 @@ from typing import NamedTuple
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.resources.attack import LINKED, Attack
 from tests.resources.usage import Memory, MemoryWatch, log_bytes

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from gridpeers.plant.build import build_plant
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.wire.messages import PLANT

@@ -15,7 +15,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Children
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from tests.toy.toy_runs import ProcessRun
 
 PROGRAM = Path(__file__).parents[2] / "examples" / "foreign_agent.py"

@@ -10,8 +10,8 @@ from typing import Any
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child, Children
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.drivers.process_driver import run_processes
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.messages import PlantEvent, Telemetry
 from tests.toy import toy_plant
 

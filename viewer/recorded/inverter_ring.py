@@ -6,7 +6,7 @@ from math import cos, pi, sin
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import FeederError, read_feeder
-from gridpeers.scenarios.live.show.feeder_map import FeederMap, MapInverter
+from gridpeers.scenarios.live.feeder_map import FeederMap, MapInverter
 from gridpeers.scenarios.record.record_info import RecordInfo
 
 

@@ -14,9 +14,8 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment.load_powers import set_power
 from gridpeers.rooms import ROOMS
-from gridpeers.scenarios.live.requests.plant_status import PlantStatus
-from gridpeers.scenarios.live.show.feeder_map import FeederMap, feeder_map
-from gridpeers.scenarios.live.show.snapshot import InverterStatus
+from gridpeers.scenarios.live.feeder_map import FeederMap, feeder_map
+from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.viewer.link_states import LinkView
 from gridpeers.viewer.liveness import LivenessView

@@ -244,7 +244,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     from gridpeers.scenarios.proposal.proposal_errors import NoProposalError
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema import load_scenario
-    from gridpeers.scenarios.start_check import start_problem
+    from gridpeers.scenarios.schema.check_notes import start_problem
     from gridpeers.wire.counted import counted
     from gridpeers.wire.driver.command_line import command_line
 

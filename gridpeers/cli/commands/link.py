@@ -9,7 +9,7 @@ import typer
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.run_address import Access
 
 if TYPE_CHECKING:
     from gridpeers.agents.agent_config import AgentConfig
@@ -64,7 +64,7 @@ def set_(
         given = {"loss": loss, "duplicate": duplicate, "corrupt": corrupt, "rate": rate}
         fault = {key: value for key, value in given.items() if value is not None} | _delay(delay, jitter)
         if not fault and not profile:
-            from gridpeers.scenarios.live.client.run_address import UsageError
+            from gridpeers.scenarios.live.run_address import UsageError
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
@@ -148,8 +148,7 @@ def show(
     Example:  gridpeers link show
     """
     with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
-        from gridpeers.scenarios.live.requests.link_requests import link_states
-        from gridpeers.scenarios.live.show.link_table import links_text
+        from gridpeers.scenarios.live.link_requests import link_states, links_text
 
         t, states, silent = link_states(client)
         typer.echo(links_text(run, t, states), nl=False)
@@ -159,7 +158,7 @@ def show(
 
 def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
     from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Uniform
-    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.live.run_address import UsageError
     from gridpeers.wire.schema.plausible import Plausible
 
     if jitter is None:
@@ -177,7 +176,7 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 def _pattern(links: list[str], arrow: str) -> str:
     from gridpeers.scenarios.emulation.link_command import EVERYTHING
-    from gridpeers.scenarios.live.client.run_address import UsageError
+    from gridpeers.scenarios.live.run_address import UsageError
 
     if not links:
         return EVERYTHING
@@ -208,8 +207,8 @@ def _give(
     from gridpeers.netem.schema.fault import Fault
     from gridpeers.netem.schema.pattern import objections
     from gridpeers.scenarios.emulation.link_command import LinkCommand
-    from gridpeers.scenarios.live.client.run_address import UsageError
-    from gridpeers.scenarios.live.requests.link_requests import check_link_command, command_links, links_of_run
+    from gridpeers.scenarios.live.link_requests import check_link_command, command_links, links_of_run
+    from gridpeers.scenarios.live.run_address import UsageError
 
     on = _pattern(links, arrow)
     if wrong := objections(on, None, {}):

@@ -8,7 +8,7 @@ import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
-from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.run_address import Access
 
 
 def status(
@@ -24,8 +24,7 @@ def status(
     Example:  gridpeers status
     """
     with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
-        from gridpeers.scenarios.live.show.render import plain
-        from gridpeers.scenarios.live.show.watching import look
+        from gridpeers.scenarios.live.watching import look, plain
 
         typer.echo(plain(look(client)), nl=False)
 
@@ -46,11 +45,11 @@ def watch(
     Example:  gridpeers watch --keys lab --connect tls/192.168.1.10:7447
     """
     with usage_errors():
-        from gridpeers.scenarios.live.client.run_address import check_duration
+        from gridpeers.scenarios.live.run_address import check_duration
 
         check_duration(duration)
     with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
-        from gridpeers.scenarios.live.show.watching import watch as watch_run
+        from gridpeers.scenarios.live.watching import watch as watch_run
 
         watch_run(client, terminal(), duration)
 
@@ -73,7 +72,7 @@ def stop(
     Example:  gridpeers stop inv2
     """
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from gridpeers.scenarios.live.requests.run_requests import LEAVING, ask, has_left
+        from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_left
 
         typer.echo(ask(client, "stop", inverter))
         if not has_left(client, inverter):
@@ -104,7 +103,7 @@ def event(
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from gridpeers.scenarios.live.requests.run_requests import ask
+        from gridpeers.scenarios.live.run_requests import ask
 
         closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
         typer.echo(ask(client, "open" if action == "open" else closing, switch))
@@ -125,7 +124,7 @@ def down(
     Example:  gridpeers down --run lab
     """
     with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
-        from gridpeers.scenarios.live.requests.run_requests import LEAVING, ask, has_ended
+        from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_ended
 
         typer.echo(ask(client, "down"))
         if not has_ended(client):

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
-from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.run_address import Access
 
 
 def load(
@@ -38,10 +38,10 @@ def load(
     Example:  gridpeers load 48 --factor 1.5
     """
     with usage_errors():
-        from gridpeers.scenarios.live.requests.load_request import load_setting
+        from gridpeers.scenarios.live.run_requests import load_setting
 
         setting = load_setting(factor, P, Q)
     with run_client(run, connect, wait, Access(keys, member, insecure), acts=True) as client:
-        from gridpeers.scenarios.live.requests.run_requests import ask
+        from gridpeers.scenarios.live.run_requests import ask
 
         typer.echo(ask(client, "load", name, setting))

@@ -13,13 +13,12 @@ from gridpeers.cli.usage import BAD_INPUT, fail, require
 from gridpeers.wire.trust.member import Role
 
 if TYPE_CHECKING:
-    from gridpeers.scenarios.live.client.access import Access
-    from gridpeers.scenarios.live.client.run_address import RunAddress
-    from gridpeers.scenarios.live.client.run_client import RunClient
+    from gridpeers.scenarios.live.run_address import Access, RunAddress
+    from gridpeers.scenarios.live.run_client import RunClient
     from gridpeers.wire.trust.credentials import Credentials
 
 RUN, ENDPOINT = "gridpeers", "tcp/127.0.0.1:7447"
-"""The same as in `gridpeers.scenarios.live.client.run_address`; a test compares them."""
+"""The same as in `gridpeers.scenarios.live.run_address`; a test compares them."""
 
 Run = Annotated[str, typer.Option("--run", metavar="NAME", help="Name of the run; runs of other names do not meet.")]
 Connect = Annotated[
@@ -64,8 +63,8 @@ def run_client(
     """
     require({"zenoh": "the connection to a run"})
     with usage_errors():
-        from gridpeers.scenarios.live.client.run_address import check_wait
-        from gridpeers.scenarios.live.client.run_client import RunClient
+        from gridpeers.scenarios.live.run_address import check_wait
+        from gridpeers.scenarios.live.run_client import RunClient
         from gridpeers.wire.trust.key_folder import COMMANDING
 
         check_wait(wait)
@@ -83,8 +82,7 @@ def address(run: str, connect: list[str] | None, access: Access, roles: tuple[Ro
     """Return the address of a run, with the credentials for it; raise UsageError or KeysError if they do not fit."""
     from dataclasses import replace
 
-    from gridpeers.scenarios.live.client.access import objection, with_protocol
-    from gridpeers.scenarios.live.client.run_address import UsageError, address_of
+    from gridpeers.scenarios.live.run_address import UsageError, address_of, objection, with_protocol
 
     where = address_of(run, connect)
     keys = access.keys is not None
@@ -99,7 +97,7 @@ def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentia
     """Return the credentials of a command; say so if the certificate ends soon."""
     if access.keys is None:
         if access.name:
-            from gridpeers.scenarios.live.client.run_address import UsageError
+            from gridpeers.scenarios.live.run_address import UsageError
 
             raise UsageError("--as: chooses a certificate; say --keys DIR, too")
         return None
@@ -116,9 +114,9 @@ def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentia
 def usage_errors() -> Iterator[None]:
     """End the command with one line and exit code 2 on a usage error, or if the run is not there."""
     from gridpeers.scenarios.drivers.free_endpoint import ListenError
-    from gridpeers.scenarios.live.client.run_address import UsageError
-    from gridpeers.scenarios.live.client.run_client import NobodyError
-    from gridpeers.scenarios.live.requests.run_requests import RefusedError
+    from gridpeers.scenarios.live.run_address import UsageError
+    from gridpeers.scenarios.live.run_client import NobodyError
+    from gridpeers.scenarios.live.run_requests import RefusedError
     from gridpeers.scenarios.results.run_files import FolderError
     from gridpeers.wire.driver.process import ConfigurationError
     from gridpeers.wire.driver.session import SessionError

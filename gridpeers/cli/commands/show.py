@@ -46,10 +46,8 @@ def check(
     from gridpeers.cli.progress import TRYING, explained_work
     from gridpeers.scenarios.predict.robustness_notes import robustness_notes
     from gridpeers.scenarios.results.file_sizes import file_sizes
-    from gridpeers.scenarios.schema.liar_notes import liar_notes
-    from gridpeers.scenarios.schema.security_notes import security_notes
+    from gridpeers.scenarios.schema.check_notes import liar_notes, security_notes, start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
-    from gridpeers.scenarios.start_check import start_problem
 
     with explained_work(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)

@@ -22,12 +22,12 @@ from gridpeers.cli.commands.options import (
     usage_errors,
 )
 from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
-from gridpeers.scenarios.live.client.access import Access
+from gridpeers.scenarios.live.run_address import Access
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.output import watch_readers
 
 if TYPE_CHECKING:
-    from gridpeers.scenarios.live.launch.live_processes import ProcessOutcome
+    from gridpeers.scenarios.live.live_processes import ProcessOutcome
 
 _Case = Annotated[str, typer.Option("--case", metavar="NAME", help="Case of the scenario; its last when left out.")]
 _Listen = Annotated[
@@ -75,9 +75,15 @@ def _start(
     """Run the plant, with its agents or without; its arguments are the options of both commands."""
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
-        from gridpeers.scenarios.live.client.access import objection, with_protocol
-        from gridpeers.scenarios.live.client.run_address import RunAddress, UsageError, check_endpoint, check_name
-        from gridpeers.scenarios.live.launch.plant_endpoint import check_alone, endpoint_for_run
+        from gridpeers.scenarios.live.live_options import check_alone, endpoint_for_run
+        from gridpeers.scenarios.live.run_address import (
+            RunAddress,
+            UsageError,
+            check_endpoint,
+            check_name,
+            objection,
+            with_protocol,
+        )
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_name("--run", run)
@@ -91,11 +97,11 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
-        from gridpeers.scenarios.live.launch.link_log import LinkLog, check_new
-        from gridpeers.scenarios.live.launch.live_folders import folders, live_record
-        from gridpeers.scenarios.live.launch.live_options import LiveOptions, chosen_case, configure, manual_node_faults
-        from gridpeers.scenarios.live.launch.live_processes import all_here, plant_here, say
-        from gridpeers.scenarios.live.numbers.live_report import conclude
+        from gridpeers.scenarios.live.link_log import LinkLog, check_new
+        from gridpeers.scenarios.live.live_folders import folders, live_record
+        from gridpeers.scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
+        from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
+        from gridpeers.scenarios.live.live_report import conclude
         from gridpeers.scenarios.record.record_info import LIVE
         from gridpeers.scenarios.results.file_sizes import HOUR, file_sizes, require_room
         from gridpeers.scenarios.results.metrics_file import RunMetrics
@@ -215,9 +221,14 @@ def agent(
     require({"zenoh": "an agent"})
     with usage_errors():
         from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-        from gridpeers.scenarios.live.client.access import objection
-        from gridpeers.scenarios.live.client.run_address import UsageError, check_endpoint, check_inverters, check_wait
-        from gridpeers.scenarios.live.launch.live_processes import agent_here
+        from gridpeers.scenarios.live.live_processes import agent_here
+        from gridpeers.scenarios.live.run_address import (
+            UsageError,
+            check_endpoint,
+            check_inverters,
+            check_wait,
+            objection,
+        )
 
         check_inverters(inverters)
         if keys is not None and len(inverters) > 1:

@@ -12,8 +12,8 @@ from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, Dask, f
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from gridpeers.scenarios.sweep.file import Plan
     from gridpeers.scenarios.sweep.study import Summary
+    from gridpeers.scenarios.sweep.sweep_reading import Plan
 
 _PACKAGES = {"joblib": "the runs over all cores", "pyarrow": "the table", "matplotlib": "the plots"}
 
@@ -40,7 +40,7 @@ def sweep(
     Example:  gridpeers sweep topology --jobs 2
     """
     from gridpeers.scenarios.schema import ScenarioError
-    from gridpeers.scenarios.sweep.file import read_sweep
+    from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 
     try:
         plan = read_sweep(file)
@@ -50,7 +50,7 @@ def sweep(
     if dry_run:
         typer.echo(_size(file, plan))
         return
-    from gridpeers.scenarios.sweep.sweep_folder import folder_of
+    from gridpeers.scenarios.sweep.study import folder_of
 
     again = ["sweep", file, *(["--out", str(out)] if out else [])]
     summary = finish(file, plan, folder_of(out, plan.name), jobs, dask, again)
@@ -84,8 +84,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import BASIS_RUNS, remaining
     from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
-    from gridpeers.scenarios.sweep.study import study
-    from gridpeers.scenarios.sweep.sweep_folder import SweepFolder
+    from gridpeers.scenarios.sweep.study import SweepFolder, study
     from gridpeers.scenarios.sweep.workers import WorkersError, cores
     from gridpeers.wire.driver.command_line import command_line
 

@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_info
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.results.record import Recorded, Recorder
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
-from gridpeers.scenarios.sweep.file import read_sweep
+from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 
 FILES = sorted(Path(__file__).parent.glob("*.toml"))
 """Scenario files and, where the name begins with `sweep`, sweep files; none of them can be run."""

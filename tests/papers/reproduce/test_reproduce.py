@@ -20,7 +20,7 @@ from gridpeers.scenarios.results.evaluation.claims import judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.schema import load_scenario
-from gridpeers.scenarios.sweep.file.graph_axis import algebraic_connectivity
+from gridpeers.scenarios.sweep.axes import algebraic_connectivity
 
 ISLANDING: Part = PARTS[0]
 PIXEL = bytes.fromhex(

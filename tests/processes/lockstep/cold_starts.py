@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Literal
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_runs import ProcessRun
 

@@ -19,7 +19,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.gridlabd.process.delta_mode_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
 from gridpeers.plant.plant_config import PlantConfig, Protection
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.wire.messages import Telemetry

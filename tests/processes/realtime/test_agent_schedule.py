@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.children import Child
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_runs import ProcessRun, exists
 

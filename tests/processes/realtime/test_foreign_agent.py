@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from msgspec.structs import replace
 
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.results.sharing_index import sharing_index
 from gridpeers.scenarios.schema import load_scenario
 from tests.toy.mixed import Mixed

@@ -13,8 +13,8 @@ from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.drivers.outcome import Outcome
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from tests.toy.toy_runs import ProcessRun
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.sweep.file import read_sweep
 from gridpeers.scenarios.sweep.sweep_case import run_one
+from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 from tests.command_line import invoke
 
 

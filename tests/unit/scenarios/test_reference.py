@@ -14,8 +14,7 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
-from gridpeers.scenarios.field_docs import field_docs
-from gridpeers.scenarios.reference import TOPICS, page
+from gridpeers.scenarios.reference import TOPICS, field_docs, page
 from gridpeers.scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from gridpeers.wire import keys, messages
 from gridpeers.wire.schema.table_schema import fields_of

@@ -16,7 +16,7 @@ import pytest
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from gridpeers.scenarios.live.client.run_address import ENDPOINT, RUN, RunAddress
+from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
 from gridpeers.viewer.own_agents import OwnAgents
 from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, command_line
 from gridpeers.wire.codec import decode, encode
@@ -85,7 +85,7 @@ def commands(monkeypatch: pytest.MonkeyPatch) -> list[Command]:
     told: list[Command] = []
     monkeypatch.setattr(Plant, "commands", told, raising=False)
     monkeypatch.setattr("gridpeers.viewer.page_actions.RunClient", Plant)
-    monkeypatch.setattr("gridpeers.scenarios.live.client.run_client.RunClient", Plant)
+    monkeypatch.setattr("gridpeers.scenarios.live.run_client.RunClient", Plant)
     return told
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.scenarios.live.client.run_address import UsageError
+from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.viewer.page_address import access
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.emulation.link_reports import LinkStatus
-from gridpeers.scenarios.live.requests.plant_status import PlantStatus
+from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.viewer.liveness import FROZEN
 from gridpeers.viewer.run_view import Cursor, RunView
 from gridpeers.viewer.strips import LENGTH, STEP

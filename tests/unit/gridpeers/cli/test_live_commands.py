@@ -11,8 +11,8 @@ import pytest
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.cli.commands import options
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.live.client import run_address
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live import run_address
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.schema import load_scenario
 from tests.command_line import invoke
 

@@ -68,8 +68,8 @@ def test_a_host_whose_loopback_is_down_is_told_before_anything_starts(text: str)
 def test_a_plant_is_not_waited_for_where_nothing_can_be_reached() -> None:
     """The search for one on the loopback ends at its first look, with the same advice."""
     told = _apart(
-        "from gridpeers.scenarios.live.client.run_address import address_of\n"
-        "from gridpeers.scenarios.live.client.run_client import RunClient\n"
+        "from gridpeers.scenarios.live.run_address import address_of\n"
+        "from gridpeers.scenarios.live.run_client import RunClient\n"
         "with RunClient(address_of('lab', None)) as client: client.find_plant(60.0)"
     )
 

@@ -13,7 +13,7 @@ from gridpeers.agents.agent_config import AgentConfig, Control, GraphRule
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.wire.actions import Publish
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import Stop

@@ -4,8 +4,7 @@ from dataclasses import dataclass, field
 
 from msgspec.structs import replace
 
-from gridpeers.scenarios.drivers.telemetry_endpoint import TelemetryEndpoint
-from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryStream
+from gridpeers.scenarios.drivers.telemetry_stream import QUIET, TelemetryEndpoint, TelemetryStream
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, LinkReport, LinkRequest, Telemetry

@@ -17,7 +17,7 @@ from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates, read_only
 from gridpeers.scenarios.results.metrics import Steady
-from gridpeers.scenarios.sweep.column_labels import unit_of
+from gridpeers.scenarios.sweep.sweep_table import unit_of
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from gridpeers.wire.plugins.registry import PluginError
 

@@ -7,7 +7,7 @@ import pytest
 
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.live.launch.live_options import LiveOptions, configure
+from gridpeers.scenarios.live.live_options import LiveOptions, configure
 from gridpeers.scenarios.results.event_windows import as_they_came, late_moves
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs

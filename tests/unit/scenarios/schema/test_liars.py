@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
-from gridpeers.scenarios.schema.liar_notes import liar_notes
+from gridpeers.scenarios.schema.check_notes import liar_notes
 
 LIARS = """
 [time]

@@ -11,9 +11,8 @@ from gridpeers.plant.plant_config import LoadEvent
 from gridpeers.scenarios.results.plots.drawing import happening
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.scenarios.schema.load_changes import powers_after
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from gridpeers.scenarios.schema.supply import supply_notes
+from gridpeers.scenarios.schema.supply import powers_after, supply_notes
 from gridpeers.wire.messages import LoadSetting
 from tests.scenario_files import problems, written
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gridpeers.scenarios.schema import ScenarioError
-from gridpeers.scenarios.sweep.file import read_sweep, sweeps
-from gridpeers.scenarios.sweep.file.paths import PathError, put
+from gridpeers.scenarios.sweep.paths import PathError, put
+from gridpeers.scenarios.sweep.sweep_reading import read_sweep, sweeps
 from tests.unit.scenarios.sweep.conftest import Write
 
 

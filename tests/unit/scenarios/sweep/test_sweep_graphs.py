@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
 
-from gridpeers.scenarios.sweep.file.graph_axis import Edges, algebraic_connectivity, connected_graph, connected_graphs
+from gridpeers.scenarios.sweep.axes import Edges, algebraic_connectivity, connected_graph, connected_graphs
 
 
 @settings(max_examples=100)

@@ -13,10 +13,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.sweep.column_labels import label_of
-from gridpeers.scenarios.sweep.statistics import figures_of, indexes_of, is_drawn, spread_of, values_of
 from gridpeers.scenarios.sweep.sweep_case import FATE
-from gridpeers.scenarios.sweep.sweep_plots import curves, draw_all, heat_maps
+from gridpeers.scenarios.sweep.sweep_plots import (
+    curves,
+    draw_all,
+    figures_of,
+    heat_maps,
+    indexes_of,
+    is_drawn,
+    spread_of,
+    values_of,
+)
+from gridpeers.scenarios.sweep.sweep_table import label_of
 
 
 def table(parameters: dict[str, list[Any]], **indexes: list[float | None]) -> pd.DataFrame:

@@ -23,16 +23,15 @@ from gridpeers.plant.dynamics import Circuit
 from gridpeers.plant.dynamics.live_network import LiveNetwork
 from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.drivers.outcome import Outcome
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.run_files import FolderError
+from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.loading import load_scenario
 from gridpeers.scenarios.sweep import sweep_case
-from gridpeers.scenarios.sweep.file import read_sweep
-from gridpeers.scenarios.sweep.study import Summary, study
+from gridpeers.scenarios.sweep.study import Summary, SweepFolder, study
 from gridpeers.scenarios.sweep.sweep_case import plant_at_start
-from gridpeers.scenarios.sweep.sweep_folder import SweepFolder
+from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 from gridpeers.wire.messages import PlantEvent
 from tests.unit.scenarios.sweep.conftest import Write
 

@@ -1,0 +1,336 @@
+"""Departures of a run from its scenario: what people did or left undone, and the windows that it disturbs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf
+from typing import NamedTuple
+
+from gridpeers.netem.models.loss import Bernoulli
+from gridpeers.netem.schema.fault import Span
+from gridpeers.netem.schema.pattern import Link
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.bus_islands import switch_names
+from gridpeers.plant.equipment.named_loads import load_name, named_loads
+from gridpeers.scenarios.live.run_monitor import line_of
+from gridpeers.scenarios.results.event_windows import Window, as_they_came, windows
+from gridpeers.scenarios.results.island_membership import is_closed
+from gridpeers.scenarios.results.steadiness import STEADY
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.wire.messages import PLANT, PlantEvent
+
+_NOTICED = 1.0
+"""Time (s) after the end of a fault until which a silence is its doing: states have to come and to be reported."""
+
+_RECOVERED = 10.0
+"""Time (s) after a pause until which its links may yet have to be made anew."""
+
+_RARE = 0.3
+"""Probability of independent losses at which a dozen in a row come once in two million."""
+
+_SILENT = re.compile(r"\S+ is silent: (?:.* (no measurement))?")
+_DEAF = re.compile(r"\S+ does not hear ([^:]+):")
+_AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
+
+
+class ExpectedSilence:
+    """Recognise events of silence (`gridpeers.plant.realtime.silence_detector`) that the scenario itself causes.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        With its one case.
+    feeder : Feeder
+        Its feeder.
+    """
+
+    def __init__(self, scenario: ScenarioModel, feeder: Feeder) -> None:
+        (case,) = scenario.cases
+        setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True)
+        self._netem, self._microgrids = setup.netem, setup.microgrids
+
+    def __call__(self, event: PlantEvent) -> bool:
+        """Return whether an event ends a silence, or begins one that a fault of the scenario causes."""
+        if _AGAIN.match(event.text):
+            return True
+        name, t = event.subject, event.t
+        if match := _SILENT.match(event.text):
+            return self._hurt(name, t) or (bool(match[1]) and self._cut_off(PLANT, name, t))
+        if match := _DEAF.match(event.text):
+            others = match[1].split(", ")
+            return self._hurt(name, t) or all(self._hurt(one, t) or self._cut_off(one, name, t) for one in others)
+        return False
+
+    def _hurt(self, name: str, t: float) -> bool:
+        """Whether an agent is paused, slow or dead at t (s), or was shortly before."""
+        return any(
+            node.name == name
+            and (node.kill or node.pause or node.slow_s > 0.0)
+            and node.from_s <= t < (inf if node.to_s is None else node.to_s + _RECOVERED)
+            for node in self._netem.nodes
+        )
+
+    def _cut_off(self, src: str, dst: str, t: float) -> bool:
+        """Whether a fault that can keep back all messages acts on a link at t (s) or shortly before."""
+        spans = self._netem.spans(Link(src, dst), self._microgrids)
+        return any(_silences(span) and span.from_s <= t < span.to_s + _NOTICED for span in spans)
+
+
+def _silences(span: Span) -> bool:
+    """Whether a fault can keep back or delay a dozen messages one after the other."""
+    if isinstance(span.model, Bernoulli):
+        return span.model.p > _RARE
+    return span.kind not in ("duplicate", "corrupt")
+
+
+NEAR = 1e-9
+"""Times (s) that differ by less are the same: they are multiples of the plant's step."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class LiveWindows:
+    """The windows of a live run, each kind in the order of time."""
+
+    measured: tuple[Window, ...]
+    """Windows with numbers: each lasts to the next event, of the scenario or live."""
+    too_short: tuple[Window, ...]
+    """Windows that the next event ended before the values could be steady."""
+    not_reached: tuple[Window, ...]
+    """Windows of the scenario whose end the run did not reach."""
+    unrecorded: tuple[Window, ...]
+    """Windows without numbers, as rows are missing at their end, where they are measured."""
+
+
+def live_events(done: Iterable[PlantEvent]) -> tuple[tuple[str, float], ...]:
+    """Return label and time (s) of each event that people made on switches and loads; those of one step are one event.
+
+    Examples
+    --------
+    >>> live_events([PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened")])
+    (('live at 2.5 s', 2.5),)
+    """
+    return tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in done))
+
+
+def live_windows(
+    scenario: ScenarioModel,
+    events: Iterable[PlantEvent],
+    live: Sequence[tuple[str, float]],
+    ended: float,
+    missing: Sequence[tuple[float, float]] = (),
+) -> LiveWindows:
+    """Return the windows of a live run.
+
+    A live event opens a window as the scenario's events do, and ends the one before it. Its own window lasts to the
+    next event or to the end of the run, whatever the scenario says of its end. A switch operated at the moment of an
+    event of the scenario belongs to the window of that event.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        As run.
+    events : Iterable[PlantEvent]
+        The plant's events.
+    live : Sequence[tuple[str, float]]
+        Label and time (s) of the live events, in the order of time.
+    ended : float
+        Time (s) of the last row.
+    missing : Sequence[tuple[float, float]], optional
+        Times (s) of the rows before and after each interval without rows.
+    """
+    meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
+    scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
+    starts = [window.start for window in scripted]
+    live = [(label, t) for label, t in live if all(abs(t - start) > NEAR for start in starts)]
+    reached, not_reached = [], []
+    for plan, window in zip(meant, scripted, strict=True):
+        cut = [t for _, t in live if window.start < t < window.end - NEAR]
+        if cut or plan.end <= ended + NEAR:
+            reached.append(replace(window, end=cut[0]) if cut else window)
+        else:
+            not_reached.append(plan)
+    starts += [t for _, t in live]
+    for label, t in live:
+        end = min((start for start in starts if start > t), default=ended)
+        reached.append(Window(label=label, start=t, end=min(end, ended)))
+    reached.sort(key=lambda window: window.start)
+    shortest = max(STEADY, 2.0 * scenario.time.record_s) - NEAR
+    too_short = [one for one in reached if one not in scripted and one.end - one.start < shortest]
+    unrecorded = [
+        one
+        for one in reached
+        if one not in too_short and any(a < one.end and b > one.end - STEADY - NEAR for a, b in missing)
+    ]
+    return LiveWindows(
+        measured=tuple(one for one in reached if one not in too_short and one not in unrecorded),
+        too_short=tuple(too_short),
+        not_reached=tuple(not_reached),
+        unrecorded=tuple(unrecorded),
+    )
+
+
+_SHOWN = 3
+"""Most departures in a note; metrics.json has all of them."""
+
+
+def few(lines: Sequence[str]) -> str:
+    """Return the first lines, and the number of the others."""
+    more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
+    return f"{'; '.join(lines[:_SHOWN])}{more}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Departures:
+    """The departures of a run from its scenario, and its windows of measurement."""
+
+    events: tuple[PlantEvent, ...]
+    """The departures, in the order of time."""
+    disturbed: tuple[Window, ...]
+    """Measured windows of the scenario, as it means them, that end after the first departure or miss rows: the plant
+    remembers whatever happened to it."""
+    windows: LiveWindows
+    """The windows of the scenario's events, and of those that people made on switches and loads."""
+    live: Mapping[str, str]
+    """By label, the operations of each event that people made."""
+
+    def lines(self, end: float = inf) -> list[str]:
+        """Return the departures before a time (s), one line each."""
+        return [line_of(event).strip() for event in self.events if event.t < end]
+
+    @property
+    def note(self) -> str:
+        """A sentence on the disturbed windows; "" if there are none."""
+        if not self.disturbed:
+            return ""
+        lines = self.lines(self.disturbed[-1].end) or ["rows that are missing"]
+        names = ", ".join(window.label for window in self.disturbed)
+        return f"{names}: not what the scenario means by it, which does not tell of: {few(lines)}"
+
+
+class _Due(NamedTuple):
+    """A move of an agent that the scenario asks people, or the driver, to make."""
+
+    verb: str
+    """As the plant's events say it: "left", "joined" or "died"."""
+    name: str
+    since: float
+    until: float
+    """Times (s) between which it may happen."""
+    complaint: str = ""
+    """Text of the departure if it does not happen; "" if it need not."""
+    deadline: float = inf
+    """From when (s) on it is missing."""
+
+
+def compare(
+    scenario: ScenarioModel,
+    feeder: Feeder,
+    events: Sequence[PlantEvent],
+    ended: float,
+    missing: Sequence[tuple[float, float]] = (),
+) -> Departures:
+    """Compare a run with its scenario.
+
+    Parameters
+    ----------
+    scenario, feeder : ScenarioModel, Feeder
+        As run, with one case.
+    events : Sequence[PlantEvent]
+        The plant's events.
+    ended : float
+        Time (s) of the last row.
+    missing : Sequence[tuple[float, float]], optional
+        Times (s) of the rows before and after each interval without rows.
+    """
+    meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
+    switched = tuple(_switched(scenario, feeder, events))
+    commands = (event for event in events if event.kind == "link" and event.subject == "links")
+    departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
+    first = departures[0].t if departures else ended
+    live = live_events(switched)
+    opened = live_windows(scenario, events, live, ended, missing)
+    measured = {window.label for window in opened.measured}
+    return Departures(
+        events=tuple(departures),
+        disturbed=tuple(
+            window
+            for window in meant
+            if window.label in measured
+            and (first < window.end - NEAR or any(a < window.end and b > window.start for a, b in missing))
+        ),
+        windows=opened,
+        live={label: "; ".join(one.text for one in switched if one.t == t) for label, t in live},
+    )
+
+
+def _switched(scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent]) -> Iterator[PlantEvent]:
+    """Yield the switches that people operated and the loads that they set; opening an open switch changes nothing."""
+    switches, loads = switch_names(feeder), named_loads(feeder)
+    timeout = scenario.plant.sync_check.timeout
+    planned = [
+        (f"switch {closes}", switches[name], event.t_s, event.t_s + (timeout if closes and event.synchronised else 0.0))
+        for event in scenario.events
+        for names, closes in ((event.open, False), (event.close, True))
+        for name in names
+    ]
+    planned += [
+        ("load", load_name(loads, text), event.t_s, event.t_s) for event in scenario.events for text in event.load
+    ]
+    for event in events:
+        if event.kind not in ("switch", "load") or event.text.endswith(" already"):
+            continue
+        if event.kind == "switch":
+            done = f"switch {is_closed(event)}", switches.get(event.subject, event.subject)
+        else:
+            done = "load", event.subject
+        if not any(
+            done == (what, name) and since - NEAR < event.t < until + NEAR for what, name, since, until in planned
+        ):
+            yield event
+
+
+def _moved(
+    scenario: ScenarioModel, feeder: Feeder, events: Iterable[PlantEvent], meant: Sequence[Window], ended: float
+) -> Iterator[PlantEvent]:
+    """Yield the agents that joined, left or died against the scenario, and those that should have and did not."""
+    due = [*_due(scenario, meant)]
+    expected = ExpectedSilence(scenario, feeder)
+    first = {row.name for row in feeder.inverters}
+    for event in events:
+        if event.kind != "roster" or expected(event):
+            continue
+        match = re.match(rf"{re.escape(event.subject)} (joined|left|died)", event.text)
+        verb = match[1] if match else ""
+        if event.t == 0.0 and verb and event.subject in first:
+            continue  # another event, "started without", names the agents that are absent at the start
+        planned = [
+            one
+            for one in due
+            if (one.verb, one.name) == (verb, event.subject) and one.since - NEAR <= event.t < one.until
+        ]
+        if not planned:
+            yield event
+        elif planned[0].complaint:
+            due.remove(planned[0])
+    for one in due:
+        if one.complaint and one.deadline <= ended + NEAR:
+            yield PlantEvent(t=one.since, kind="roster", subject=one.name, text=one.complaint)
+
+
+def _due(scenario: ScenarioModel, meant: Sequence[Window]) -> Iterator[_Due]:
+    for event, window in zip(scenario.events, meant, strict=True):
+        start, end = window.start, window.end
+        for name in event.leave:
+            yield _Due("left", name, start, end, f"{name} was to leave, and nobody had it leave in time", end)
+        for name in event.join:
+            yield _Due("joined", name, start, end, f"{name} was to join, and nobody started it in time", end)
+    (case,) = scenario.cases
+    for node in netem_of(scenario, case).nodes:
+        if node.kill:
+            yield _Due("died", node.name, node.from_s, inf, f"{node.name} was to be killed, and was not", node.from_s)
+        elif node.pause:  # an agent paused for longer than Zenoh's lease counts as dead, until it goes on
+            yield _Due("died", node.name, node.from_s, inf)
+            yield _Due("joined", node.name, node.from_s, inf)

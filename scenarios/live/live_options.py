@@ -1,0 +1,248 @@
+"""What `plant` and `up` settle before a live run: options, the plant's endpoint, configurations of plant and agents."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import msgspec
+
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
+from gridpeers.scenarios.live.feeder_map import feeder_map
+from gridpeers.scenarios.live.run_address import (
+    LONGEST_TIME,
+    RUN,
+    Access,
+    RunAddress,
+    UsageError,
+    accepting,
+    check_duration,
+    check_endpoint,
+    check_wait,
+    loopback_of,
+    next_port,
+)
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.run_request import SPEEDS
+from gridpeers.scenarios.schema import ScenarioModel
+from gridpeers.scenarios.schema.configs import as_in, configs
+from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.scenario_model import NEEDS_KEYS
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.trust.credentials import Credentials
+
+LOOKING = 1.5
+"""Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""
+
+
+def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
+    """Return the endpoint where a plant will be able to listen, a free port for port 0.
+
+    Parameters
+    ----------
+    listen : str
+        The endpoint.
+    credentials : Credentials or None, optional
+        The plant's, to ask another run that is there for its name.
+    access : Access or None, optional
+        The options that gave them, for the commands that the error names.
+
+    Raises
+    ------
+    UsageError
+        If it is no endpoint, or another run is there, which the message names.
+    ListenError
+        If it cannot be listened on.
+    """
+    try:
+        return free_endpoint(check_endpoint("--listen", listen), option="--listen")
+    except ListenError as error:
+        where = loopback_of(listen)
+        there = runs_at(where, credentials) if error.in_use and accepting((where,)) else []
+        if not there:
+            raise
+        found_by = RunAddress(run=there[0], connect=(where,), access=access or Access()).words
+        status, down = command_line("status", *found_by), command_line("down", *found_by)
+        beside = next_port(listen)
+        other = loopback_of(beside)
+        raise UsageError(
+            f"--listen: {' and '.join(f'run {name}' for name in there)} is there already, at {where}; "
+            f"{status} shows it, {down} ends it; to have both, give this one a name and "
+            f"a port of its own (--run NAME --listen {beside}; its other commands --run NAME --connect {other})"
+        ) from None
+
+
+def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
+    """Return the names of the runs whose plants are at an endpoint, as far as they show within `LOOKING` seconds."""
+    with RunClient(RunAddress(run=RUN, connect=(endpoint,), credentials=credentials)) as client:
+        client.until(lambda: bool(client.runs), LOOKING)
+        return sorted(client.runs)
+
+
+def check_alone(
+    run: str, beyond: tuple[str, ...], credentials: Credentials | None = None, access: Access | None = None
+) -> None:
+    """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    beyond : tuple[str, ...]
+        Endpoints that the plant will connect to; without any, it cannot meet another plant.
+    credentials : Credentials or None, optional
+        The plant's.
+    access : Access or None, optional
+        The options that gave them, for the command that the error names.
+    """
+    if not beyond:
+        return
+    there = RunAddress(run=run, connect=beyond, credentials=credentials, access=access or Access())
+    with RunClient(there) as client:
+        if client.until(lambda: client.plant, LOOKING):
+            raise UsageError(
+                f"--run: a plant of run {run} is there already, at {', '.join(beyond)}; end it "
+                f"({command_line('down', *there.words)}), or give this run another name"
+            )
+
+
+class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
+    """Options of `gridpeers plant` and `gridpeers up`."""
+
+    run: str
+    """Name of the run."""
+    case: str = ""
+    """Case of the scenario; the last one if empty."""
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
+    wait: float = 30.0
+    """Time (s) for which the plant waits for its agents."""
+    duration: float | None = None
+    """Run time (s) after which the run ends; None for no end."""
+    recorded: bool = False
+    """Whether the run is recorded, as its scenario says."""
+    secured: bool = False
+    """Whether the processes have certificates."""
+    strict: bool = False
+    """Whether the run breaks when the plant cannot keep pace."""
+
+
+def chosen_case(scenario: ScenarioModel, case: str) -> str:
+    """Return the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
+
+    Raises
+    ------
+    UsageError
+        If there is no such case.
+    """
+    if case and case not in scenario.cases:
+        raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
+    return case or list(scenario.cases)[-1]
+
+
+def configure(
+    scenario: ScenarioModel, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
+) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
+    """Return the configurations of the plant and of all agents, spare ones last.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        A checked scenario.
+    feeder : Feeder
+        Its feeder.
+    options : LiveOptions
+        Options of the command.
+    listen : str
+        Where the plant listens.
+    beyond : tuple[str, ...], optional
+        What the plant connects to itself, e.g. a Zenoh router.
+
+    Raises
+    ------
+    UsageError
+        If an option cannot be used.
+
+    Examples
+    --------
+    >>> from gridpeers.scenarios.schema import load_scenario
+    >>> plant, agents = configure(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
+    >>> plant.end, plant.settings.spares, agents[-1].name
+    (None, ('inv10',), 'inv10')
+    """
+    _check(options)
+    if scenario.plant.simulator != "gridpeers":
+        raise UsageError(
+            f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
+            'or "gridpeers"'
+        )
+    if scenario.security == "mtls" and not options.secured:
+        raise UsageError(NEEDS_KEYS)
+    case = chosen_case(scenario, options.case)
+    plant, agents = configs(scenario, feeder, case, listen, real_nodes=True)
+    # links are emulated even without a fault: gridpeers link may set one during the run
+    links = plant.links or setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).to_tree()
+    level: RecordLevel = scenario.record if options.recorded else "physics"
+    live = {"run": options.run, "clock": "wall", "speed": options.speed, "links": links, "record": level}
+    first = [agent for agent in agents if agent.name in plant.agents]
+    everyone = tuple(
+        msgspec.structs.replace(agent, **live, deadline=0.0) for agent in (*first, *_spares(feeder, agents[0]))
+    )
+    end = None if options.duration is None else max(1, round(options.duration / plant.T_c)) * plant.T_c
+    diagram = msgspec.structs.replace(feeder_map(as_in(scenario, feeder)), scenario=scenario.name, case=case)
+    plant = msgspec.structs.replace(
+        plant,
+        **live,
+        settings=msgspec.structs.replace(plant.settings, spares=tuple(row.name for row in feeder.spares)),
+        schedule=(),  # in a live run, people let agents leave and join
+        end=end,
+        connect=beyond,
+        wait_for_agents=min(options.wait, LONGEST_TIME),  # JSON has no infinity
+        strict=options.strict,
+        feeder_map=msgspec.to_builtins(diagram),
+        agent_configs={agent.name: msgspec.json.decode(msgspec.json.encode(agent)) for agent in everyone},
+    )
+    return plant, everyone
+
+
+def manual_node_faults(scenario: ScenarioModel) -> str:
+    """Return a note on the process faults that people have to inject into agents of their own; "" if there are none.
+
+    Parameters
+    ----------
+    scenario : ScenarioModel
+        With its one case.
+    """
+    (case,) = scenario.cases
+    nodes = [node for node in netem_of(scenario, case).nodes if node.kill or node.pause]
+    if not nodes:
+        return ""
+    names = ", ".join(dict.fromkeys(node.name for node in nodes))
+    return f"[[node]] of {names}: agents in other terminals are killed and paused by you (kill -KILL, -STOP, -CONT)"
+
+
+def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
+    """Yield the configurations of the spare inverters' agents: as the others', but for the nameplate."""
+    for row in feeder.spares:
+        yield msgspec.structs.replace(
+            like,
+            name=row.name,
+            kind=row.kind,
+            microgrid=row.microgrid,
+            P_rated=row.P_rated,
+            V_nom=row.V_nom,
+            m_p=row.m_p,
+            m_q=row.m_q,
+        )
+
+
+def _check(options: LiveOptions) -> None:
+    least, greatest = SPEEDS
+    if not least <= options.speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {options.speed:g}")
+    check_wait(options.wait)
+    check_duration(options.duration)

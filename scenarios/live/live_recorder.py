@@ -1,0 +1,197 @@
+"""Print what happens in a live run as lines in its terminal, and record the run on request, in a thread of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Collection
+from pathlib import Path
+from queue import SimpleQueue
+from time import monotonic
+
+from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
+from gridpeers.scenarios.drivers.telemetry_stream import Recordable
+from gridpeers.scenarios.live.link_log import LinkLog
+from gridpeers.scenarios.live.run_monitor import line_of
+from gridpeers.scenarios.record.record_info import RecordInfo
+from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
+from gridpeers.wire.driver.free_lists import FreeLists
+from gridpeers.wire.driver.large_blocks import keep_out_of_the_heap
+from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
+from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.trust.credentials import Credentials
+
+_STOP, _CRASH = "stop", "crash"
+
+_ON = "; the run goes on without it"
+
+
+class LiveRecorder:
+    """Say the plant's events as they come, and feed the `Recorder` and the `LinkLog` of the run.
+
+    The plant waits for it before the start and at the end, so nothing of the run is missing. Use it as a context.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    endpoint : str
+        Where the plant listens.
+    say : Callable[[str], None]
+        Called with a line for every event.
+    folder : Path or None
+        Folder for the files of the record; None records nothing.
+    silent : Collection[str], optional
+        Kinds of events that it does not say.
+    link_log : LinkLog, optional
+        Takes the plant's messages on commands to links.
+    record : RecordInfo, optional
+        The run, for its record run.mcap in the folder; None writes none.
+    credentials : Credentials or None, optional
+        Own certificate and members of the site; None if links are open.
+    """
+
+    def __init__(
+        self,
+        run: str,
+        endpoint: str,
+        say: Callable[[str], None],
+        folder: Path | None = None,
+        *,
+        silent: Collection[str] = (),
+        link_log: LinkLog | None = None,
+        record: RecordInfo | None = None,
+        credentials: Credentials | None = None,
+    ) -> None:
+        self._credentials = credentials
+        self._say, self._silent, self._link_log = say, silent, link_log
+        self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
+        self.recorded: Recorded | None = None
+        """The record, once it is closed, if it is whole."""
+        self.failure = ""
+        """Why something could not be recorded: the first reason; "" if everything was."""
+        self.failed_laws: dict[str, PlantEvent] = {}
+        """By agent, the first failure of its law."""
+        self.cut_short = ""
+        """Why the plant's last message does not come, if that is known."""
+        self._crashes: SimpleQueue[tuple[str, str]] = SimpleQueue()
+        """Agent and end in words, one for each `_CRASH` that the thread is told."""
+        self._limit = RateLimit()
+        self._run, self._endpoint = run, endpoint
+        self.client: TelemetryClient
+        """Follows the run."""
+        self._thread = threading.Thread(target=self._follow, daemon=True)
+
+    def __enter__(self) -> LiveRecorder:
+        keep_out_of_the_heap()
+        self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take, self._credentials)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Take in what has come, close the session, and give the files their names."""
+        self.client.say(_STOP)
+        self._thread.join()
+        self.client.close()
+        self._say_all(*self._limit.left_out(), *self.client.rejects.take_lines())
+        if self._link_log is not None:
+            try:
+                self._say_all(*self._link_log.close(self.client.t))
+            except OSError as error:
+                self._fail(f"the link commands cannot be written: {error.strerror}")
+        if self._recorder is not None:
+            self._finish(self._recorder)
+
+    def note_crash(self, agent: str, end: str) -> None:
+        """Note that the process of an agent crashed, with how it ended in words; from any thread."""
+        self._crashes.put((agent, end))
+        self.client.say(_CRASH)
+
+    def _say_all(self, *lines: str) -> None:
+        for line in lines:
+            self._say(line)
+
+    def _fail(self, why: str, consequence: str = "") -> None:
+        """Say why something is not recorded, and the consequence; keep the first reason."""
+        self._say(why + consequence)
+        self.failure = self.failure or why
+
+    def _finish(self, recorder: Recorder) -> None:
+        """Give the files their names; those of a record that is not whole keep the partial ones."""
+        try:
+            if recorder.count < 2:
+                self._say("nothing was recorded, so there are no numbers")
+            elif not self.client.ended:
+                why = self.cut_short or "then no word came of the plant"
+                self._fail(f"the record ends at {recorder.ended:.2f} s: {why}")
+            else:
+                self.recorded = recorder.finish(recorder.ended, recorder.record_step)
+                self._say_all(*self.recorded.link_lines)
+            recorder.close()
+        except RecordError as error:
+            self._fail(str(error))
+            self._abandon(recorder)
+        except OSError as error:
+            self._fail(f"the record cannot be written: {error.strerror}")
+
+    def _abandon(self, recorder: Recorder) -> None:
+        """Leave a record as it is; the reason has been said."""
+        self._recorder = None
+        with contextlib.suppress(OSError):
+            recorder.close()
+
+    def _follow(self) -> None:
+        free_lists = FreeLists(monotonic())
+        while not self.client.ended:
+            for word in self.client.take(None):
+                if word == _STOP:
+                    return
+                self.client.note_crash(*self._crashes.get())
+            free_lists.tend(monotonic())
+        self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
+
+    def _take(self, message: Recordable) -> None:
+        """Say and record one message; an error in it must not end the recording of the others."""
+        try:
+            if isinstance(message, LinkRequest):
+                self._take_request(message)
+            if isinstance(message, Telemetry):
+                self._say_events(message)
+            self._record(message)
+        except Exception as error:
+            self.client.rejects.failed("telemetry", error)
+
+    def _say_events(self, telemetry: Telemetry) -> None:
+        for event in telemetry.events:
+            if event.kind == "law":
+                self.failed_laws.setdefault(event.subject, event)
+            if event.kind not in self._silent and (line := self._limit.admit(line_of(event), monotonic())) is not None:
+                self._say(line)
+        if telemetry.final:  # before the terminal says that the run has ended
+            self._say_all(*self._limit.left_out())
+
+    def _record(self, message: Recordable) -> None:
+        """Record one message; an error in writing ends the record, not the run."""
+        recorder = self._recorder
+        if recorder is None:
+            return
+        known, sound = len(recorder.missing), not recorder.record_failure
+        try:
+            recorder(message)
+        except (RecordError, OSError) as error:
+            why = getattr(error, "strerror", None) or error
+            self._fail(f"the record ends at {recorder.ended:.2f} s: {why}", _ON)
+            self._abandon(recorder)
+        if sound and recorder.record_failure:
+            self._say(recorder.record_failure + _ON)
+        for before, after in recorder.missing[known:]:
+            self._say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
+
+    def _take_request(self, request: LinkRequest) -> None:
+        if self._link_log is None:
+            return
+        try:
+            self._link_log(request)
+        except OSError as error:
+            self._fail(f"the link commands end at {self.client.t:.2f} s: {error.strerror}", _ON)
+            self._link_log = None

@@ -1,1 +1,0 @@
-"""Requests to the plant of a run: its status, commands to it, to links and loads, and configurations of agents."""

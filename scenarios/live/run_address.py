@@ -1,0 +1,320 @@
+"""How a command names a run and proves who it is: name, endpoints, certificates, and the checks of such options."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from ipaddress import ip_address
+from pathlib import Path
+
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.wire.keys import check_name as check_key_part
+from gridpeers.wire.trust.credentials import Credentials
+
+
+@dataclass(frozen=True)
+class Access:
+    """The options `--keys`, `--as` and `--insecure` of a command."""
+
+    keys: Path | None = None
+    """Folder with the site's certificates."""
+    name: str = ""
+    """Name of the member; the first that fits if empty."""
+    insecure: bool = False
+    """Whether an endpoint that others reach may be open to everybody."""
+
+    @property
+    def words(self) -> list[str]:
+        """The options as they are typed, for a command that this one starts or names, but for its own name."""
+        keys = [] if self.keys is None else ["--keys", str(self.keys)]
+        return [*keys, *(["--insecure"] if self.insecure else [])]
+
+
+def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
+    """Return why an endpoint cannot be used with or without certificates; empty if it can.
+
+    Examples
+    --------
+    >>> objection("--connect", "tcp/127.0.0.1:7447", keys=False, insecure=False)
+    ''
+    >>> objection("--connect", "tls/10.0.0.1:7447", keys=False, insecure=True)
+    '--connect: tls/10.0.0.1:7447 needs certificates: say --keys DIR, the folder that gridpeers keys init has made'
+    """
+    parsed = parse_endpoint(endpoint)
+    assert parsed is not None
+    if keys and parsed.protocol != "tls":
+        return f"{option}: {endpoint} is open, and --keys asks for TLS: write {parsed._replace(protocol='tls')}"
+    if not keys and parsed.protocol == "tls":
+        return f"{option}: {endpoint} needs certificates: say --keys DIR, the folder that gridpeers keys init has made"
+    if not (keys or insecure or is_loopback_host(parsed.host)):
+        return (
+            f"{option}: {endpoint} is not on this host's loopback, and without certificates whoever reaches it reads "
+            f"and commands the run: say --keys DIR and {parsed._replace(protocol='tls')} (docs/security.md), or "
+            "--insecure if you trust the network"
+        )
+    return ""
+
+
+def is_loopback_host(host: str) -> bool:
+    """Return whether an endpoint's host is this host's loopback.
+
+    Examples
+    --------
+    >>> [is_loopback_host(host) for host in ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")]
+    [True, True, True, False, False]
+    """
+    try:
+        return host == "localhost" or ip_address(host.strip("[]")).is_loopback
+    except ValueError:  # a name that only begins like an address, as anybody may register it
+        return False
+
+
+def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
+    """Return the default endpoint as it is with certificates; any other endpoint as it was typed.
+
+    Examples
+    --------
+    >>> with_protocol("tcp/127.0.0.1:7447", keys=True, default="tcp/127.0.0.1:7447")
+    'tls/127.0.0.1:7447'
+    """
+    return endpoint.replace("tcp/", "tls/", 1) if keys and endpoint == default else endpoint
+
+
+RUN = "gridpeers"
+"""Default name of a run."""
+
+ENDPOINT = "tcp/127.0.0.1:7447"
+"""Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
+
+LONGEST_TIME = 1e9
+"""Longest time (s) of any option, some 30 years; clocks do not reach much further."""
+
+PROBE = 1.0
+"""Longest wait (s) for a TCP connection, to see whether anything listens."""
+
+_PROTOCOLS = ("tcp", "tls", "quic", "udp")
+
+
+class UsageError(ValueError):
+    """An option or argument cannot be used; the message says what would be right."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunAddress:
+    """A run and where to find it."""
+
+    run: str
+    """Name of the run, part of every key."""
+    connect: tuple[str, ...]
+    """Endpoints to connect to; one that answers is enough."""
+    credentials: Credentials | None = None
+    """Own certificate and members of the site; None if links are open."""
+    access: Access = field(default_factory=Access)
+    """The options that gave them, for commands that start others."""
+
+    @property
+    def words(self) -> list[str]:
+        """The options by which a command on the same host finds this run, without those that have their defaults.
+
+        Examples
+        --------
+        >>> RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words
+        []
+        >>> RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words
+        ['--run', 'demo', '--connect', 'tcp/127.0.0.1:7500']
+        """
+        near = tuple(map(loopback_of, self.connect))
+        default = with_protocol(ENDPOINT, keys=self.access.keys is not None, default=ENDPOINT)
+        run = [] if self.run == RUN else ["--run", self.run]
+        connect = [] if near == (default,) else [word for each in near for word in ("--connect", each)]
+        return [*run, *connect, *self.access.words]
+
+    def __str__(self) -> str:
+        """Return it as messages name it.
+
+        Examples
+        --------
+        >>> print(RunAddress(run="demo", connect=("tcp/127.0.0.1:7447",)))
+        run demo at tcp/127.0.0.1:7447
+        """
+        return f"run {self.run} at {', '.join(self.connect)}"
+
+
+def address_of(run: str, connect: list[str] | None) -> RunAddress:
+    """Return the address that the options `--run` and `--connect` give.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    connect : list[str] or None
+        Endpoints; none stands for `ENDPOINT`.
+
+    Raises
+    ------
+    UsageError
+        If a name or an endpoint cannot be used.
+    """
+    return RunAddress(
+        run=check_name("--run", run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT])
+    )
+
+
+def check_name(option: str, name: str) -> str:
+    """Return the name of a run or an inverter, if it can be a part of a Zenoh key.
+
+    Examples
+    --------
+    >>> check_name("--run", "lab-2")
+    'lab-2'
+    """
+    try:
+        check_key_part(option, name)
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    return name
+
+
+def check_inverters(names: Sequence[str]) -> None:
+    """Refuse a name that cannot be an inverter's, and one that is given twice.
+
+    Examples
+    --------
+    >>> check_inverters(["inv1", "inv2", "inv1"])
+    Traceback (most recent call last):
+        ...
+    gridpeers.scenarios.live.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an ...
+    """
+    for name in names:
+        check_name("INVERTER", name)
+    twice = [name for name, count in Counter(names).items() if count > 1]
+    if twice:
+        raise UsageError(f"INVERTER: {', '.join(twice)} is given twice; one agent controls an inverter")
+
+
+def check_wait(wait: float) -> float:
+    """Return a longest wait (s), if it is one; infinity waits for ever.
+
+    Examples
+    --------
+    >>> check_wait(2.5)
+    2.5
+    """
+    if not wait >= 0.0:
+        raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
+    return wait
+
+
+def check_duration(seconds: float | None) -> None:
+    """Raise UsageError if a duration (s) cannot be one; None has no end."""
+    if seconds is not None and not 0.0 < seconds <= LONGEST_TIME:
+        raise UsageError(f"--for: must be a time of more than 0 s and at most {LONGEST_TIME:g} s, got {seconds:g} s")
+
+
+def check_endpoint(option: str, text: str) -> str:
+    """Return an endpoint if it has the form of one.
+
+    Parameters
+    ----------
+    option : str
+        Where it was typed. For "--listen" port 0 stands for any free one.
+    text : str
+        E.g. "tcp/192.168.1.10:7447".
+
+    Raises
+    ------
+    UsageError
+        If Zenoh could make nothing of it.
+
+    Examples
+    --------
+    >>> check_endpoint("--connect", "tcp/lab.example:7447")
+    'tcp/lab.example:7447'
+    """
+    endpoint = parse_endpoint(text)
+    if endpoint is None:
+        host = re.fullmatch(r"(?:\w+/)?([\w.-]+)(?::(\d+))?", text)
+        example = f"tcp/{host[1]}:{host[2] or 7447}" if host else ENDPOINT
+        raise UsageError(f'{option}: "{text}" is no endpoint; write PROTOCOL/HOST:PORT, e.g. {example}')
+    if endpoint.protocol not in _PROTOCOLS:
+        raise UsageError(f'{option}: {text}: no protocol "{endpoint.protocol}"; protocols are {", ".join(_PROTOCOLS)}')
+    lowest = 0 if option == "--listen" else 1
+    if not lowest <= endpoint.port <= 65535:
+        raise UsageError(f"{option}: {text}: a port is a number from {lowest} to 65535, got {endpoint.port}")
+    return text
+
+
+def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the endpoints that accept a TCP connection, whether or not anything is said on it.
+
+    The system accepts connections to a stopped process in its stead.
+    """
+    return tuple(text for text in connect if _accepts(text))
+
+
+def _accepts(text: str) -> bool:
+    endpoint = parse_endpoint(text)
+    if endpoint is None or not endpoint.connects:
+        return False
+    try:
+        with socket.create_connection((endpoint.host.strip("[]"), endpoint.port), PROBE):
+            return True
+    except OSError:
+        return False
+
+
+def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
+    """Return where a process must listen so that others of the run can connect to it.
+
+    Examples
+    --------
+    >>> return_path(("tcp/127.0.0.1:7447",)), return_path(("tcp/192.168.1.10:7447",))
+    (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
+    """
+    protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
+    far = [host for host in _hosts(connect) if not is_loopback_host(host)]
+    if not far:
+        return (f"{protocol}/127.0.0.1:0",)
+    return (f"{protocol}/[::]:0",) if far[0].startswith("[") else (f"{protocol}/0.0.0.0:0",)
+
+
+def is_loopback(connect: tuple[str, ...]) -> bool:
+    """Return whether all endpoints are on this host's loopback.
+
+    Examples
+    --------
+    >>> is_loopback(("tcp/127.0.0.1:7447",)), is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
+    (True, False)
+    """
+    return all(map(is_loopback_host, _hosts(connect)))
+
+
+def _hosts(connect: tuple[str, ...]) -> list[str]:
+    return [endpoint.host for text in connect if (endpoint := parse_endpoint(text))]
+
+
+def loopback_of(listen: str) -> str:
+    """Return where a process of this host connects to one that listens there.
+
+    Examples
+    --------
+    >>> loopback_of("tcp/0.0.0.0:7447"), loopback_of("tcp/[::]:7447"), loopback_of("tcp/10.0.0.1:7447")
+    ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/10.0.0.1:7447')
+    """
+    return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
+
+
+def next_port(listen: str) -> str:
+    """Return the same endpoint at the port beside.
+
+    Examples
+    --------
+    >>> next_port("tcp/127.0.0.1:7447"), next_port("tcp/[::1]:65535")
+    ('tcp/127.0.0.1:7448', 'tcp/[::1]:65534')
+    """
+    endpoint = parse_endpoint(listen)
+    assert endpoint is not None
+    return str(endpoint._replace(port=endpoint.port + 1 if endpoint.port < 65535 else endpoint.port - 1, rest=""))

@@ -1,0 +1,319 @@
+"""State of a run as a client knows it: from the plant's telemetry, the agents' status, tokens and configurations.
+
+Pure: messages and the time are arguments.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import deque
+from collections.abc import Collection
+from dataclasses import dataclass, field
+
+import msgspec
+
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.console import in_order, short
+from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
+
+
+class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
+    """The plant's answer to "status", as far as it is shown; see `gridpeers.plant.realtime.run_commands`."""
+
+    phase: str
+    """gathering, running or closing."""
+    t: float
+    """Run time (s)."""
+    speed: float
+    """Run time per wall time (s/s)."""
+    pacing: Pacing
+    agents: tuple[str, ...] = ()
+    """Inverters whose agents take part."""
+    absent: tuple[str, ...] = ()
+    """Inverters whose agents do not."""
+    events: tuple[PlantEvent, ...] = ()
+    """The latest, oldest first."""
+    impaired: tuple[str, ...] = ()
+    """Agents whose link to or from the plant has an emulated fault."""
+    switches: dict[str, bool] = {}
+    """Position of each switch, by its name: whether it is closed."""
+    loads: dict[str, tuple[float, float]] = {}
+    """Real (W) and reactive power (var) at nominal voltage of each load that was set during the run."""
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """All inverters of the plant."""
+        return self.agents + self.absent
+
+
+OLD = 0.2
+"""An age (s) from which on it is shown in colour: ten control periods of 20 ms, half of what is still used."""
+
+V_LOW, V_HIGH = 0.95, 1.05
+"""Terminal voltages (pu) beyond which one is shown as off: range A of ANSI C84.1."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InverterStatus:
+    """One inverter and its agent at one moment; None stands for an unknown value."""
+
+    name: str
+    island: str = ""
+    """Name of its island: "grid", or the first inverter in it; "" if nobody has said."""
+    f: float | None = None
+    """Hz."""
+    P: float | None = None
+    """kW."""
+    P_set: float | None = None
+    """kW."""
+    P_share: float | None = None
+    """P by its rating (pu)."""
+    Q: float | None = None
+    """kvar."""
+    V: float | None = None
+    """pu of its nominal voltage."""
+    V_set: float | None = None
+    """pu of its nominal voltage."""
+    ages: dict[str, float] = field(default_factory=dict)
+    """Age (s) of the latest state of each neighbour that it uses."""
+    hears: int | None = None
+    """Neighbours that it uses; None if that is not known."""
+    late: bool = False
+    """Whether the latest state of one of them is `OLD`."""
+    off_voltage: bool = False
+    """Whether V is beyond `V_LOW` to `V_HIGH`."""
+    received: int | None = None
+    """Messages that came in."""
+    sent: int | None = None
+    """Messages that went out."""
+    lost: int | None = None
+    """Messages that were sent to it and never came."""
+    impaired: tuple[str, ...] = ()
+    """Senders whose links to it have an emulated fault."""
+    note: str = ""
+    """A note for the reader: "no agent", "not heard here; the plant hears it", "waits for ...", "silent for 3 s"."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Snapshot:
+    """A run at one moment."""
+
+    run: str
+    t: float | None = None
+    """Run time (s)."""
+    pace: str = ""
+    """The plant's pace in a few words."""
+    speed: float = 1.0
+    """Run time per wall time (s/s)."""
+    impaired: tuple[str, ...] = ()
+    """Agents whose link to or from the plant has an emulated fault."""
+    inverters: tuple[InverterStatus, ...] = ()
+    """All inverters, in their order."""
+    events: tuple[str, ...] = ()
+    """Events, a line each, the latest last."""
+
+
+def line_of(event: PlantEvent) -> str:
+    """Return an event as a line; its time comes first and only there.
+
+    Examples
+    --------
+    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.5 s"))
+    '    1.50 s  inv2 joined'
+    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.50 s"))
+    '    1.50 s  inv2 joined'
+    """
+    return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"
+
+
+SILENT = 1.5
+"""An agent whose status is older than this (s of wall time) is silent: it sends three in this time."""
+
+_PER_INVERTER = 6
+"""Values of one inverter in a row of telemetry."""
+
+_KEPT = 100
+"""Most events that are kept."""
+
+
+class RunMonitor:
+    """Collect the state of a run.
+
+    Parameters
+    ----------
+    run : str
+        Name of the run.
+    """
+
+    def __init__(self, run: str) -> None:
+        self._run = run
+        self._configs: dict[str, AgentConfig] = {}
+        self._inverters: tuple[str, ...] = ()
+        self._row: tuple[float, ...] = ()
+        self._t: float | None = None
+        self._heard_at: float | None = None
+        self._end: str | None = None
+        """Once the run has ended, why it broke; empty if it did not."""
+        self._epoch = 0
+        """Epoch of the plant."""
+        self._latest = 0.0
+        """Run time of its latest telemetry (s)."""
+        self._pacing: Pacing | None = None
+        self._impaired: tuple[str, ...] = ()
+        self._plant_status: PlantStatus | None = None
+        self._events: deque[PlantEvent] = deque(maxlen=_KEPT)
+        self._status: dict[str, tuple[AgentStatus, float]] = {}
+        self.members: set[str] = set()
+        """Inverters whose agents take part, as the plant says."""
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of all inverters in the messages so far, in order."""
+        others = sorted(
+            (set(self._status) | set(self._configs)) - set(self._inverters), key=lambda name: (len(name), name)
+        )
+        return self._inverters + tuple(others)
+
+    @property
+    def has_configs(self) -> bool:
+        """Whether the configurations of all inverters in the telemetry are here."""
+        return self._configs.keys() >= set(self._inverters)
+
+    def config(self, config: AgentConfig) -> None:
+        """Note the configuration of an agent."""
+        self._configs[config.name] = config
+
+    def plant_status(self, status: PlantStatus) -> None:
+        """Note the plant's status."""
+        self._plant_status, self._impaired = status, status.impaired
+        self.members = set(status.agents)
+        if status.phase != "gathering":
+            self._t, self._pacing = status.t, status.pacing
+        self._events.extend(event for event in status.events if event not in self._events)
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        """Note the plant's telemetry; `now` is the client's clock (s)."""
+        if message.epoch != self._epoch:
+            if self._epoch:
+                self._events.clear()
+                self.members.clear()
+                self._plant_status = None
+            self._epoch, self._latest = message.epoch, 0.0
+        if message.t < self._latest:
+            return  # published again for a recorder that has missed it
+        self._latest = message.t
+        if message.inverters != self._inverters:
+            self._row = ()
+        self._inverters, self._t, self._heard_at = message.inverters, message.t, now
+        self._end = message.outcome if message.final else None
+        self._pacing = message.pacing or self._pacing
+        self._impaired = message.impaired
+        if message.rows:
+            self._row = message.rows[-1]
+        for event in message.events:
+            if event not in self._events:
+                self._events.append(event)
+                self._count_member(event)
+
+    def _count_member(self, event: PlantEvent) -> None:
+        """Note an agent that joins, leaves or dies."""
+        match = re.match(r"(\S+) (joined|left|died)\b", event.text)
+        if event.kind != "roster" or match is None or match[1] != event.subject:
+            return
+        if match[2] == "joined":
+            self.members.add(event.subject)
+        else:
+            self.members.discard(event.subject)
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Note the status of an agent."""
+        self._status[message.sender] = (message, now)
+
+    def snapshot(self, present: Collection[str], now: float, *, current: bool = True) -> Snapshot:
+        """Return a snapshot.
+
+        Parameters
+        ----------
+        present : Collection[str]
+            Inverters whose agents have a token.
+        now : float
+            The client's clock (s).
+        current : bool, optional
+            Whether the plant's values are of now; it is decided here too.
+        """
+        pace = self._pace()
+        if self._end is not None:
+            pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False
+        elif self._heard_at is not None and now - self._heard_at > SILENT:
+            pace, current = f"the plant has been silent for {now - self._heard_at:.0f} s", False
+        names = dict.fromkeys((*self.inverters, *in_order(present)))
+        return Snapshot(
+            run=self._run,
+            t=self._t,
+            pace=pace,
+            speed=1.0 if self._plant_status is None else self._plant_status.speed,
+            impaired=self._impaired if current else (),
+            inverters=tuple(self._inverter(name, name in present, current, now) for name in names),
+            events=tuple(line_of(event) for event in self._events),
+        )
+
+    def _inverter(self, name: str, present: bool, current: bool, now: float) -> InverterStatus:
+        """Return the status of one inverter; with values of the plant only if they are current."""
+        f = P = Q = V = P_set = V_set = None
+        if current and name in self._inverters and self._row:
+            start = 1 + _PER_INVERTER * self._inverters.index(name)
+            f, P, Q, V, P_set, V_set = self._row[start : start + _PER_INVERTER]
+        config = self._configs.get(name)
+        status, at = self._status.get(name, (None, now))
+        if not present or now - at > SILENT:
+            status = None
+        ages = dict(zip(status.neighbours, status.ages, strict=False)) if status else {}
+        used = {neighbour: age for neighbour, age in ages.items() if status and neighbour in status.used}
+        V_pu = None if V is None or config is None else V / config.V_nom
+        return InverterStatus(
+            name=name,
+            island=status.island if status else "",
+            f=f,
+            P=None if P is None else P / 1e3,
+            P_set=None if P_set is None else P_set / 1e3,
+            P_share=None if P is None or config is None else P / config.P_rated,
+            Q=None if Q is None else Q / 1e3,
+            V=V_pu,
+            V_set=None if V_set is None or config is None else V_set / config.V_nom,
+            ages=used,
+            hears=None if status is None else len(status.used),
+            late=any(age >= OLD for age in used.values()),
+            off_voltage=V_pu is not None and not V_LOW <= V_pu <= V_HIGH,
+            received=status.received if status else None,
+            sent=status.sent if status else None,
+            lost=status.lost if status else None,
+            impaired=status.impaired if status else (),
+            note=self._note(name, present, status, now - at),
+        )
+
+    def _pace(self) -> str:
+        """Return in a few words how well the plant keeps real time."""
+        pacing, plant = self._pacing, self._plant_status
+        if pacing is None or pacing.steps == 0:
+            return "waits for its agents" if plant is not None and plant.phase == "gathering" else ""
+        speed = f"speed {plant.speed:g}   " if plant is not None else ""
+        text = f"{speed}pace: {100.0 * (1.0 - pacing.late / pacing.steps):.2f} % of steps in time"
+        text += f" (p50 {1e3 * pacing.p50:.1f} ms, p99 {1e3 * pacing.p99:.1f} ms)"
+        return text + (f", fell behind by {pacing.slipped:.1f} s" if pacing.slipped > 0.0 else "")
+
+    def _note(self, name: str, present: bool, status: AgentStatus | None, age: float) -> str:
+        """Return what a person should know of an agent, whose last status is `age` (s) old."""
+        if not present:
+            return "not heard here; the plant hears it" if name in self.members else "no agent"
+        if status is None:
+            return f"silent for {age:.0f} s" if name in self._status else "has not reported yet"
+        if status.phase != "running":
+            return f"waits for {status.waits_for}" if status.waits_for else status.phase
+        unused = [neighbour for neighbour in status.neighbours if neighbour not in status.used]
+        apart = [neighbour for neighbour in unused if self._island(neighbour) not in ("", status.island)]
+        silent = [neighbour for neighbour in unused if neighbour not in apart]
+        parts = (f"apart: {short(apart)}" if apart else "", f"without {short(silent)}" if silent else "")
+        return "; ".join(part for part in parts if part)
+
+    def _island(self, name: str) -> str:
+        return self._status[name][0].island if name in self._status else ""

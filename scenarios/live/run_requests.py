@@ -1,0 +1,289 @@
+"""Requests to a running plant: its status, configurations of agents, and commands to switches, loads and agents."""
+
+from __future__ import annotations
+
+import secrets
+from collections.abc import Callable, Iterator, Mapping
+from math import inf, isfinite
+from time import monotonic
+from typing import Any, Literal, TypeVar
+
+import msgspec
+
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.own_nameplate import check_nameplate
+from gridpeers.plant.equipment.named_loads import FACTOR
+from gridpeers.scenarios.console import in_order
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.live.run_address import UsageError
+from gridpeers.scenarios.live.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.run_monitor import PlantStatus
+from gridpeers.wire.bounds import MOST_COUNT
+from gridpeers.wire.codec import encode
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
+from gridpeers.wire.printable import printable
+
+T = TypeVar("T")
+
+Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
+
+QUESTIONS = ("status", "links")
+"""Verbs that change nothing."""
+
+ANSWER = 10.0
+"""Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
+
+ASKED_AGAIN = 1.0
+"""Time (s) after which a question without an answer is asked again: it may have been lost with its link."""
+
+ACKNOWLEDGED = 4.0
+"""Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
+
+AGAIN = 0.1
+"""Time (s) between two requests for the same thing."""
+
+LEAVING = 10.0
+"""Longest wait (s) for processes that were asked to leave."""
+
+
+class RefusedError(ValueError):
+    """The plant has refused a command; the message is the plant's."""
+
+
+def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | None = None) -> str:
+    """Give the plant a command and return its answer.
+
+    Raises
+    ------
+    RefusedError
+        If the plant refuses.
+    NobodyError
+        If it does not answer.
+    """
+    answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument, load=load)
+    return answer.text
+
+
+def request(
+    client: RunClient,
+    receivers: Callable[[Answer], set[str]],
+    *,
+    verb: Verb,
+    wait: float = ANSWER,
+    **command_fields: Any,
+) -> tuple[Answer, dict[str, LinkAcknowledgement]]:
+    """Give the plant a command; return its answer, and those that come in time of the receivers that follow from it.
+
+    Anybody who may ask the plant anything may have its answer sent to this client. So the command has a number that
+    nobody else knows, which the plant repeats; acknowledgements have the number that the plant's answer names.
+
+    A question, which changes nothing, is asked again until its answer comes, for `wait` (s).
+    """
+    number = secrets.randbelow(MOST_COUNT)
+    command = Command(sender="visitor", epoch=0, seq=number, t=0.0, reply_to=client.id, verb=verb, **command_fields)
+    answer: Answer | None = None
+    acknowledgements: dict[int, dict[str, LinkAcknowledgement]] = {}
+    now = ask_at = monotonic()
+    end = now + wait
+    while now < end:
+        if now >= ask_at:
+            client.publish(client.keys.for_verb(verb), encode(command))
+            ask_at = now + ASKED_AGAIN if verb in QUESTIONS else inf
+        for key, payload, _ in client.take(min(end, ask_at) - now):
+            message = client.read(key, payload)
+            if isinstance(message, LinkAcknowledgement):
+                acknowledgements.setdefault(message.seq, {})[message.sender] = message
+            elif isinstance(message, Answer) and message.seq == number:
+                if not message.ok:
+                    raise RefusedError(message.text)
+                answer, end, ask_at = message, monotonic() + ACKNOWLEDGED, inf
+        if answer is not None and _of_number(answer, acknowledgements).keys() >= receivers(answer):
+            break
+        now = monotonic()
+    if answer is None:
+        raise NobodyError(
+            f"the plant of {client.where} is there but has not answered within {wait:.3g} s; is it frozen?"
+        )
+    return answer, _of_number(answer, acknowledgements)
+
+
+def _of_number(
+    answer: Answer, acknowledgements: Mapping[int, dict[str, LinkAcknowledgement]]
+) -> dict[str, LinkAcknowledgement]:
+    """Return the acknowledgements of the number that an answer names."""
+    number = answer.data.get("number")
+    return acknowledgements.get(number, {}) if isinstance(number, int) else {}
+
+
+def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
+    """Return the state of the run as the plant reports it within `wait` (s)."""
+    answer, _ = request(client, lambda answer: set(), verb="status", wait=wait)
+    return data_of(client, answer, PlantStatus)
+
+
+def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
+    """Return the data of an answer.
+
+    Raises
+    ------
+    NobodyError
+        If they are something else: anybody may answer as a plant on open links, and one of another version may.
+    """
+    try:
+        return msgspec.convert(answer.data, kind)
+    except msgspec.ValidationError as error:
+        raise NobodyError(
+            f"the plant of {client.where} answers what cannot be read here: {printable(str(error), 200)}; is it of "
+            "another version?"
+        ) from None
+
+
+def has_left(client: RunClient, name: str) -> bool:
+    """Wait until an agent that was asked to leave has left; return whether it has."""
+    end = monotonic() + LEAVING
+    while name in plant_status(client).agents:
+        if monotonic() > end:
+            return False
+        client.until(lambda: False, AGAIN)
+    return True
+
+
+def has_ended(client: RunClient) -> bool:
+    """Wait until a run that was asked to end has ended; return whether it has. Its plant leaves last."""
+    return client.until(lambda: not client.plant, LEAVING)
+
+
+def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
+    """Return the configuration that the plant hands out to the agent of an inverter.
+
+    Raises
+    ------
+    NobodyError
+        If the plant says that there is no such inverter, or does not answer within `wait` (s).
+    """
+    end = monotonic() + wait
+    inverters = plant_status(client, wait).inverters
+    if name not in inverters:
+        there = f"inverters are {', '.join(in_order(inverters))}"
+        raise NobodyError(f'no inverter "{name}" in {client.where}; {there}')
+    return configurations(client, name, end - monotonic())[name]
+
+
+def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> dict[str, AgentConfig]:
+    """Return configurations of agents by name: all that came until that of `name`, or any, was there.
+
+    With the certificate of an agent it asks for that of `name` alone: access rules let an agent ask for no other.
+
+    Raises
+    ------
+    NobodyError
+        If it does not come within `wait` (s), asked for again and again.
+    """
+    known: dict[str, AgentConfig] = {}
+    credentials = client.where.credentials
+    is_agent = credentials is not None and credentials.own.role == "agent"
+    key = client.keys.config(name if is_agent else "*")
+    now = ask_at = monotonic()
+    end = now + wait
+    while not (name in known if name else known):
+        if now >= end:
+            what = f"the configuration of {name}" if name else "a configuration"
+            raise NobodyError(f"no answer: the plant of {client.where} has not sent {what} within {wait:.3g} s")
+        if now >= ask_at:
+            client.fetch(key)
+            ask_at = now + ASKED_AGAIN
+        for _, payload, _ in client.take(min(end, ask_at) - now):
+            config = read_config(payload)
+            if config is not None:
+                known[config.name] = config
+        now = monotonic()
+    return known
+
+
+def read_config(payload: bytes) -> AgentConfig | None:
+    """Return a plausible configuration of an agent; None if the bytes are something else."""
+    if not payload.startswith(b"{"):
+        return None
+    try:
+        config = decode_foreign(msgspec.json.Decoder(AgentConfig).decode, payload)
+        check_nameplate(config)
+    except (msgspec.DecodeError, ValueError):
+        return None
+    return config
+
+
+def check_free(client: RunClient, name: str) -> None:
+    """Raise NobodyError if an agent of this name takes part already, before a second one says anything in the run.
+
+    Of two that come at the same moment the plant refuses one.
+    """
+    if name in plant_status(client).agents:
+        raise NobodyError(
+            f"{name}: another agent of this name takes part in run {client.where.run} already; stop it first "
+            f"({command_line('stop', name, *client.where.words)}), or start the agent of another inverter"
+        )
+
+
+def own_code(config: AgentConfig) -> tuple[str, ...]:
+    """Return the code that a configuration names beside gridpeers' own and installed plug-ins, in words.
+
+    Examples
+    --------
+    >>> from gridpeers.agents.agent_config import Control, LawChoice
+    >>> control = Control(secondary="all", graph="full", law=LawChoice(command=("./mylaw",)))
+    >>> own_code(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0, f_nom=60.0,
+    ...     m_p=0.01, m_q=0.05, T_c=0.02, control=control, deadline=10.0, connect=()))
+    ('the law ./mylaw',)
+    """
+    return tuple(_named(config))
+
+
+def _named(config: AgentConfig) -> Iterator[str]:
+    law, graph = config.control.law, config.control.own_graph
+    if law.command or law.fmu or ":" in law.use:
+        yield f"the law {law.name}"
+    if graph is not None and ":" in graph.use:
+        yield f"the graph {graph.use}"
+    if config.links:
+        for fault in EmulationConfig.of_tree(config.links).netem.links:
+            yield from (f"the link fault {plugin.use}" for plugin in fault.own if ":" in plugin.use)
+
+
+MOST = 1e8
+"""Largest number (kW or kvar) that is sent; what is plausible the plant knows, as it knows the feeder."""
+
+
+def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:
+    """Return the power of a load in the units of messages.
+
+    Parameters
+    ----------
+    factor
+        Factor on its real and reactive power.
+    P_kW, Q_kvar
+        Real (kW) and reactive power (kvar) at nominal voltage.
+
+    Raises
+    ------
+    UsageError
+        If nothing is given, too much, or no number.
+
+    Examples
+    --------
+    >>> load_setting(None, 210.0, None)
+    LoadSetting(factor=None, P=210000.0, Q=None)
+    """
+    for option, value in (("--factor", factor), ("--P", P_kW), ("--Q", Q_kvar)):
+        if value is not None and not (isfinite(value) and abs(value) <= MOST):
+            raise UsageError(f"{option}: must be a finite number, at most {MOST:g}, got {value:g}")
+    if factor is not None and (objection := FACTOR.objection(factor)):
+        raise UsageError(f"--factor: {objection}")
+    if factor is not None and (P_kW is not None or Q_kvar is not None):
+        raise UsageError("--factor: goes with neither --P nor --Q; give the factor, or the power")
+    if factor is None and P_kW is None and Q_kvar is None:
+        raise UsageError("nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)")
+    return LoadSetting(
+        factor=factor, P=None if P_kW is None else 1e3 * P_kW, Q=None if Q_kvar is None else 1e3 * Q_kvar
+    )

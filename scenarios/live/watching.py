@@ -1,0 +1,340 @@
+"""A run on a terminal: once as text for `gridpeers status`, as a table that renews itself for `gridpeers watch`."""
+
+from __future__ import annotations
+
+import os
+import select
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from time import monotonic
+from typing import Protocol
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.table import Table
+from rich.text import Text
+
+from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.scenarios.console import short
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
+from gridpeers.scenarios.live.run_requests import plant_status, read_config
+from gridpeers.wire.bounds import MOST_INVERTERS
+from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
+from gridpeers.wire.timing.session_deadline import SessionDeadline
+
+EVENTS = 6
+"""Number of the latest events in a view."""
+
+
+@dataclass(frozen=True)
+class _Column:
+    head: str
+    unit: str
+    text: Callable[[InverterStatus], str]
+    right: bool = True
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0
+
+
+def _count(value: int | None) -> str:
+    return "-" if value is None else str(value)
+
+
+def _oldest(inverter: InverterStatus) -> str:
+    return _number(max(inverter.ages.values(), default=None), 2)
+
+
+_COLUMNS = (
+    _Column("agent", "", lambda inverter: inverter.name, right=False),
+    _Column("island", "", lambda inverter: inverter.island or "-", right=False),
+    _Column("f", "Hz", lambda inverter: _number(inverter.f, 3)),
+    _Column("P", "kW", lambda inverter: _number(inverter.P, 1)),
+    _Column("P_set", "kW", lambda inverter: _number(inverter.P_set, 1)),
+    _Column("P", "pu", lambda inverter: _number(inverter.P_share, 3)),
+    _Column("Q", "kvar", lambda inverter: _number(inverter.Q, 1)),
+    _Column("V", "pu", lambda inverter: _number(inverter.V, 4)),
+    _Column("V_set", "pu", lambda inverter: _number(inverter.V_set, 4)),
+    _Column("hears", "", lambda inverter: short(list(inverter.ages)), right=False),
+    _Column("age", "s", _oldest),
+    _Column("in", "", lambda inverter: _count(inverter.received)),
+    _Column("out", "", lambda inverter: _count(inverter.sent)),
+    _Column("lost", "", lambda inverter: _count(inverter.lost)),
+    _Column("impaired", "", lambda inverter: short(inverter.impaired) if inverter.impaired else "", right=False),
+    _Column("", "", lambda inverter: inverter.note, right=False),
+)
+"""Columns of each agent; "age" is that of the oldest state of the neighbours in use, "impaired" are the senders whose
+links to it have an emulated fault."""
+
+
+def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
+    """Return the columns that have something to show."""
+    calm = not any(inverter.impaired for inverter in snapshot.inverters)
+    return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
+
+
+def head(snapshot: Snapshot) -> str:
+    """Return one line on the whole run."""
+    t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
+    islands = list(dict.fromkeys(inverter.island for inverter in snapshot.inverters if inverter.island))
+    parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
+    parts.append(f"impaired to the plant: {short(snapshot.impaired)}" if snapshot.impaired else "")
+    return "   ".join(part for part in parts if part)
+
+
+def plain(snapshot: Snapshot) -> str:
+    """Return the text for `gridpeers status`: no colour, no line drawing, columns that `awk` can cut."""
+    columns = _columns(snapshot)
+    titles = [f"{column.head} {column.unit}".strip() for column in columns]
+    rows = [titles, *([column.text(inverter) for column in columns] for inverter in snapshot.inverters)]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(columns))]
+    text = [head(snapshot)]
+    for row in rows if snapshot.inverters else []:
+        cells = [
+            cell.rjust(width) if column.right else cell.ljust(width)
+            for cell, width, column in zip(row, widths, columns, strict=True)
+        ]
+        text.append("  ".join(cells).rstrip())
+    text += snapshot.events[-EVENTS:]
+    return "\n".join(text) + "\n"
+
+
+def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
+    """Return the table for `gridpeers watch`; `keys` says which keys can be typed."""
+    grid = Table(box=None, padding=(0, 2, 0, 0), header_style="bold")
+    columns = _columns(snapshot)
+    for column in columns:
+        title = f"{column.head}\n{column.unit}" if column.head else ""
+        grid.add_column(title, justify="right" if column.right else "left", no_wrap=column.head != "hears")
+    for inverter in snapshot.inverters:
+        grid.add_row(*(Text(column.text(inverter), style=_style(column, inverter)) for column in columns))
+    events = [Text(line, style="dim", no_wrap=True, overflow="ellipsis") for line in snapshot.events[-EVENTS:]]
+    return Group(Text(head(snapshot), style="bold"), Text(), grid, Text(), *events, Text(keys, style="dim"))
+
+
+def _style(column: _Column, inverter: InverterStatus) -> str:
+    if inverter.note and not inverter.note.startswith("apart") and column.head in ("agent", ""):
+        return "yellow"  # to be in another island is no fault
+    if column.head == "age" and inverter.late:
+        return "yellow"
+    if (column.head == "lost" and inverter.lost) or column.head == "impaired":
+        return "yellow"
+    return ""
+
+
+LOOK = 1.2
+"""Longest wait (s) for one snapshot: two periods of an agent's status, and a bit."""
+
+SILENT = 1.0
+"""Time (s) without a message after which a sender counts as silent: two periods of an agent's status."""
+
+CONFIGS_AGAIN = 2.0
+"""Time (s) after which missing configurations are asked for again."""
+
+REFRESH = 0.25
+"""Time (s) between two tables on a terminal: the plant publishes five times a second."""
+
+PERIOD = 1.0
+"""Time (s) between two texts where the output is no terminal."""
+
+QUIT = ("q", "Q", "\x1b")
+"""Keys that end it."""
+
+
+class TakesMessages(Protocol):
+    """The part of a `RunMonitor` that takes messages; the page's view has it too."""
+
+    @property
+    def inverters(self) -> tuple[str, ...]:
+        """Names of all inverters in the messages so far."""
+        ...
+
+    def config(self, config: AgentConfig) -> None:
+        """Take the configuration of an agent."""
+        ...
+
+    def telemetry(self, message: Telemetry, now: float) -> None:
+        """Take the plant's telemetry."""
+        ...
+
+    def status(self, message: AgentStatus, now: float) -> None:
+        """Take the status of an agent."""
+        ...
+
+
+def leave_out(key: str, payload: bytes) -> None:
+    """Leave out what is neither telemetry nor the status or configuration of an agent."""
+
+
+class RunSubscriber:
+    """Feed the messages of a run into a monitor.
+
+    Parameters
+    ----------
+    client : RunClient
+        At the run.
+    monitor : TakesMessages
+        Takes the messages.
+    on_other : Callable[[str, bytes], None], optional
+        Called with key and payload of every other message.
+    """
+
+    def __init__(
+        self, client: RunClient, monitor: TakesMessages, on_other: Callable[[str, bytes], None] = leave_out
+    ) -> None:
+        self._client, self._monitor, self._on_other = client, monitor, on_other
+        self._subscribed: set[str] = set()
+        self._plant = client.plant
+        self._heard_at: dict[str, float] = {}
+        """Time at which each sender was last heard."""
+        self._used: dict[str, tuple[str, ...]] = {}
+        """Neighbours that each agent uses."""
+        self._patience = SessionDeadline()
+        self._configured: set[str] = set()
+        """Inverters whose configuration has come."""
+        self._ask_at = 0.0
+        """When (s, monotonic) to ask for those that are missing."""
+        client.listen(client.keys.telemetry)
+        self._ask_for_configs(monotonic())
+
+    def _ask_for_configs(self, now: float) -> None:
+        """Ask for the configurations of all agents; a question may be lost with its link."""
+        if now >= self._ask_at:
+            self._ask_at = now + CONFIGS_AGAIN
+            self._client.fetch(self._client.keys.config("*"))
+
+    def take(self, seconds: float) -> list[Telemetry | AgentStatus]:
+        """Wait (s) for messages, feed them into the monitor and return them."""
+        heard: list[Telemetry | AgentStatus] = []
+        for key, payload, at in self._client.take(seconds):
+            config = read_config(payload)
+            if config is not None:
+                self._monitor.config(config)
+                self._configured.add(config.name)
+                continue
+            message = self._client.read(key, payload)
+            if isinstance(message, Telemetry):
+                self._monitor.telemetry(message, at)
+            elif isinstance(message, AgentStatus):
+                self._monitor.status(message, at)
+                self._used[message.sender] = message.used
+            else:
+                self._on_other(key, payload)
+                continue
+            self._heard_at[message.sender] = at
+            heard.append(message)
+        now = monotonic()
+        if self._client.plant and not self._plant:  # it was restarted, perhaps with other inverters
+            self._configured.clear()
+            self._ask_at = now
+        self._plant = self._client.plant
+        if self._plant and not self._configured.issuperset(self._monitor.inverters):
+            self._ask_for_configs(now)
+        for name in self._monitor.inverters:
+            self._listen_to(name)
+        for name in self._client.present:  # anybody may hold tokens of any names
+            if len(self._subscribed) < MOST_INVERTERS:
+                self._listen_to(name)
+        self._renew(now)
+        return heard
+
+    def _listen_to(self, name: str) -> None:
+        if name not in self._subscribed:
+            self._subscribed.add(name)
+            self._client.listen(self._client.keys.status(name))
+
+    def take_until(self, end: float) -> None:
+        """Feed the messages that come until a time (s, monotonic)."""
+        while (left := end - monotonic()) > 0.0:
+            self.take(left)
+
+    def _renew(self, now: float) -> None:
+        """Open a new session if a process that takes part has been silent for too long, or this host has moved.
+
+        A process takes part if its token is there, or if an agent that is heard uses it.
+        """
+        heard = {name for name, at in self._heard_at.items() if now - at <= SILENT}
+        there = {*([PLANT] if self._client.plant else []), *self._client.present}
+        there.update(*(self._used.get(name, ()) for name in heard))
+        silent = dict.fromkeys(sorted(there - heard), 0.0)
+        self._patience.whole |= PLANT in heard and not silent
+        if self._patience.lost(silent, now) or self._client.moved:
+            self._patience = self._patience.next()
+            self._client.renew()
+
+
+def look(client: RunClient) -> Snapshot:
+    """Listen until the plant and every agent have published their state, or for `LOOK` seconds."""
+    monitor = RunMonitor(client.where.run)
+    monitor.plant_status(plant_status(client))
+    subscriber, heard = RunSubscriber(client, monitor), set[str]()
+    end = monotonic() + LOOK
+    while (left := end - monotonic()) > 0.0:
+        heard.update(message.sender for message in subscriber.take(left))
+        if heard >= {PLANT, *client.present, *monitor.members} and monitor.has_configs:
+            break
+    return monitor.snapshot(client.present, monotonic())
+
+
+def watch(client: RunClient, console: Console, seconds: float | None) -> None:
+    """Show a run until the user quits, or for a time.
+
+    Parameters
+    ----------
+    client : RunClient
+        At the run, with its agents met.
+    console : Console
+        The terminal.
+    seconds : float or None
+        Time (s) after which it ends; None until q or Ctrl-C.
+    """
+    monitor = RunMonitor(client.where.run)
+    monitor.plant_status(plant_status(client))
+    subscriber = RunSubscriber(client, monitor)
+    end = float("inf") if seconds is None else monotonic() + seconds
+    if not console.is_terminal:
+        while monotonic() < end:
+            subscriber.take_until(min(end, monotonic() + PERIOD))
+            text = plain(monitor.snapshot(client.present, monotonic()))
+            console.print(text, soft_wrap=True)
+        return
+    with keyboard() as key, Live(console=console, screen=True, auto_refresh=False) as live:
+        while monotonic() < end:
+            subscriber.take_until(monotonic() + REFRESH)
+            live.update(table(monitor.snapshot(client.present, monotonic())), refresh=True)
+            if key(0.0) in QUIT:
+                return
+
+
+@contextmanager
+def keyboard() -> Iterator[Callable[[float], str]]:
+    """Yield a function that waits (s) for a key typed without Enter; "" if none came. Ctrl-C stays Ctrl-C.
+
+    Where standard input is no terminal, or the system has no termios, it returns "" at once.
+    """
+    try:
+        import termios
+        import tty
+    except ImportError:
+        yield lambda seconds: ""
+        return
+    try:
+        file = sys.stdin.fileno()
+        before = termios.tcgetattr(file)
+    except (OSError, ValueError, termios.error):
+        yield lambda seconds: ""
+        return
+
+    def read(seconds: float) -> str:
+        ready, _, _ = select.select([file], [], [], seconds)
+        return os.read(file, 1).decode(errors="replace") if ready else ""
+
+    tty.setcbreak(file)
+    try:
+        yield read
+    finally:
+        termios.tcsetattr(file, termios.TCSADRAIN, before)

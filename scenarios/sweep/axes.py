@@ -1,0 +1,319 @@
+"""The axes of a sweep: each is a list of settings, and every combination of them is a sample."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.paths import flatten
+from gridpeers.scenarios.sweep.sweep_model import GraphAxis, RandomAxis, ValueRange
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.schema.table_schema import fields_of
+
+Edges = tuple[tuple[int, int], ...]
+"""Pairs i < j, sorted."""
+
+TRIES = 200
+"""Draws per graph that is asked for, until it is held that there are no more different ones."""
+
+
+def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, ...]:
+    """Different connected graphs of n nodes, drawn one after the other, each number with its own stream.
+
+    So the first graphs stay the same when more are asked for. There are fewer than `count` where so many do not exist:
+    with all links, one.
+
+    Parameters
+    ----------
+    n : int
+        Nodes, at least 2.
+    links : int
+        From n - 1 to n (n - 1) / 2.
+    count : int
+        How many graphs.
+    seed : int
+        Of the draws.
+
+    Examples
+    --------
+    >>> [len(graph) for graph in connected_graphs(9, 12, 3, seed=1)], len(connected_graphs(9, 36, 10, seed=1))
+    ([12, 12, 12], 1)
+    """
+    most = 1 if links == n * (n - 1) // 2 else count
+    found: dict[Edges, None] = {}
+    for i in range(TRIES * count):
+        if len(found) >= most:
+            break
+        found.setdefault(connected_graph(n, links, random.Random(f"{seed}/{n}/{links}/{i}")))
+    return tuple(found)
+
+
+def connected_graph(n: int, links: int, rng: random.Random) -> Edges:
+    """Draw one graph by this distribution; only `rng.random()` is used, the same in every version of Python."""
+    assert n - 1 <= links <= n * (n - 1) // 2
+    tree = _tree([int(rng.random() * n) for _ in range(n - 2)])
+    free = [pair for pair in combinations(range(n), 2) if pair not in tree]
+    more = [free.pop(int(rng.random() * len(free))) for _ in range(links - len(tree))]
+    return tuple(sorted([*tree, *more]))
+
+
+def algebraic_connectivity(n: int, edges: Sequence[tuple[int, int]]) -> float:
+    r"""Second smallest eigenvalue :math:`\lambda_2` of the Laplacian with weight 1 per link (Fiedler, 1973).
+
+    Examples
+    --------
+    >>> round(algebraic_connectivity(3, [(0, 1), (1, 2)]), 9)
+    1.0
+    """
+    L = np.zeros((n, n))
+    for i, j in edges:
+        L[[i, j], [i, j]] += 1.0
+        L[[i, j], [j, i]] -= 1.0
+    return float(f"{np.linalg.eigvalsh(L)[1]:.9g}")  # the last digits are the library's, not the graph's
+
+
+def _tree(code: Sequence[int]) -> set[tuple[int, int]]:
+    """Tree of a Pruefer code: each tree of n labelled nodes has exactly one code of n - 2 numbers below n."""
+    n = len(code) + 2
+    degree = [1 + code.count(i) for i in range(n)]
+    edges = set()
+    for node in code:
+        leaf = degree.index(1)
+        edges.add((min(leaf, node), max(leaf, node)))
+        degree[leaf] -= 1
+        degree[node] -= 1
+    i, j = (node for node in range(n) if degree[node] == 1)
+    return edges | {(i, j)}
+
+
+class Setting(NamedTuple):
+    """One point of an axis."""
+
+    shown: Mapping[str, Any]
+    """Columns of the table."""
+    put: Mapping[str, Any]
+    """Keys of the scenario, by path."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Keys that vary together."""
+
+    origin: Mapping[str, str]
+    """Key of the sweep file by key of the scenario."""
+    settings: Callable[[], Sequence[Setting]]
+    """Makes the points; of use only when no problem is noted."""
+
+
+def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
+    """Return every combination, the last axis fastest."""
+    for points in product(*settings):
+        yield Setting(
+            {name: value for point in points for name, value in point.shown.items()},
+            {path: value for point in points for path, value in point.put.items()},
+        )
+
+
+def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
+    """Return the points of keys that go together, first values with first.
+
+    Examples
+    --------
+    >>> [dict(setting.put) for setting in of_values({"gains.k_p": [1, 2], "gains.k_q": [3, 4]})]
+    [{'gains.k_p': 1, 'gains.k_q': 3}, {'gains.k_p': 2, 'gains.k_q': 4}]
+    """
+    rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
+    return [Setting(row, row) for row in rows]
+
+
+def value_axis(values: Mapping[str, Sequence[Any]], table: str) -> Axis:
+    """Return the axis of keys of one table that go together."""
+    return Axis({path: f"{table}.{path}" for path in values}, lambda: of_values(values))
+
+
+def grid_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
+    """Return an axis for each key of `[grid]`."""
+    return [value_axis({path: values}, "grid") for path, values in _values_of(table, "grid", problems).items()]
+
+
+def zip_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
+    """Return the one axis of the keys of `[zip]`, or none; they have equally many values."""
+    values = _values_of(table, "zip", problems)
+    counts = {path: len(items) for path, items in values.items()}
+    if len(set(counts.values())) > 1 and all(counts.values()):
+        listed = ", ".join(f"{path} has {count}" for path, count in counts.items())
+        problems.add("zip", f"keys that go together need equally many values, but {listed}; for all combinations: grid")
+    elif (twice := _twice(list(zip(*values.values(), strict=False)))) is not None:
+        problems.add("zip", f"has {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+    return [value_axis(values, "zip")] if values else []
+
+
+def graph_axes(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str], problems: Problems) -> list[Axis]:
+    """Return the one axis of random graphs, or none; each number of links can join the inverters."""
+    n = len(inverters)
+    low, high = n - 1, n * (n - 1) // 2
+    for i, links in enumerate(axis.links):
+        if not low <= links <= high:
+            why = "fewer cannot join them" if links < low else "there are no more pairs"
+            problems.add("graph.links", f"{n} inverters have {low} to {high} links, got {links}: {why}")
+        elif links in axis.links[:i]:
+            problems.add("graph.links", f"{links} is listed twice; for more graphs raise per_count")
+    keys = [f"case.{case}.{key}" for case in cases for key in ("graph", "links")]
+    return [Axis(dict.fromkeys(keys, "graph"), lambda: _graphs(axis, inverters, cases))] if axis.links else []
+
+
+def _graphs(axis: GraphAxis, inverters: Sequence[str], cases: Sequence[str]) -> Sequence[Setting]:
+    """Draw the graphs; each is put into every case as its listed links."""
+    points = []
+    for links in axis.links:
+        for number, edges in enumerate(connected_graphs(len(inverters), links, axis.per_count, axis.seed)):
+            pairs = [[inverters[i], inverters[j]] for i, j in edges]
+            shown = {
+                "graph.links": links,
+                "graph.number": number,
+                "graph.lambda_2": algebraic_connectivity(len(inverters), edges),
+                "graph.edges": " ".join("-".join(pair) for pair in pairs),
+            }
+            put = {f"case.{case}.graph": "links" for case in cases} | {f"case.{case}.links": pairs for case in cases}
+            points.append(Setting(shown, put))
+    return points
+
+
+_RANGE = tuple(field.key for field in fields_of(ValueRange))
+
+
+def _values_of(table: Mapping[str, Any], where: str, problems: Problems) -> dict[str, list[Any]]:
+    """Return the values of each key of `[grid]` or `[zip]`; a key with a problem has none."""
+    found: dict[str, list[Any]] = {}
+    for path, value in flatten(table, _is_range):
+        at, found[path] = f"{where}.{path}", []
+        if _is_range(value):
+            values, wrong = read_table(ValueRange, value)
+            wrong = wrong or problems_of(values)
+            for key, text in wrong:
+                problems.add(f"{at}.{key}" if key else at, text)
+            found[path] = [] if wrong else values.listed()
+        elif not isinstance(value, list):
+            problems.add(at, f"must be a list of values or {{ from, to, count }}, got {value!r}; write [{value!r}]")
+        elif not value:
+            problems.add(at, "has no value; list at least one")
+        elif where == "grid" and (twice := _twice(value)) is not None:
+            problems.add(at, f"lists {twice!r} twice, and nothing is run twice; for more seeds write seeds = n")
+        else:
+            found[path] = value
+    return found
+
+
+def _twice(items: Sequence[Any]) -> Any:
+    """Return the first item that comes again, or None; items are compared as written, as lists are among them."""
+    seen: set[str] = set()
+    for item in items:
+        if repr(item) in seen:
+            return item
+        seen.add(repr(item))
+    return None
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value of the file is a finite number."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def _is_range(value: Any) -> bool:
+    return isinstance(value, Mapping) and any(key in value for key in _RANGE)
+
+
+DISTRIBUTIONS = ("uniform", "loguniform", "choice")
+
+
+@dataclass(frozen=True)
+class Distribution:
+    """How one key is drawn."""
+
+    name: str
+    """One of `DISTRIBUTIONS`."""
+    of: Sequence[Any]
+    """Bounds, or the choices."""
+
+    def at(self, u: float) -> Any:
+        """Return the quantile at a number u from [0, 1).
+
+        Examples
+        --------
+        >>> uniform, loguniform = Distribution("uniform", [1.0, 3.0]), Distribution("loguniform", [0.01, 1.0])
+        >>> uniform.at(0.5), loguniform.at(0.5), Distribution("choice", "ab").at(0.6)
+        (2.0, 0.1, 'b')
+        """
+        if self.name == "choice":
+            return self.of[int(u * len(self.of))]
+        low, high = self.of
+        raw = low + (high - low) * u if self.name == "uniform" else low * (high / low) ** u
+        return float(f"{raw:.12g}")
+
+    def problem(self) -> str:
+        """Return the problem of the bounds or the choices; "" if there is none."""
+        of = self.of
+        if self.name == "choice":
+            return "" if isinstance(of, list) and of else f"choice needs a list of values, got {of!r}"
+        if not (isinstance(of, list) and len(of) == 2 and all(map(is_number, of)) and of[0] < of[1]):
+            return f"{self.name} needs [low, high], two numbers in this order, got {of!r}"
+        if self.name == "loguniform" and of[0] <= 0:
+            return f"loguniform needs bounds above 0, got {of!r}; or use uniform"
+        return ""
+
+
+def random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
+    """Return the one axis of the keys of `[random.keys]`, which are drawn together, or none."""
+    keys = {path: _distribution(path, value, problems) for path, value in flatten(axis.keys, _is_distribution)}
+    if keys and not axis.samples and not problems.touch("random.samples"):
+        problems.add("random.samples", "no sample is drawn; write how many, e.g. samples = 100")
+    elif axis.samples and not keys:
+        problems.add("random", "samples are asked for, but no key is drawn; write a table [random.keys]")
+    return [Axis({path: f"random.keys.{path}" for path in keys}, lambda: draw(axis, keys))] if keys else []
+
+
+def draw(axis: RandomAxis, keys: Mapping[str, Distribution]) -> Sequence[Setting]:
+    """Draw the samples: `scipy.stats.qmc.LatinHypercube`, or independent uniform numbers.
+
+    Examples
+    --------
+    >>> drawn = draw(RandomAxis(samples=4), {"gains.alpha": Distribution("uniform", [0.0, 4.0])})
+    >>> sorted(int(setting.put["gains.alpha"]) for setting in drawn)
+    [0, 1, 2, 3]
+    """
+    if axis.method == "latin-hypercube":
+        from scipy.stats import qmc  # takes longer to import than a run takes
+
+        unit = qmc.LatinHypercube(len(keys), rng=axis.seed).random(axis.samples)
+    else:
+        unit = np.random.default_rng(axis.seed).random((axis.samples, len(keys)))
+    columns = zip(keys.items(), unit.T.tolist(), strict=True)
+    return of_values({path: [distribution.at(u) for u in column] for (path, distribution), column in columns})
+
+
+def _distribution(path: str, value: Any, problems: Problems) -> Distribution:
+    """Return the distribution of a key, of use only when no problem is noted."""
+    name, of = next(iter(value.items()), ("", ())) if isinstance(value, Mapping) else ("", ())
+    if name not in DISTRIBUTIONS or len(value) != 1:
+        wrong = next((key for key in value if key not in DISTRIBUTIONS), "") if isinstance(value, Mapping) else ""
+        hint = f"the distributions are {', '.join(DISTRIBUTIONS)}"
+        hint = suggestion(wrong, DISTRIBUTIONS, "distributions") if wrong else hint
+        text = f"must be one distribution such as {{ uniform = [0.5, 2.0] }}, got {value!r}; {hint}"
+    else:
+        text = Distribution(name, of).problem()
+    if text:
+        problems.add(f"random.keys.{path}", text)
+    return Distribution(name, of)
+
+
+def _is_distribution(table: Mapping[str, Any]) -> bool:
+    return not any(isinstance(below, Mapping) for below in table.values())

@@ -1,0 +1,314 @@
+"""From a name or a path to a checked plan of runs, or to all that is wrong with it, before anything starts."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import islice
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.catalogue_files import SWEEPS, names_in
+from gridpeers.scenarios.console import duration
+from gridpeers.scenarios.schema import ScenarioError, ScenarioModel, find_scenario, load_scenario
+from gridpeers.scenarios.schema.loading import check_tables, find_file, read_toml
+from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.schema.scenario_errors import Problems
+from gridpeers.scenarios.sweep.axes import (
+    Axis,
+    Setting,
+    graph_axes,
+    grid_axes,
+    of_values,
+    random_axes,
+    samples,
+    zip_axes,
+)
+from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
+from gridpeers.scenarios.sweep.sweep_model import Sweep
+from gridpeers.wire.schema.relations import problems_of
+from gridpeers.wire.schema.suggestion import suggestion
+
+
+@dataclass(frozen=True)
+class Run:
+    """One case of one sample."""
+
+    sample: int
+    """Number of the sample, from 0, in the order of the axes."""
+    case: str
+    """Case that is run."""
+    scenario: ScenarioModel
+    """The sample's scenario, checked."""
+    shown: Mapping[str, Any]
+    """The sample's value of each parameter."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plan:
+    """A checked sweep."""
+
+    name: str
+    """Name of the results' folder."""
+    title: str
+    """One line on the study."""
+    text: str
+    """The sweep file."""
+    base: ScenarioModel
+    """The scenario as it is without the sweep."""
+    runs: Sequence[Run]
+    """All runs: sample by sample, case by case."""
+    fingerprint: str
+    """SHA-256 of everything that decides the runs: scenarios, feeders, order. Two sweeps with one are the same."""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Columns of the varied keys, in the order of the file."""
+        return tuple(self.runs[0].shown)
+
+
+def fingerprint(runs: Iterable[Run], feeders: Iterable[Feeder]) -> str:
+    """Return the hash of runs and feeders; comments and layout of the files do not change it."""
+    whole = hashlib.sha256()
+    for run in runs:
+        whole.update(msgspec.json.encode((run.sample, run.case, run.scenario, dict(run.shown))))
+    for text in sorted(map(repr, feeders)):
+        whole.update(text.encode())
+    return whole.hexdigest()
+
+
+MOST_LISTED = 20
+"""Most problems of samples in a message: the rest is more of the same."""
+
+
+class BaseScenario(NamedTuple):
+    """The scenario that is varied."""
+
+    tree: Tree
+    """Its tables."""
+    path: Path
+    """Its file: relative paths start there."""
+    scenario: ScenarioModel
+    """Checked."""
+    feeder: Feeder
+    """Its feeder."""
+
+
+class _SampleProblems(Problems):
+    """Problems of one sample, by key."""
+
+    def __init__(self) -> None:
+        super().__init__("")
+        self.noted: list[tuple[str, str]] = []
+
+    def add(self, path: str, text: str) -> None:
+        super().add(path, text)
+        self.noted.append((path, text))
+
+    def add_plain(self, text: str) -> None:
+        super().add_plain(text)
+        self.noted.append(("", text))
+
+
+def checked_runs(
+    base: BaseScenario,
+    fixed: Mapping[str, Any],
+    settings: Sequence[Setting],
+    cases: Sequence[str],
+    origin: Mapping[str, str],
+    problems: Problems,
+) -> tuple[list[Run], Sequence[Feeder]]:
+    """Check every sample, and return its runs and all feeders; both are of use only when no problem is noted.
+
+    Parameters
+    ----------
+    base : BaseScenario
+        The scenario that is varied.
+    fixed : Mapping[str, Any]
+        Keys that are set in every sample, by path.
+    settings : Sequence[Setting]
+        The samples.
+    cases : Sequence[str]
+        Cases that are run.
+    origin : Mapping[str, str]
+        Key of the sweep file by key of the scenario.
+    problems : Problems
+        Takes the problems, each at the key of the sweep file that it comes from.
+    """
+    runs: list[Run] = []
+    feeders: dict[tuple[str, str], Feeder] = {}
+    wrong: dict[tuple[str, str], list[int]] = {}
+    reader = lru_cache(maxsize=None)(read_feeder)
+    for i, setting in enumerate(settings):
+        tree, noted = copy.deepcopy(base.tree), _SampleProblems()
+        for path, value in {**fixed, **setting.put}.items():
+            try:
+                put(tree, path, copy.deepcopy(value))
+            except PathError as error:
+                noted.add(path, str(error))
+        scenario, feeder = check_tables(tree, base.path, noted, reader)
+        if not scenario.events and not noted.touch("event"):
+            noted.add("event", "the scenario has no [[event]], and only what follows an event is measured; write one")
+        for problem in noted.noted:
+            wrong.setdefault(problem, []).append(i)
+        if not noted.noted and feeder is not None:
+            feeders[scenario.plant.feeder, scenario.plant.load_set] = feeder
+            chosen = msgspec.structs.replace(scenario, cases={case: scenario.cases[case] for case in cases})
+            runs += [Run(i, case, chosen, setting.shown) for case in cases]
+    for (path, text), numbers in list(wrong.items())[:MOST_LISTED]:
+        at = _origin(path, origin)
+        inside = f"{path}: " if path and not at.endswith(path) else ""
+        problems.add(at, inside + text + _in_samples(numbers, settings))
+    if len(wrong) > MOST_LISTED:
+        problems.add("", f"and {len(wrong) - MOST_LISTED} more problems of this kind in other samples")
+    return runs, tuple(feeders.values())
+
+
+def _origin(path: str, origin: Mapping[str, str]) -> str:
+    """Return the key of the sweep file that a key of the scenario was set by, or a table around it."""
+    around = [key for key in origin if path == key or path.startswith((f"{key}.", f"{key}["))]
+    return origin[max(around, key=len)] if around else path
+
+
+def _in_samples(numbers: Sequence[int], settings: Sequence[Setting]) -> str:
+    """Return which samples a problem is in, with the values of the first."""
+    count = len(settings)
+    if len(numbers) == count:
+        return f" (in all {count} samples)" if count > 1 else ""
+    values = settings[numbers[0]].shown
+    listed = ", ".join(f"{key} = {json.dumps(value)}" for key, value in values.items() if key != "graph.edges")
+    more = f"; and in {len(numbers) - 1} more of {count}" if len(numbers) > 1 else ""
+    return f" (sample {numbers[0]}: {listed}{more})"
+
+
+SECONDS_PER_SECOND = 0.05
+"""Rough cost of a second of the nine-inverter feeder (s on one core, bench/peers), for messages alone."""
+
+
+def sweeps() -> tuple[str, ...]:
+    """Return the names of the sweeps that come with gridpeers."""
+    return names_in(SWEEPS)
+
+
+def read_sweep(name: str | Path) -> Plan:
+    """Read a sweep and check every sample's scenario before anything is started.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem of the sweep file, of its scenario and of its samples.
+
+    Examples
+    --------
+    >>> plan = read_sweep("gains")
+    >>> plan.base.name, plan.parameters
+    ('islanding', ('gains.k_p', 'gains.k_q'))
+    """
+    path = find_file(str(name), SWEEPS, "sweep")
+    text, data = read_toml(path)
+    problems = Problems(path.name, text)
+    sweep = problems.read(Sweep, data)
+    axes = _own_axes(sweep, problems)
+    base = _base(sweep, path, problems)
+    return _plan(msgspec.structs.replace(sweep, name=sweep.name or path.stem), text, axes, base, problems)
+
+
+def plan_of(sweep: Sweep, base: BaseScenario) -> Plan:
+    """Check a sweep that is made in Python.
+
+    Raises
+    ------
+    ScenarioError
+        With every problem of the sweep and of its samples.
+    """
+    problems = Problems("sweep")
+    return _plan(sweep, "", _own_axes(sweep, problems), base, problems)
+
+
+def _own_axes(sweep: Sweep, problems: Problems) -> list[Axis]:
+    """Return the axes that need no scenario, the slowest first, and note the file's own problems."""
+    for problem in problems_of(sweep):
+        problems.add(*problem)
+    axes = [*grid_axes(sweep.grid, problems), *zip_axes(sweep.zip, problems), *random_axes(sweep.random, problems)]
+    if not (axes or sweep.graph.links or sweep.seeds > 1):
+        problems.add("", "nothing is varied; write a table [grid], [zip], [random] or [graph], or seeds = n")
+    return axes
+
+
+def _base(sweep: Sweep, path: Path, problems: Problems) -> BaseScenario:
+    """Return the scenario that is varied; without it nothing more can be checked, and all that was noted is raised."""
+    beside = path.parent / sweep.scenario
+    try:
+        base = beside if sweep.scenario and beside.is_file() else find_scenario(sweep.scenario)
+        return BaseScenario(read_toml(base)[1], base, *load_scenario(base))
+    except ScenarioError as error:
+        if not problems.touch("scenario"):
+            for problem in error.problems:
+                problems.add("scenario", problem)
+        problems.raise_if_any()
+        raise
+
+
+def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, problems: Problems) -> Plan:
+    """Check every sample of a sweep, and make its runs."""
+    scenario = base.scenario
+    cases = _cases(sweep, scenario, problems)
+    names = [row.name for row in inverters_of(scenario, base.feeder)]
+    fixed = dict(flatten(sweep.set))
+    axes = [*axes, *graph_axes(sweep.graph, names, cases, problems)]
+    if sweep.seeds > 1:
+        seeds = range(scenario.seed, scenario.seed + sweep.seeds)
+        axes.append(Axis({"seed": "seeds"}, lambda: of_values({"seed": seeds})))
+    origin = _origins([Axis({path: f"set.{path}" for path in fixed}, lambda: ()), *axes], problems)
+    points = [] if problems.any else [axis.settings() for axis in axes]
+    count = math.prod(map(len, points))
+    size = count * len(cases)
+    settings = list(islice(samples(points), count if size <= sweep.max_runs else 1))
+    runs, feeders = checked_runs(base, fixed, settings, cases, origin, problems)
+    if size > sweep.max_runs > 0:
+        end_s = (runs[0].scenario if runs else scenario).time.end_s
+        problems.add(
+            "max_runs",
+            f"this is {size:,} runs, about {duration(size * SECONDS_PER_SECOND * end_s)} on one core, and more than "
+            f"max_runs = {sweep.max_runs:,}; thin out the axes, or raise max_runs if it is meant",
+        )
+    problems.raise_if_any()
+    return Plan(
+        name=sweep.name,
+        title=sweep.title,
+        text=text,
+        base=scenario,
+        runs=tuple(runs),
+        fingerprint=fingerprint(runs, feeders),
+    )
+
+
+def _cases(sweep: Sweep, scenario: ScenarioModel, problems: Problems) -> tuple[str, ...]:
+    for case in sweep.cases:
+        if case not in scenario.cases:
+            problems.add("cases", f'no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
+    chosen = tuple(case for case in scenario.cases if case in sweep.cases)
+    return chosen or tuple(scenario.cases)
+
+
+def _origins(axes: Sequence[Axis], problems: Problems) -> dict[str, str]:
+    """Return the key of the sweep file by key of the scenario; a key that is set in two ways is a problem."""
+    found: dict[str, str] = {}
+    for key, where in (item for axis in axes for item in axis.origin.items()):
+        try:
+            steps(key)
+        except PathError as error:
+            problems.add(where, str(error))
+        if key in found:
+            problems.add(where, f"{key} is set by {found[key]} already; leave one of them out")
+        found.setdefault(key, where)
+    return found

@@ -1,0 +1,157 @@
+"""Waiting for a plant: what is told meanwhile, and what ends it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from gridpeers.scenarios.live import run_client as client
+from gridpeers.scenarios.live.run_address import address_of
+from gridpeers.scenarios.live.run_client import NobodyError, RunClient
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.member import Member
+
+
+class Clock:
+    """Time that passes while somebody waits, and whose token comes meanwhile."""
+
+    def __init__(self, comes: dict[float, str]) -> None:
+        self.now, self._comes = 0.0, comes
+
+    def take(self, count: int, seconds: float) -> list[tuple[str, str, bytes, float]]:
+        """Wait as a session does: until somebody comes, or to the end."""
+        end = self.now + seconds
+        due = [t for t in self._comes if t <= end]
+        self.now = min(due) if due else end
+        return [("appeared", Keys(self._comes.pop(self.now)).alive_plant(1), b"", self.now)] if due else []
+
+
+Waiting = Callable[..., list[str]]
+
+INV1 = Member(name="inv1", role="agent")
+SHOWN = Credentials(own=INV1, ca="ca.pem", certificate="inv1.pem", key="inv1.key", members=(INV1,))
+
+
+@pytest.fixture
+def waiting(monkeypatch: pytest.MonkeyPatch) -> Waiting:
+    """Waits for the plant of run lab and gives what was told, each with its time, the last without if all ended ill."""
+
+    def wait(
+        comes: dict[float, str],
+        longest: float,
+        credentials: Credentials | None = None,
+        links: int = 1,
+        strangers: tuple[str, ...] = (),
+        *,
+        hears: bool = True,
+    ) -> list[str]:
+        clock, told, unseen, lines = Clock(comes), list[str](), [*strangers], list[str]()
+
+        def looks(name: str) -> bool:
+            """Look at the links, as a session does that has no certificate of a name yet."""
+            while unseen:
+                lines.append(unseen.pop())
+            return bool(links) and not strangers
+
+        class Session:
+            """Stands for Zenoh."""
+
+            id, misplaced, moved, inbox = "1", False, False, Inbox()
+            subscribe = watch = close = staticmethod(lambda *_, **__: None)
+            peers = staticmethod(lambda: links)
+            take = staticmethod(clock.take)
+            take_lines = staticmethod(lambda: tuple(lines.pop(0) for _ in range(len(lines))))
+            vouches = staticmethod(looks)
+
+        monkeypatch.setattr(client, "Session", lambda *_, **__: Session())
+        monkeypatch.setattr(client, "monotonic", lambda: clock.now)
+        try:
+            where = replace(address_of("lab", None), credentials=credentials)
+            tell = (lambda line: told.append(f"{clock.now:g}: {line}")) if hears else None
+            RunClient(where).find_plant(longest, tell)
+        except NobodyError as error:
+            told.append(str(error))
+        return told
+
+    return wait
+
+
+def test_a_plant_of_another_run_is_told_at_once_and_once(waiting: Waiting) -> None:
+    """A --run that no run has is reported during the wait, which goes on, as the run may yet start."""
+    told = waiting({0.5: "lab2", 3.0: "lab"}, 60.0)
+
+    assert told == [
+        "0.5: no plant yet of run lab at tcp/127.0.0.1:7447 (runs there: lab2); waits on",
+        "2: no plant yet of run lab at tcp/127.0.0.1:7447; 2 of 60 s waited",
+    ]
+
+
+def test_a_wait_is_told_ever_more_rarely(waiting: Waiting) -> None:
+    """A minute of waiting is five lines, and the sixth says that it was in vain."""
+    *reminders, last = waiting({}, 60.0)
+
+    assert [line.partition(":")[0] for line in reminders] == ["2", "4", "8", "16", "32"]
+    assert last.startswith("no plant of run lab at tcp/127.0.0.1:7447 within 60 s")
+
+
+def test_a_link_on_which_nothing_passes_is_told_once_and_at_the_end(waiting: Waiting) -> None:
+    """A revoked certificate, which TLS accepts: the plant can say nothing to its holder, who says why it waits."""
+    *reminders, last = waiting({}, 10.0, SHOWN)
+
+    told = [line for line in reminders if "takes the link, but nothing passes on it" in line]
+    assert [line.partition(":")[0] for line in reminders] == ["2", "2", "4", "8"]
+    assert told == reminders[1:2]
+    assert "revokes or lacks the certificate of inv1" in told[0]
+    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s: {told[0].removeprefix('2: ')}"
+
+
+STRANGER = "a link to tls/127.0.0.1:7447: its certificate is revoked; nothing passes on it"
+"""A line that a session gives once."""
+
+
+@pytest.mark.parametrize("hears", [True, False])
+@pytest.mark.parametrize(("comes", "there"), [({}, ""), ({0.5: "lab2"}, " (runs there: lab2)")])
+def test_a_link_to_an_end_without_access_is_the_reason_at_the_end(
+    waiting: Waiting, comes: dict[float, str], there: str, *, hears: bool
+) -> None:
+    """Whether or not somebody was told of it during the wait; who was, was told once."""
+    *reminders, last = waiting({**comes}, 10.0, SHOWN, strangers=(STRANGER,), hears=hears)
+
+    assert [line for line in reminders if STRANGER in line] == [f"2: {STRANGER}"] * hears
+    assert last == f"no plant of run lab at tcp/127.0.0.1:7447 within 10 s{there}: {STRANGER}"
+
+
+def test_a_short_wait_has_the_reason_too(waiting: Waiting) -> None:
+    """Its only look at the links is the one at its end."""
+    assert waiting({}, 0.5, SHOWN, strangers=(STRANGER,)) == [
+        f"no plant of run lab at tcp/127.0.0.1:7447 within 0.5 s: {STRANGER}"
+    ]
+
+
+def test_a_refused_certificate_ends_the_wait(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It would be refused for ever; open links are told to show one."""
+    monkeypatch.setattr(client, "tls_refusal", lambda *_: "asks for a certificate")
+
+    assert waiting({}, 60.0, None, 0) == [
+        "what listens at tcp/127.0.0.1:7447 asks for a certificate; say --keys DIR and tls/127.0.0.1:7447 "
+        "(docs/security.md)"
+    ]
+    assert waiting({}, 60.0, SHOWN, 0)[0].endswith(
+        "asks for a certificate; say by --keys the folder of its site, or by --connect where the plant of this site is "
+        "(docs/security.md)"
+    )
+
+
+def test_who_has_a_link_asks_for_no_other(waiting: Waiting, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The handshake that tells why there is none would be a stranger's connection to a plant that is there."""
+
+    def never(*_: object) -> str:
+        raise AssertionError
+
+    monkeypatch.setattr(client, "tls_refusal", never)
+
+    assert len(waiting({}, 60.0)) == 6

@@ -1,0 +1,176 @@
+"""What those who only look on and record believe: commands, `watch`, the record of links."""
+
+from __future__ import annotations
+
+import random
+from typing import Any
+
+import msgspec
+import pytest
+from msgspec.structs import replace
+
+from gridpeers.netem.ledger import LinkCounts, LinkTrace
+from gridpeers.scenarios.emulation.link_reports import LinkReportData, encode_data
+from gridpeers.scenarios.live import run_client as client
+from gridpeers.scenarios.live.run_address import address_of
+from gridpeers.scenarios.live.run_client import RunClient
+from gridpeers.scenarios.live.run_monitor import RunMonitor
+from gridpeers.scenarios.live.run_requests import read_config
+from gridpeers.scenarios.live.watching import RunSubscriber, plain
+from gridpeers.scenarios.results.link_record import LinkRecord
+from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
+from tests.hostile.cases import Truth, hostile
+from tests.toy.toy_configs import agent_config
+
+KEYS = Keys("lab")
+NAMES = ("inv1", "inv2")
+
+Event = tuple[str, str, bytes, float]
+
+
+class Line:
+    """Stands for Zenoh: what the test puts on it comes in."""
+
+    id, misplaced, moved = "1", False, False
+
+    def __init__(self) -> None:
+        self.events: list[Event] = []
+        self.inbox = Inbox()
+
+    def take(self, count: int, seconds: float) -> list[Event]:
+        """All that is there."""
+        events, self.events = self.events, []
+        return events
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **__: None
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> Line:
+    """The line of every client from now on."""
+    made = Line()
+    monkeypatch.setattr(client, "Session", lambda *_, **__: made)
+    return made
+
+
+def telemetry(t: float, epoch: int = 7, inverters: tuple[str, ...] = NAMES) -> Telemetry:
+    """Valid telemetry of the plant."""
+    row = (t, *(60.0, 5e4, 0.0, 277.0, 5e4, 277.0) * len(inverters))
+    return Telemetry(
+        sender="plant", epoch=epoch, seq=0, t=t, inverters=inverters, rows=(row,), events=(), final=False,
+        outcome="", reproducible=False,
+    )  # fmt: skip
+
+
+def is_status(message: bytes, key: str) -> bool:
+    """Whether these are bytes of a status under its sender's key: a visitor does not know the epochs of agents."""
+    try:
+        found = decode(message)
+    except RejectedError:
+        return False
+    return isinstance(found, AgentStatus) and key == KEYS.status(found.sender)
+
+
+def test_a_visitor_shows_the_same_whatever_else_is_published(line: Line) -> None:
+    """Telemetry of a plant that is not there, statuses under others' keys, nonsense: no line of the table changes."""
+    at = RunClient(address_of("lab", None))
+    monitor = RunMonitor("lab")
+    subscriber = RunSubscriber(at, monitor)
+    keys: Truth = {
+        KEYS.telemetry: ("plant", (Telemetry, LinkReport, LinkRequest)),
+        **{KEYS.status(name): (name, (AgentStatus,)) for name in NAMES},
+    }
+    line.events = [
+        ("appeared", KEYS.alive_plant(7), b"", 0.0),
+        ("message", KEYS.telemetry, encode(telemetry(1.0)), 0.0),
+    ]
+    subscriber.take(0.1)
+    before = plain(monitor.snapshot((), 0.0))
+    flood = list(hostile(keys, {"plant": 7, **dict.fromkeys(NAMES, 7)}, random.Random(1)))
+    line.events = [("message", key, payload, 0.0) for key, payload in flood if not is_status(payload, key)]
+    sent = len(line.events)
+    subscriber.take(0.1)
+
+    assert sent > 30_000
+    assert plain(monitor.snapshot((), 0.0)) == before
+    assert before.replace("\n", "").isprintable()
+
+
+def test_a_picture_of_other_inverters_waits_for_their_values() -> None:
+    """A plant with other inverters, that has no row yet, does not lend them the former's."""
+    monitor = RunMonitor("lab")
+    monitor.telemetry(telemetry(1.0), 0.0)
+    monitor.telemetry(replace(telemetry(0.0, 8, ("inv1", "inv2", "inv3")), rows=()), 0.1)
+
+    assert [entry.P for entry in monitor.snapshot((), 0.2).inverters] == [None, None, None]
+
+
+@pytest.mark.parametrize("change", [{"P_rated": 0.0}, {"V_nom": -1.0}, {"name": "\x1b[2J"}, {"m_p": 1e300}])
+def test_a_configuration_that_cannot_be_is_none(change: dict[str, Any]) -> None:
+    """Nobody divides by a rating of 0, or prints a name that clears the screen."""
+    config = agent_config("inv1")
+
+    assert read_config(msgspec.json.encode(config)) == config
+    assert read_config(msgspec.json.encode(replace(config, **change))) is None
+
+
+COUNTS = LinkCounts(sent=1, duplicated=0, delivered=1, dropped={}, corrupted=0, in_flight=0)
+
+
+def report(body: object, sender: str = "inv1") -> LinkReport:
+    """A report with this in it."""
+    return LinkReport(sender=sender, epoch=1, seq=0, t=0.0, data=msgspec.msgpack.encode(body))
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        {"traces": [["inv2", "inv1", [1, 2], [0.0], ["cut"]]]},
+        {"traces": [["", "inv1", [1], [0.0], ["cut"]]]},
+        {"traces": [["inv2", "inv3", [1], [0.0], ["cut"]]]},
+        {"traces": [["inv2", "inv1", [-1], [0.0], ["cut"]]]},
+        {"traces": [["inv2", "inv1", [2**64 - 1], [0.0], ["cut"]]]},
+        {"traces": [["inv2", "inv1", [1], [float("nan")], ["cut"]]]},
+        {"traces": [["inv2", "inv1", [1], [0.0], ["cut\x1b"]]]},
+        {"counts": {"": msgspec.to_builtins(COUNTS)}},
+        {"counts": {"inv2": {**msgspec.to_builtins(COUNTS), "sent": -1}}},
+        [],
+        7,
+    ],
+)
+def test_a_book_of_links_that_cannot_be_is_counted_and_not_recorded(body: object) -> None:
+    """Uneven rows, names that are none, links to somebody else: the rest of the record is as if it had not come."""
+    record = LinkRecord()
+    record(report(body))
+
+    assert record.garbled == 1
+    assert record.counts == {}
+    assert dict(record.by_link()) == {}
+
+
+def test_a_sound_book_is_recorded() -> None:
+    """With all that it says."""
+    record = LinkRecord()
+    book = LinkReportData(
+        traces=(LinkTrace("inv2", "inv1", (1, 2), (0.0, 0.02), ("cut", 0.1)),), counts={"inv2": COUNTS}
+    )
+    record(LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=encode_data(book)))
+
+    assert record.garbled == 0
+    assert record.counts == {("inv2", "inv1"): COUNTS}
+
+
+def test_every_message_that_is_sent_can_be_read_by_a_visitor_of_that_plant(line: Line) -> None:
+    """And by nobody who sees another plant's token."""
+    at = RunClient(address_of("lab", None))
+    line.events = [("appeared", KEYS.alive_plant(7), b"", 0.0)]
+    list(at.take(0.0))
+    said: Message = telemetry(1.0)
+
+    assert at.read(KEYS.telemetry, encode(said)) == said
+    assert at.read(KEYS.telemetry, encode(replace(telemetry(1.0), epoch=6))) is None
+    assert at.read(KEYS.telemetry, b"nonsense") is None

@@ -1,0 +1,114 @@
+"""Silence is no answer: questions are asked again until the wait ends, and then nobody is said to have said no."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import cast
+
+import msgspec
+import pytest
+
+from gridpeers.scenarios.live import run_requests
+from gridpeers.scenarios.live.link_requests import links_of_run
+from gridpeers.scenarios.live.run_client import NobodyError, RunClient
+from gridpeers.scenarios.live.run_requests import ask, configuration, configurations, plant_status
+from gridpeers.wire.codec import decode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import Answer, AnyMessage, Command
+from tests.toy.toy_configs import agent_config
+
+KEYS = Keys("demo")
+
+
+class Lost:
+    """Stands for a client at a plant of inv1 and inv2, whose first questions are lost; time passes while it waits."""
+
+    id, where, keys = "z1", type("Where", (), {"credentials": None, "__str__": lambda self: "run demo"})(), KEYS
+
+    def __init__(self, lost: int = 0) -> None:
+        self.now, self.asked, self._lost = 0.0, 0, lost
+        self._coming: list[tuple[str, bytes] | Answer] = []
+
+    def _arrives(self) -> bool:
+        self.asked += 1
+        self._lost -= 1
+        return self._lost < 0
+
+    def publish(self, key: str, payload: bytes) -> None:
+        """Ask the plant."""
+        command = decode(payload)
+        assert isinstance(command, Command)
+        data = {"phase": "running", "t": 1.0, "speed": 1.0, "pacing": PACING, "agents": ["inv1"], "absent": ["inv2"]}
+        if self._arrives():
+            self._coming.append(
+                Answer(sender="plant", epoch=1, seq=command.seq, t=1.0, ok=True, text="running", data=data)
+            )
+
+    def fetch(self, key: str) -> None:
+        """Ask for configurations."""
+        if self._arrives():
+            self._coming += [(KEYS.config(name), msgspec.json.encode(agent_config(name))) for name in ("inv1", "inv2")]
+
+    def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:
+        """Yield what comes, or wait."""
+        if not self._coming:
+            self.now += seconds
+        elif isinstance(self._coming[0], Answer):
+            yield "answer", b"", self.now
+        else:
+            yield (*self._coming.pop(0), self.now)
+
+    def read(self, key: str, payload: bytes) -> AnyMessage | None:
+        """Return the answer that has come."""
+        return cast(Answer, self._coming.pop(0)) if key == "answer" else None
+
+
+PACING = {"steps": 1, "late": 0, "p50": 0.0, "p95": 0.0, "p99": 0.0, "worst": 0.0, "slipped": 0.0}
+
+
+@pytest.fixture
+def lossy(monkeypatch: pytest.MonkeyPatch) -> type[Lost]:
+    """Makes clients whose clock is the module's own."""
+    clock: list[Lost] = []
+
+    class Timed(Lost):
+        def __init__(self, lost: int = 0) -> None:
+            super().__init__(lost)
+            clock[:] = [self]
+
+    monkeypatch.setattr(run_requests, "monotonic", lambda: clock[0].now)
+    return Timed
+
+
+def test_a_question_that_was_lost_is_asked_again(lossy: type[Lost]) -> None:
+    """A second later, and again: the status, and a configuration; a command that changes something is given once."""
+    client = lossy(3)
+    assert plant_status(cast(RunClient, client)).agents == ("inv1",)
+    assert (client.asked, client.now) == (4, pytest.approx(3.0))
+
+    client = lossy(3)
+    assert configurations(cast(RunClient, client), "inv2").keys() == {"inv1", "inv2"}
+    assert (client.asked, client.now) == (4, pytest.approx(3.0))
+
+    client = lossy(1)
+    with pytest.raises(NobodyError, match="has not answered within 10 s"):
+        ask(cast(RunClient, client), "open", "sw1")
+    assert client.asked == 1
+
+
+def test_no_answer_is_not_taken_for_a_no(lossy: type[Lost]) -> None:
+    """Neither an inverter nor emulated links are said to be missing, once the wait has ended."""
+    with pytest.raises(NobodyError, match="the plant of run demo is there but has not answered within 30 s"):
+        configuration(cast(RunClient, lossy(1000)), "inv1", 30.0)
+    with pytest.raises(NobodyError, match="no answer: the plant of run demo has not sent the configuration of inv1"):
+        configurations(cast(RunClient, lossy(1000)), "inv1", 30.0)
+    with pytest.raises(NobodyError, match="no answer: the plant of run demo has not sent a configuration within"):
+        links_of_run(cast(RunClient, lossy(1000)))
+
+
+def test_an_inverter_that_the_plant_does_not_have_is_told_at_once(lossy: type[Lost]) -> None:
+    """Its status names all inverters: nobody waits for a configuration that cannot come."""
+    client = lossy()
+    with pytest.raises(NobodyError, match='no inverter "inv3" in run demo; inverters are inv1, inv2'):
+        configuration(cast(RunClient, client), "inv3", 60.0)
+    assert client.now == 0.0
