@@ -13,13 +13,7 @@ SWEEPS = CATALOGUE / "sweeps"
 
 
 def names_in(folder: Path) -> tuple[str, ...]:
-    """Names of the files of a catalogue.
-
-    Examples
-    --------
-    >>> names_in(SWEEPS)[:2]
-    ('communication-delay', 'degraded-communication')
-    """
+    """Names of the files of a catalogue."""
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 

@@ -54,14 +54,8 @@ def run_case(
 
     Parameters
     ----------
-    request : Request
-        The run.
-    case : str
-        Name of the case.
     toml : str
         The scenario as run, for its record.
-    progress : Progress
-        Takes the progress.
     plant_at_rest : Callable[[PlantConfig], PlantLike], optional
         In one process: gives the plant at t = 0 instead of building it.
 

@@ -49,8 +49,6 @@ class Child:
         What to run, without the interpreter.
     config : msgspec.Struct or tuple of these
         Configuration, sent as one line of JSON.
-    log : Path
-        File for what it prints.
     on_exit : Callable[[Child], None]
         Called from another thread when it has ended.
     on_word : Callable[[str], None], optional

@@ -75,12 +75,8 @@ class ForkServer:
 
         Parameters
         ----------
-        words : Sequence[str]
-            Module and arguments.
         log : IO[bytes]
             File for its standard error, and for its standard output unless it speaks to this process.
-        speaks : bool
-            Whether its standard output comes here.
 
         Raises
         ------

@@ -53,25 +53,13 @@ class ZenohEndpoint(NamedTuple):
 
 
 def parse_endpoint(text: str) -> ZenohEndpoint | None:
-    """Return the endpoint of a text; None if the text has not the form of one.
-
-    Examples
-    --------
-    >>> parse_endpoint("tcp/[::1]:7447")
-    ZenohEndpoint(protocol='tcp', host='[::1]', port=7447, rest='')
-    """
+    """Return the endpoint of a text; None if the text has not the form of one."""
     match = _FORM.fullmatch(text)
     return match and ZenohEndpoint(match["protocol"], match["host"], int(match["port"]), match["rest"] or "")
 
 
 def local_endpoint(port: int) -> str:
-    """Return the endpoint at a port of this host's loopback.
-
-    Examples
-    --------
-    >>> local_endpoint(7447)
-    'tcp/127.0.0.1:7447'
-    """
+    """Return the endpoint at a port of this host's loopback."""
     return f"tcp/127.0.0.1:{port}"
 
 
@@ -80,8 +68,6 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
 
     Parameters
     ----------
-    text : str, optional
-        The endpoint.
     option : str, optional
         The option or key that gives it, for the error.
 

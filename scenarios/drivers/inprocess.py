@@ -52,16 +52,8 @@ def run_direct(
 
     Parameters
     ----------
-    config : PlantConfig
-        The plant.
-    agents : Sequence[AgentConfig]
-        The agents.
-    laws : Sequence[Law]
-        Law of each.
     plant : PlantLike
         The plant at t = 0.
-    on_telemetry : Callable[[Telemetry], None]
-        Takes the plant's telemetry.
     on_journal : Callable[[Journal], None], optional
         Takes the journals, if the configurations ask for them.
     """
@@ -93,20 +85,10 @@ class InprocessBus:
 
     Parameters
     ----------
-    plant : LockstepPlant
-        The plant's core.
     agents : Iterable[LockstepAgent]
         The agents' cores, in the order in which they start.
-    on_telemetry : Callable[[Telemetry], None]
-        Takes the plant's telemetry.
-    on_links : Callable[[LinkReport], None]
-        Takes the reports of emulated links.
-    on_journal : Callable[[Journal], None]
-        Takes the journals of the nodes.
     newcomer : Callable[[str], LockstepAgent]
         Makes the core of an agent that the plant awaits while the run goes on.
-    known : KnownAgents
-        What all agents know of each other.
     """
 
     def __init__(
@@ -235,8 +217,6 @@ def run_inprocess(
         The agents, in the order in which they start; also those that join later.
     on_telemetry : Callable[[Telemetry], None]
         Called with every telemetry message as it comes; the first at t = 0.
-    on_links : Callable[[LinkReport], None], optional
-        Called with every report of emulated links.
     on_journal : Callable[[Journal], None], optional
         Called with every part of a node's journal, if the configurations ask for journals.
     plant : PlantLike, optional

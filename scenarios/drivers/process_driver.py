@@ -79,8 +79,6 @@ def run_processes(
         Called with "listening", "compiling", "ready" as the plant comes up.
     on_start : Callable[[Children], None], optional
         Called once all processes are started; tests inject faults here.
-    on_links : Callable[[LinkReport], None], optional
-        Called with every report of emulated links.
     on_journal : Callable[[Journal | LinkRequest], None], optional
         Called with every part of a node's journal, if the configurations ask for journals, and every link command.
     plant_command : Sequence[str], optional

@@ -25,12 +25,6 @@ def secured(
 
     Parameters
     ----------
-    plant : PlantConfig
-        The plant.
-    agents : Sequence[AgentConfig]
-        Agents it knows.
-    folder : Path
-        Folder of the site.
     started : Collection[str]
         Names of the agents that start from here: their keys must be in the folder.
     inverters : Sequence[str]

@@ -33,14 +33,7 @@ class ProcessFault(NamedTuple):
 
 
 def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
-    """Return the signals of entries `[[node]]` in the order of time; their other faults are emulated.
-
-    Examples
-    --------
-    >>> faults = process_faults([NodeFault(name="inv3", pause=True, from_s=1.0, to_s=2.5)])
-    >>> [(fault.t, fault.number.name) for fault in faults]
-    [(1.0, 'SIGSTOP'), (2.5, 'SIGCONT')]
-    """
+    """Return the signals of entries `[[node]]` in the order of time; their other faults are emulated."""
     faults = []
     for node in nodes:
         if node.kill:
@@ -119,14 +112,10 @@ class Supervisor:
 
     Parameters
     ----------
-    plant : PlantConfig
-        The plant.
     agents : Iterable[AgentConfig]
         All agents, also those that join later, with their endpoints.
     log_dir : Path
         Folder for `plant.log`, `inv1.log`, ...; the second life of inv1 writes `inv1-2.log`.
-    on_exit : Callable[[Child], None]
-        Called with every process that has ended.
     on_word : Callable[[str], None], optional
         Called with "listening", "compiling", "ready" as the plant comes up.
     plant_command : Sequence[str], optional
@@ -246,15 +235,7 @@ class Supervisor:
 
 
 def share(names: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:
-    """Return the agents that share a process with each, itself included; neighbours in the order stay together.
-
-    Examples
-    --------
-    >>> share(("inv1", "inv2", "inv3", "inv4"), 2)["inv2"]
-    ('inv1', 'inv2')
-    >>> share(("inv1", "inv2", "inv3"), 0)["inv2"]
-    ('inv2',)
-    """
+    """Return the agents that share a process with each, itself included; neighbours in the order stay together."""
     count = min(processes or len(names), len(names))
     bounds = [len(names) * k // count for k in range(count + 1)] if count else [0]
     blocks = [tuple(names[a:b]) for a, b in pairwise(bounds)]

@@ -30,8 +30,6 @@ def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
 
     Parameters
     ----------
-    config : PlantConfig
-        The plant.
     waits : bool, optional
         Whether it waits for the recorder even if it waits for no agent, as in a live run that is recorded.
     """
@@ -49,12 +47,6 @@ class TelemetryClient:
     ----------
     name : str
         The recorder's name; the plant waits for it before the start.
-    run : str
-        Name of the run.
-    endpoint : str
-        Where the plant listens.
-    clock : {"simulated", "wall"}
-        The run's kind of time.
     on_message : Callable[[Recordable], None]
         Called with each message, in the order in which the plant published them.
     credentials : Credentials or None, optional

@@ -46,18 +46,6 @@ class TelemetryStream:
     ----------
     lost : bool
         Whether messages are lost, as the plant did not have them any more.
-
-    Examples
-    --------
-    >>> def telemetry(seq):
-    ...     return Telemetry(sender="plant", epoch=1, seq=seq, t=0.0, inverters=(), rows=(), events=(),
-    ...         final=False, outcome="", reproducible=False)
-    >>> stream = TelemetryStream()
-    >>> [len(stream.take(telemetry(seq), now=0.0)) for seq in (0, 1, 3)], stream.question(now=0.0)
-    ([1, 1, 0], '2')
-    >>> stream.answered(Answer(sender="plant", epoch=1, seq=0, t=0.0, ok=True, text="2"), now=0.1)
-    >>> [len(stream.take(telemetry(seq), now=0.1)) for seq in (2, 3, 3, 4)], stream.question(now=0.2)
-    ([1, 1, 0, 1], None)
     """
 
     def __init__(self, *, acknowledges: bool = False) -> None:
@@ -129,17 +117,7 @@ class TelemetryStream:
 
 
 class TelemetryEndpoint(PlantFollower):
-    """Accept the messages of one plant for recorders, from the first to the last.
-
-    Parameters
-    ----------
-    name : str
-        The recorder's name.
-    run : str
-        Name of the run.
-    stream : TelemetryStream
-        Puts messages in order.
-    """
+    """Accept the messages of one plant for recorders, from the first to the last."""
 
     def __init__(self, name: str, run: str, stream: TelemetryStream) -> None:
         super().__init__(name, run)

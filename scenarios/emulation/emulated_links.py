@@ -43,8 +43,6 @@ class EmulatedLinks:
     ----------
     name : str
         The receiver: an inverter, or the plant.
-    config : EmulationConfig
-        The run's faults.
     """
 
     def __init__(self, name: str, config: EmulationConfig) -> None:

@@ -122,15 +122,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return problems
 
     def __str__(self) -> str:
-        """Return it in words.
-
-        Examples
-        --------
-        >>> print(LinkCommand(fault=Fault(on="inv1 -> inv4", delay=0.1, loss=0.2), for_s=5.0))
-        inv1 -> inv4: loss 0.2, delay 0.1 s, for 5 s
-        >>> print(LinkCommand(heal=Heal(on=EVERYTHING, from_s=0.0)))
-        all links: heal
-        """
+        """Return it in words."""
         where = "all links" if self.on == EVERYTHING else self.on
         if self.fault is None:
             return f"{where}: heal"
@@ -138,16 +130,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{where}: " + ", ".join(faults + ([] if self.for_s is None else [f"for {self.for_s:g} s"]))
 
     def in_words(self, impaired: Sequence[Link]) -> str:
-        """Return it in words, given which of its links have a fault when it begins to hold.
-
-        Examples
-        --------
-        >>> heal = LinkCommand(heal=Heal(on="* <-> *", from_s=0.0))
-        >>> heal.in_words([Link("inv4", "inv7"), Link("inv7", "inv4"), Link("inv1", "inv4")])
-        'inv4 <-> inv7, inv1 -> inv4: healed'
-        >>> heal.in_words([])
-        '* <-> *: no link has a fault, nothing to heal'
-        """
+        """Return it in words, given which of its links have a fault when it begins to hold."""
         if self.fault is not None:
             return str(self)
         if not impaired:

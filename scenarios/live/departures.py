@@ -43,8 +43,6 @@ class ExpectedSilence:
     ----------
     scenario : ScenarioModel
         With its one case.
-    feeder : Feeder
-        Its feeder.
     """
 
     def __init__(self, scenario: ScenarioModel, feeder: Feeder) -> None:
@@ -130,10 +128,6 @@ def live_windows(
 
     Parameters
     ----------
-    scenario : ScenarioModel
-        As run.
-    events : Iterable[PlantEvent]
-        The plant's events.
     live : Sequence[tuple[str, float]]
         Label and time (s) of the live events, in the order of time.
     ended : float
@@ -238,8 +232,6 @@ def compare(
     ----------
     scenario, feeder : ScenarioModel, Feeder
         As run, with one case.
-    events : Sequence[PlantEvent]
-        The plant's events.
     ended : float
         Time (s) of the last row.
     missing : Sequence[tuple[float, float]], optional

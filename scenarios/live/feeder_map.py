@@ -67,15 +67,7 @@ class FeederMap(msgspec.Struct, frozen=True):
 
 
 def feeder_map(feeder: Feeder) -> FeederMap:
-    """Return the one-line diagram of a feeder.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.tables import read_feeder
-    >>> diagram = feeder_map(read_feeder("microgrid123"))
-    >>> diagram.inverters[0].name, diagram.buses[diagram.inverters[0].bus][0], diagram.switches[0].name
-    ('inv1', '160', '13-152')
-    """
+    """Return the one-line diagram of a feeder."""
     at = places(feeder)
     number = {bus.name: i for i, bus in enumerate(feeder.buses)}
     return FeederMap(

@@ -43,8 +43,6 @@ class LinkLog:
     ----------
     scenario : ScenarioModel
         As run, with its one case.
-    feeder : Feeder
-        Its feeder.
     replay : Path or None
         File of the scenario that replays the run's links: written at the end in any case, and now and then before.
     replay_if_changed : Path or None
@@ -122,10 +120,6 @@ def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chan
     ----------
     scenario : ScenarioModel
         As run, with its one case.
-    feeder : Feeder
-        Its feeder.
-    changes : Sequence[Change]
-        The link commands.
     t : float
         How far the run came (s): the scenario ends there, if it does not end later anyway.
     """

@@ -130,19 +130,10 @@ def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStatus])
 
     Parameters
     ----------
-    run : str
-        Name of the run.
     t : float
         Run time (s).
     stands : Mapping
         How links stand, by sender and receiver.
-
-    Examples
-    --------
-    >>> print(links_text("lab", 2.0, {("inv1", "inv4"): LinkStatus(holds=("loss 0.2",))}), end="")
-    run lab   t = 2.00 s   1 link impaired
-    link          sent  delivered  dropped  now
-    inv1 -> inv4     0          0        0  loss 0.2
     """
     names = in_order({name for link in stands for name in link} - {PLANT})
     order = {name: i for i, name in enumerate([*names, PLANT])}

@@ -44,8 +44,6 @@ def endpoint_for_run(listen: str, credentials: Credentials | None = None, access
 
     Parameters
     ----------
-    listen : str
-        The endpoint.
     credentials : Credentials or None, optional
         The plant's, to ask another run that is there for its name.
     access : Access or None, optional
@@ -90,12 +88,8 @@ def check_alone(
 
     Parameters
     ----------
-    run : str
-        Name of the run.
     beyond : tuple[str, ...]
         Endpoints that the plant will connect to; without any, it cannot meet another plant.
-    credentials : Credentials or None, optional
-        The plant's.
     access : Access or None, optional
         The options that gave them, for the command that the error names.
     """
@@ -153,12 +147,6 @@ def configure(
     ----------
     scenario : ScenarioModel
         A checked scenario.
-    feeder : Feeder
-        Its feeder.
-    options : LiveOptions
-        Options of the command.
-    listen : str
-        Where the plant listens.
     beyond : tuple[str, ...], optional
         What the plant connects to itself, e.g. a Zenoh router.
 
@@ -166,13 +154,6 @@ def configure(
     ------
     UsageError
         If an option cannot be used.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> plant, agents = configure(*load_scenario("islanding"), LiveOptions(run="lab"), "tcp/127.0.0.1:7447")
-    >>> plant.end, plant.settings.spares, agents[-1].name
-    (None, ('inv10',), 'inv10')
     """
     _check(options)
     if scenario.plant.simulator != "gridpeers":

@@ -106,12 +106,6 @@ def plant_here(
 
     Parameters
     ----------
-    config : PlantConfig
-        The plant.
-    folder : Path or None
-        Where to record the run.
-    link_log : LinkLog
-        Takes the commands to links.
     record : RecordInfo, optional
         The run, for its record.
     """
@@ -154,16 +148,8 @@ def all_here(
 
     Parameters
     ----------
-    config : PlantConfig
-        The plant.
     agents : tuple[AgentConfig, ...]
         All agents it knows; spare ones are not started.
-    logs : Path
-        Folder for the logs of the processes.
-    folder : Path or None
-        Where to record the run.
-    link_log : LinkLog
-        Takes the commands to links.
     record : RecordInfo, optional
         The run, for its record.
     """

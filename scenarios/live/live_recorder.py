@@ -33,12 +33,6 @@ class LiveRecorder:
 
     Parameters
     ----------
-    run : str
-        Name of the run.
-    endpoint : str
-        Where the plant listens.
-    say : Callable[[str], None]
-        Called with a line for every event.
     folder : Path or None
         Folder for the files of the record; None records nothing.
     silent : Collection[str], optional

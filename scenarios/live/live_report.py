@@ -42,14 +42,8 @@ def live_drawing(
 
     Parameters
     ----------
-    departures : Departures
-        The run compared with its scenario.
     scenario, feeder : ScenarioModel, Feeder
         As run, with one case.
-    history : History
-        The recorded rows.
-    events : Sequence[PlantEvent]
-        The plant's events.
     """
     (case,) = scenario.cases
     reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
@@ -89,12 +83,6 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None,
     ----------
     metrics : RunMetrics
         The run: its scenario has one case, and its folder exists.
-    recorded : Recorded
-        The whole record.
-    pacing : Pacing or None
-        How the plant kept pace.
-    figures : bool, optional
-        Whether its figures are drawn.
 
     Raises
     ------

@@ -34,15 +34,7 @@ class Access:
 
 
 def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
-    """Return why an endpoint cannot be used with or without certificates; empty if it can.
-
-    Examples
-    --------
-    >>> objection("--connect", "tcp/127.0.0.1:7447", keys=False, insecure=False)
-    ''
-    >>> objection("--connect", "tls/10.0.0.1:7447", keys=False, insecure=True)
-    '--connect: tls/10.0.0.1:7447 needs certificates: say --keys DIR, the folder that gridpeers keys init has made'
-    """
+    """Return why an endpoint cannot be used with or without certificates; empty if it can."""
     parsed = parse_endpoint(endpoint)
     assert parsed is not None
     if keys and parsed.protocol != "tls":
@@ -133,13 +125,7 @@ class RunAddress:
         return [*run, *connect, *self.access.words]
 
     def __str__(self) -> str:
-        """Return it as messages name it.
-
-        Examples
-        --------
-        >>> print(RunAddress(run="demo", connect=("tcp/127.0.0.1:7447",)))
-        run demo at tcp/127.0.0.1:7447
-        """
+        """Return it as messages name it."""
         return f"run {self.run} at {', '.join(self.connect)}"
 
 
@@ -148,8 +134,6 @@ def address_of(run: str, connect: list[str] | None) -> RunAddress:
 
     Parameters
     ----------
-    run : str
-        Name of the run.
     connect : list[str] or None
         Endpoints; none stands for `ENDPOINT`.
 
@@ -164,13 +148,7 @@ def address_of(run: str, connect: list[str] | None) -> RunAddress:
 
 
 def check_name(option: str, name: str) -> str:
-    """Return the name of a run or an inverter, if it can be a part of a Zenoh key.
-
-    Examples
-    --------
-    >>> check_name("--run", "lab-2")
-    'lab-2'
-    """
+    """Return the name of a run or an inverter, if it can be a part of a Zenoh key."""
     try:
         check_key_part(option, name)
     except ValueError as error:
@@ -228,11 +206,6 @@ def check_endpoint(option: str, text: str) -> str:
     ------
     UsageError
         If Zenoh could make nothing of it.
-
-    Examples
-    --------
-    >>> check_endpoint("--connect", "tcp/lab.example:7447")
-    'tcp/lab.example:7447'
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:
@@ -267,13 +240,7 @@ def _accepts(text: str) -> bool:
 
 
 def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Return where a process must listen so that others of the run can connect to it.
-
-    Examples
-    --------
-    >>> return_path(("tcp/127.0.0.1:7447",)), return_path(("tcp/192.168.1.10:7447",))
-    (('tcp/127.0.0.1:0',), ('tcp/0.0.0.0:0',))
-    """
+    """Return where a process must listen so that others of the run can connect to it."""
     protocol = "tls" if all(text.startswith("tls/") for text in connect) else "tcp"
     far = [host for host in _hosts(connect) if not is_loopback_host(host)]
     if not far:

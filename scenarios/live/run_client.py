@@ -18,15 +18,7 @@ from gridpeers.wire.trust.tls_refusal import tls_refusal
 
 
 class PlantSearch:
-    """The search of one session for the plant of a run.
-
-    Parameters
-    ----------
-    where : RunAddress
-        The run and its endpoints.
-    session : Session
-        The session.
-    """
+    """The search of one session for the plant of a run."""
 
     def __init__(self, where: RunAddress, session: Session) -> None:
         self._where, self._session = where, session
@@ -154,8 +146,6 @@ class RunClient:
 
     Parameters
     ----------
-    where : RunAddress
-        The run and its endpoints.
     meet_agents : bool, optional
         Whether to connect to the agents too, to hear what they publish; the plant alone is enough to ask it.
     listen : tuple[str, ...], optional

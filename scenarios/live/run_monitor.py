@@ -137,13 +137,7 @@ _KEPT = 100
 
 
 class RunMonitor:
-    """Collect the state of a run.
-
-    Parameters
-    ----------
-    run : str
-        Name of the run.
-    """
+    """Collect the state of a run."""
 
     def __init__(self, run: str) -> None:
         self._run = run
@@ -234,8 +228,6 @@ class RunMonitor:
 
         Parameters
         ----------
-        present : Collection[str]
-            Inverters whose agents have a token.
         now : float
             The client's clock (s).
         current : bool, optional

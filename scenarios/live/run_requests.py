@@ -227,16 +227,7 @@ def check_free(client: RunClient, name: str) -> None:
 
 
 def own_code(config: AgentConfig) -> tuple[str, ...]:
-    """Return the code that a configuration names beside gridpeers' own and installed plug-ins, in words.
-
-    Examples
-    --------
-    >>> from gridpeers.agents.agent_config import Control, LawChoice
-    >>> control = Control(secondary="all", graph="full", law=LawChoice(command=("./mylaw",)))
-    >>> own_code(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0, f_nom=60.0,
-    ...     m_p=0.01, m_q=0.05, T_c=0.02, control=control, deadline=10.0, connect=()))
-    ('the law ./mylaw',)
-    """
+    """Return the code that a configuration names beside gridpeers' own and installed plug-ins, in words."""
     return tuple(_named(config))
 
 
@@ -260,8 +251,6 @@ def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None)
 
     Parameters
     ----------
-    factor
-        Factor on its real and reactive power.
     P_kW, Q_kvar
         Real (kW) and reactive power (kvar) at nominal voltage.
 

@@ -9,21 +9,7 @@ from gridpeers.wire.plant_follower import MOST_PLANTS
 
 
 class RunTokens:
-    """The tokens that are there, as far as there is room for them.
-
-    Parameters
-    ----------
-    run : str
-        Name of the run.
-
-    Examples
-    --------
-    >>> tokens = RunTokens("lab")
-    >>> for key in ("gridpeers/lab/alive/plant/7", "gridpeers/lab/alive/agent/inv1/a", "gridpeers/mine/alive/plant/8"):
-    ...     tokens.appeared(key)
-    >>> tokens.epochs, tokens.agents, sorted(tokens.runs)
-    ({7}, {'inv1': {'a'}}, ['lab', 'mine'])
-    """
+    """The tokens that are there, as far as there is room for them."""
 
     def __init__(self, run: str) -> None:
         self._run, self._keys = run, Keys(run)

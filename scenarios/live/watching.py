@@ -175,10 +175,6 @@ class RunSubscriber:
 
     Parameters
     ----------
-    client : RunClient
-        At the run.
-    monitor : TakesMessages
-        Takes the messages.
     on_other : Callable[[str, bytes], None], optional
         Called with key and payload of every other message.
     """
@@ -287,8 +283,6 @@ def watch(client: RunClient, console: Console, seconds: float | None) -> None:
     ----------
     client : RunClient
         At the run, with its agents met.
-    console : Console
-        The terminal.
     seconds : float or None
         Time (s) after which it ends; None until q or Ctrl-C.
     """

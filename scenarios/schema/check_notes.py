@@ -33,8 +33,6 @@ def why_away(name: str, begin_s: float, end_s: float, events: Iterable[AgentEven
 
     Parameters
     ----------
-    name : str
-        The agent.
     begin_s, end_s : float
         Run times (s); the end may be infinite.
     events : Iterable[AgentEvent]

@@ -36,13 +36,7 @@ _RUN_FOLDER = ("log", "plots", "metrics.json", "report.txt", "scenario.toml", "s
 
 
 def name_of(stem: str) -> str:
-    """Return the name of a scenario whose file has none: the file's, with other letters as names may have.
-
-    Examples
-    --------
-    >>> name_of("süd"), name_of("Übung 3 (neu)"), name_of("東京")
-    ('sud', 'Ubung-3-neu', 'scenario')
-    """
+    """Return the name of a scenario whose file has none: the file's, with other letters as names may have."""
     letters = unicodedata.normalize("NFKD", stem).encode("ascii", "ignore").decode("ascii")
     return re.sub(r"[^A-Za-z0-9_.]+", "-", letters).strip("_.-")[:31] or "scenario"
 

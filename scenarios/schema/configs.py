@@ -31,19 +31,10 @@ def configs(
         A checked scenario.
     feeder : Feeder
         Its feeder; it gives the agents their nameplates.
-    case : str
-        Name of the case.
     endpoint : str, optional
         Where the plant listens and agents connect, e.g. "tcp/127.0.0.1:7447"; the in-process driver needs none.
     real_nodes : bool, optional
         Whether processes really are killed and paused, as the driver of wall-clock time does; else it is emulated.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> plant, agents = configs(*load_scenario("islanding"), "IV")
-    >>> plant.end, agents[0].name, agents[0].control.graph
-    (7.0, 'inv1', 'full')
     """
     run = f"{scenario.name}-{case}"
     endpoints = (endpoint,) if endpoint else ()
@@ -119,14 +110,7 @@ def configs(
 
 
 def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
-    """Return the power that inverters have available in one case; a case's own numbers take the place of an event's.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> limits_of(load_scenario("intermittency")[0], "225kW")[0]
-    PowerLimit(t=2.5, inverter='inv2', P_max=225000.0)
-    """
+    """Return the power that inverters have available in one case; a case's own numbers take the place of an event's."""
     own = scenario.cases[case].P_max_kW
     return tuple(
         PowerLimit(t=event.t_s, inverter=name, P_max=1e3 * kW)
@@ -136,14 +120,7 @@ def limits_of(scenario: ScenarioModel, case: str) -> tuple[PowerLimit, ...]:
 
 
 def changes_of(scenario: ScenarioModel) -> FeederChanges:
-    """Return what a scenario changes in its feeder, in SI units and per unit.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> changes_of(load_scenario("islanding")[0]) == FeederChanges()
-    True
-    """
+    """Return what a scenario changes in its feeder, in SI units and per unit."""
     plant = scenario.plant
     return FeederChanges(
         f_nom=plant.f_nom_Hz,

@@ -70,8 +70,6 @@ def find_file(name: str, folder: Path, what: str) -> Path:
     ----------
     name : str
         Name or path, as the user gave it.
-    folder : Path
-        Folder of the catalogue.
     what : str
         What its files are, for the message.
 
@@ -120,12 +118,6 @@ def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
     ------
     ScenarioError
         With every problem of the file and of its feeder.
-
-    Examples
-    --------
-    >>> scenario, feeder = load_scenario("islanding")
-    >>> list(scenario.cases), len(feeder.inverters)
-    (['I', 'II', 'III', 'IV'], 9)
     """
     path = find_scenario(str(name))
     text, data = read_toml(path)
@@ -165,8 +157,6 @@ def check_tables(
 
     Parameters
     ----------
-    data : Mapping[str, Any]
-        Parsed TOML.
     path : Path
         Its file: a relative path of a feeder starts there, and a scenario without a name has its name, by `name_of`.
     problems : Problems

@@ -32,14 +32,7 @@ def without_agent(scenario: ScenarioModel, case: str) -> frozenset[str]:
 
 
 def with_agent(scenario: ScenarioModel, feeder: Feeder, case: str) -> tuple[InverterRow, ...]:
-    """Return the inverters that have an agent in a case, those that join later last, in the table's order.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> len(with_agent(*load_scenario("islanding"), "IV"))
-    9
-    """
+    """Return the inverters that have an agent in a case, those that join later last, in the table's order."""
     without = without_agent(scenario, case)
     return tuple(row for row in inverters_of(scenario, feeder) if row.name not in without)
 

@@ -34,27 +34,14 @@ OUR_GRAPHS = get_args(GraphRule)
 
 
 def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
-    """Return the law of a case: its own, or the scenario's.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> law_of(load_scenario("islanding")[0], "IV").use
-    'consensus'
-    """
+    """Return the law of a case: its own, or the scenario's."""
     table = table_of(scenario.cases[case].law or scenario.law)
     choice, _ = read_table(LawChoice, {key: value for key, value in table.items() if key in KEYS})
     return replace(choice, parameters={key: value for key, value in table.items() if key not in KEYS})
 
 
 def graph_of(case: Case) -> tuple[str, Plugin | None]:
-    """Return the name of a case's rule, and the rule if it is one's own.
-
-    Examples
-    --------
-    >>> graph_of(Case(secondary="all", graph="ring"))
-    ('ring', None)
-    """
+    """Return the name of a case's rule, and the rule if it is one's own."""
     plugin = plugin_of(case.graph)
     return (plugin.use, None) if plugin.use in OUR_GRAPHS else (plugin.name, plugin)
 
@@ -124,13 +111,7 @@ def with_keys(scenario: ScenarioModel, change: Callable[[PluginKey, Registry[Any
 
 
 def placed(key: PluginKey, registry: Registry[Any], folder: Path) -> PluginKey:
-    """Return a key with the folder of its module, program or FMU, and a decorator's name as `module:Name`.
-
-    Examples
-    --------
-    >>> placed("ring", GRAPHS, Path("/here")), placed({"use": "mine:Star", "hub": "inv1"}, GRAPHS, Path("/here"))
-    ('ring', {'use': 'mine:Star', 'hub': 'inv1', 'folder': '/here'})
-    """
+    """Return a key with the folder of its module, program or FMU, and a decorator's name as `module:Name`."""
     table = table_of(key)
     use, given = registry.reference(str(table.get("use", ""))), table.get("folder", "")
     local = ":" in use or "command" in table or "fmu" in table
@@ -321,8 +302,6 @@ def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioMode
     ----------
     scenario : ScenarioModel
         Checked, so with absolute folders of what is its own: laws, graphs, metrics, claims, checks, faults, feeder.
-    folder : Path
-        Folder of the file to be written.
     """
     here = folder.resolve()
 

@@ -134,8 +134,6 @@ def multiple(path: str, value: float, of: str, step: float, rule: str, problems:
         Both (s).
     rule : str
         What takes place at such times, as an end of the sentence.
-    problems : Problems
-        Takes the problem.
     """
     if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, of.rpartition(".")[2], rule)):
         problems.add(path, text)

@@ -18,14 +18,7 @@ from gridpeers.wire.messages import LoadSetting
 
 
 def load_events(scenario: ScenarioModel) -> tuple[LoadEvent, ...]:
-    """Return the changes of loads in the order of time, in SI units.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> load_events(load_scenario("islanding")[0])
-    ()
-    """
+    """Return the changes of loads in the order of time, in SI units."""
     return tuple(
         LoadEvent(t=event.t_s, load=name, setting=_setting(change))
         for event in scenario.events

@@ -38,15 +38,6 @@ def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, 
         Nodes, at least 2.
     links : int
         From n - 1 to n (n - 1) / 2.
-    count : int
-        How many graphs.
-    seed : int
-        Of the draws.
-
-    Examples
-    --------
-    >>> [len(graph) for graph in connected_graphs(9, 12, 3, seed=1)], len(connected_graphs(9, 36, 10, seed=1))
-    ([12, 12, 12], 1)
     """
     most = 1 if links == n * (n - 1) // 2 else count
     found: dict[Edges, None] = {}
@@ -67,13 +58,7 @@ def connected_graph(n: int, links: int, rng: random.Random) -> Edges:
 
 
 def algebraic_connectivity(n: int, edges: Sequence[tuple[int, int]]) -> float:
-    r"""Second smallest eigenvalue :math:`\lambda_2` of the Laplacian with weight 1 per link (Fiedler, 1973).
-
-    Examples
-    --------
-    >>> round(algebraic_connectivity(3, [(0, 1), (1, 2)]), 9)
-    1.0
-    """
+    r"""Second smallest eigenvalue :math:`\lambda_2` of the Laplacian with weight 1 per link (Fiedler, 1973)."""
     L = np.zeros((n, n))
     for i, j in edges:
         L[[i, j], [i, j]] += 1.0

@@ -30,11 +30,6 @@ def steps(path: str) -> list[str | int]:
     ------
     PathError
         If it is no path.
-
-    Examples
-    --------
-    >>> steps("event[0].t_s")
-    ['event', 0, 't_s']
     """
     if not _PATH.fullmatch(path):
         raise PathError("is no path of a key; write it as gains.k_p, case.IV.graph or event[0].t_s")

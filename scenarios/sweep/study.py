@@ -46,8 +46,6 @@ class SweepFolder:
     ----------
     folder : Path
         New, empty, or this sweep's from before.
-    plan : Plan
-        The sweep.
 
     Raises
     ------
@@ -179,8 +177,6 @@ def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs:
 
     Parameters
     ----------
-    plan : Plan
-        The sweep.
     folder : SweepFolder
         Its folder, with the rows of runs that are done.
     tell : Callable[[int], None]

@@ -160,13 +160,7 @@ def _accounts(links: LinkRecord) -> dict[str, float | None]:
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
-    """Return the measures of one window as columns.
-
-    Examples
-    --------
-    >>> flat("event1", {"MPSI": 0.25, "t_restore_s": None, "p": {"inv1": 0.5}})
-    {'event1.MPSI': 0.25, 'event1.t_restore_s': None, 'event1.p.inv1': 0.5}
-    """
+    """Return the measures of one window as columns."""
     found: dict[str, float | None] = {}
     for name, value in values.items():
         if isinstance(value, dict):

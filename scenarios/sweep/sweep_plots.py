@@ -84,13 +84,6 @@ def spread_of(at: pd.Series, values: pd.Series) -> pd.DataFrame:
         Parameter of each run. One that was drawn at random is cut into groups, each with its median as index.
     values : Series
         Index of each run: infinite where it never came to be, not a number where it says nothing.
-
-    Examples
-    --------
-    >>> spread_of(pd.Series([8, 8, 8, 12]), pd.Series([3.0, 1.0, np.inf, 0.5]))
-        low  median  high  never
-    8   1.0     3.0   3.0      1
-    12  0.5     0.5   0.5      0
     """
     by = at.to_numpy()
     if is_drawn(at):

@@ -131,14 +131,8 @@ def checked_runs(
 
     Parameters
     ----------
-    base : BaseScenario
-        The scenario that is varied.
     fixed : Mapping[str, Any]
         Keys that are set in every sample, by path.
-    settings : Sequence[Setting]
-        The samples.
-    cases : Sequence[str]
-        Cases that are run.
     origin : Mapping[str, str]
         Key of the sweep file by key of the scenario.
     problems : Problems
@@ -206,12 +200,6 @@ def read_sweep(name: str | Path) -> Plan:
     ------
     ScenarioError
         With every problem of the sweep file, of its scenario and of its samples.
-
-    Examples
-    --------
-    >>> plan = read_sweep("gains")
-    >>> plan.base.name, plan.parameters
-    ('islanding', ('gains.k_p', 'gains.k_q'))
     """
     path = find_file(str(name), SWEEPS, "sweep")
     text, data = read_toml(path)

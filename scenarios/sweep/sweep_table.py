@@ -58,13 +58,7 @@ GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic
 
 
 def unit_of(name: str) -> str:
-    """Return the unit of a column: of a key of the scenario its own, of an index the end of its name.
-
-    Examples
-    --------
-    >>> unit_of("event1.t_restore_s"), unit_of("case.IV.gains.k_p"), unit_of("event1.p.inv1"), unit_of("event1.MPSI")
-    ('s', 's', 'pu', '')
-    """
+    """Return the unit of a column: of a key of the scenario its own, of an index the end of its name."""
     field = _field_at(_apart(name)[0])
     if field is not None and field.unit:
         return field.unit
@@ -79,13 +73,6 @@ def label_of(name: str) -> str:
     """Return words for an axis, with the unit.
 
     A key whose field has no `Label` is named by its last part and its table.
-
-    Examples
-    --------
-    >>> label_of("time.T_c_s"), label_of("case.IV.gains.k_p"), label_of("link[1].delay")
-    ('control period, T_c (s)', 'gain of P_set, k_p (s), case IV', 'delay of the links (s)')
-    >>> label_of("degraded_communication.T_age_s"), label_of("plant.gfm.k_pp")
-    ('T_age of [degraded_communication] (s)', 'k_pp of [plant.gfm] (rad/s per pu)')
     """
     if (index := name.rpartition(".")[2]) in INDEXES:
         return INDEXES[index].label
