@@ -11,7 +11,7 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
 from typing import IO
@@ -53,8 +53,6 @@ class Child:
         Called from another thread when it has ended.
     on_word : Callable[[str], None], optional
         Called from another thread with every line of its standard output.
-    prefix : Sequence[str], optional
-        What stands before the interpreter in the command, e.g. ip netns exec NAME.
     server : ForkServer or None, optional
         Forks it, instead of a new interpreter; then the command is `-m` and a module.
     """
@@ -67,7 +65,6 @@ class Child:
         log: Path,
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,
-        prefix: Sequence[str] = (),
         server: ForkServer | None = None,
     ) -> None:
         self.name, self.log = name, log
@@ -75,7 +72,7 @@ class Child:
         with log.open("wb") as stderr:
             self._process = self._forked(server, words, stderr, speaks=on_word is not None) or subprocess.Popen(
                 # -P: a folder named like one of our packages, where the user stands, must not be imported instead
-                [*prefix, sys.executable, "-P", *words],
+                [sys.executable, "-P", *words],
                 stdin=subprocess.PIPE,
                 stdout=stderr if on_word is None else subprocess.PIPE,
                 stderr=stderr,

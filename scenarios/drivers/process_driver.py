@@ -49,7 +49,6 @@ def run_processes(
     on_telemetry: Callable[[Telemetry], None],
     *,
     start_order: Sequence[str] | None = None,
-    on_status: Callable[[str], None] | None = None,
     on_start: Callable[[Children], None] | None = None,
     on_links: Callable[[LinkReport], None] = lambda report: None,
     on_journal: Callable[[Journal | LinkRequest], None] = lambda message: None,
@@ -75,8 +74,6 @@ def run_processes(
         Called with every telemetry message as it comes; the first at t = 0.
     start_order : Sequence[str], optional
         Names in the order of their start; the plant, named "plant", first unless said otherwise.
-    on_status : Callable[[str], None], optional
-        Called with "listening", "compiling", "ready" as the plant comes up.
     on_start : Callable[[Children], None], optional
         Called once all processes are started; tests inject faults here.
     on_journal : Callable[[Journal | LinkRequest], None], optional
@@ -114,7 +111,7 @@ def run_processes(
     if sorted(order) != sorted([PLANT, *first]):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
-    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_journal, on_status)
+    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_journal)
     try:
         with Supervisor(
             plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command, shared=shared
@@ -141,7 +138,6 @@ class _ProcessDriver:
         on_telemetry: Callable[[Telemetry], None],
         on_links: Callable[[LinkReport], None],
         on_journal: Callable[[Journal | LinkRequest], None],
-        on_status: Callable[[str], None] | None,
     ) -> None:
         self.client = TelemetryClient(
             RECORDER, config.run, config.listen[0], config.clock, self._take, config.credentials
@@ -153,8 +149,7 @@ class _ProcessDriver:
         """Longer than the plant's own (s): the plant reports better what is wrong, unless it is the cause itself."""
         if self._wall:
             self._plant_deadline += config.wait_for_agents + 2.0 * config.T_c / config.speed
-        self._on_telemetry, self._on_links, self._on_status = on_telemetry, on_links, on_status
-        self._on_journal = on_journal
+        self._on_telemetry, self._on_links, self._on_journal = on_telemetry, on_links, on_journal
         self._began = self._ended_at = monotonic()
         self._started: float | None = None
         self._plant_ready = self._ended = False
@@ -223,10 +218,7 @@ class _ProcessDriver:
             pid = word.removeprefix(_EXIT)
             self._note_exit(next(child for child in supervisor.children if str(child.pid) == pid), supervisor)
             return
-        word = word.removeprefix(_WORD)
-        self._plant_ready = self._plant_ready or word == READY
-        if self._on_status is not None:
-            self._on_status(word)
+        self._plant_ready = self._plant_ready or word.removeprefix(_WORD) == READY
 
     def _note_exit(self, child: Child, supervisor: Supervisor) -> None:
         if self._ended:

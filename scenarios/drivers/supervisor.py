@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic
-from types import MappingProxyType, TracebackType
+from types import TracebackType
 from typing import Any, NamedTuple
 
 from msgspec.structs import replace
@@ -120,8 +120,6 @@ class Supervisor:
         Called with "listening", "compiling", "ready" as the plant comes up.
     plant_command : Sequence[str], optional
         Arguments of the interpreter for another plant than the usual one.
-    prefixes : Mapping[str, Sequence[str]], optional
-        By agent, what stands before its command, e.g. to run it on another host.
     shared : int, optional
         Number of processes that agents share; 0 gives each agent its own. An agent that the scenario starts, stops,
         kills or pauses has its own in any case.
@@ -135,15 +133,14 @@ class Supervisor:
         on_exit: Callable[[Child], None],
         on_word: Callable[[str], None] | None = None,
         plant_command: Sequence[str] = (),
-        prefixes: Mapping[str, Sequence[str]] = MappingProxyType({}),
         shared: int = 0,
     ) -> None:
         self.children = Children()
         self._agents, self._log_dir = {config.name: config for config in agents}, log_dir
-        self._on_exit, self._on_word, self._plant_command, self._prefixes = on_exit, on_word, plant_command, prefixes
+        self._on_exit, self._on_word, self._plant_command = on_exit, on_word, plant_command
         self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
         self._awaited: set[str] = set()
-        alone = self._faults.names | {action.inverter for action in plant.schedule} | set(prefixes)
+        alone = self._faults.names | {action.inverter for action in plant.schedule}
         self._shared = share(tuple(name for name in self._agents if name not in alone), shared)
         """Agents that share the process of each."""
         self._plant = replace(plant, agent_processes=len({self._mates(name) for name in plant.agents}))
@@ -191,18 +188,12 @@ class Supervisor:
             return Child(name, command, self._plant, log, self._on_exit, self._on_word, server=server)
         configs = tuple(replace(self._agents[mate], epoch=life) for mate in self._mates(name))
         process = configs if len(configs) > 1 else configs[0]
-        prefix = self._prefixes.get(name, ())
-        module = self._module(name)
-        server = None if prefix else agent_server(module, start=several)
-        return Child(name, ["-m", module], process, log, self._on_exit, prefix=prefix, server=server)
+        module = "gridpeers.scenarios.emulation.emulated_agent" if self._agents[name].links else "gridpeers.agents"
+        return Child(name, ["-m", module], process, log, self._on_exit, server=agent_server(module, start=several))
 
     def _mates(self, name: str) -> tuple[str, ...]:
         """Return the agents that share the process of one, itself included."""
         return self._shared.get(name, (name,))
-
-    def _module(self, name: str) -> str:
-        """Return the module of an agent's process."""
-        return "gridpeers.scenarios.emulation.emulated_agent" if self._agents[name].links else "gridpeers.agents"
 
     def start_when_gone(self, names: Iterable[str]) -> None:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""
