@@ -1,0 +1,153 @@
+"""What a live run's terminal shows and refuses, and how a second Ctrl-C cuts it short."""
+
+from __future__ import annotations
+
+import signal
+from contextlib import nullcontext
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+from msgspec.structs import replace
+
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.netem.schema.fault import Fault
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.start_words import COMPILING, LISTENING
+from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.live import live_processes
+from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, limited, meaning
+from gridpeers.scenarios.live.live_recorder import LiveRecorder
+from gridpeers.scenarios.live.run_address import RunAddress, UsageError
+from gridpeers.scenarios.live.run_requests import own_code
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
+from gridpeers.wire.plugins.plugin import Plugin
+from gridpeers.wire.rate_limit import BURST, RateLimit
+from tests.toy.toy_configs import agent_config, toy_configs
+
+
+def test_a_refused_handshake_is_told_without_the_words_of_zenoh() -> None:
+    """Its reason stays; colours of a terminal, thread and hint go."""
+    config, _ = toy_configs(2)
+    line = (
+        "\x1b[2m2026-11-23T09:08:43.534631Z\x1b[0m \x1b[33m WARN\x1b[0m app-0 ThreadId(02) "
+        "\x1b[2mzenoh_link_tls::unicast\x1b[0m\x1b[2m:\x1b[0m peer sent no certificates. "
+        "Hint: increase the system open file limit."
+    )
+
+    assert meaning(line, config) == "a link was refused: peer sent no certificates"
+    assert meaning(LISTENING, config) == ""
+    assert "is being built" in meaning(COMPILING, config)
+
+
+def test_an_agent_with_an_expired_certificate_does_not_flood_the_terminal() -> None:
+    """It tries again for ever, some times a second: after the first refusals, one in ten seconds is told."""
+    config, _ = toy_configs(2)
+    limit = RateLimit()
+    line = (
+        "WARN app-0 zenoh_link_tls::unicast: invalid peer certificate: certificate expired: verification time {} (UNIX)"
+    )
+
+    told = [limited(meaning(line.format(1795480184 + k), config), limit, 0.5 * k) for k in range(7200)]
+
+    assert (
+        told[0]
+        == "a link was refused: invalid peer certificate: certificate expired: verification time 1795480184 (UNIX)"
+    )
+    assert len([text for text in told if text]) <= BURST + 360
+
+
+SETUP = EmulationConfig(
+    netem=Netem(links=(Fault(on="* -> *", own=(Plugin(use="mine:Jammer"),)),)), microgrids={"inv1": "MG1"}
+)
+CONTROL = Control(secondary="all", graph="mine:star", own_graph=Plugin(use="mine:star"), law=LawChoice(use="mine:Mine"))
+CONFIG = replace(agent_config("inv1"), control=CONTROL, links=SETUP.to_tree())
+
+
+def test_what_is_not_gridpeers_own_is_named() -> None:
+    """Law, graph and faults by module:Name; what is registered or installed is on this host anyway."""
+    calm = replace(CONTROL, own_graph=None, law=LawChoice(use="dapi"))
+
+    assert own_code(CONFIG) == ("the law mine:Mine", "the graph mine:star", "the link fault mine:Jammer")
+    assert own_code(replace(CONFIG, control=calm, links={})) == ()
+
+
+@pytest.mark.parametrize(("endpoint", "trusts", "runs"), [
+    ("tcp/127.0.0.1:7447", False, True),
+    ("tcp/192.168.1.10:7447", False, False),
+    ("tcp/192.168.1.10:7447", True, True),
+])  # fmt: skip
+def test_code_of_a_plant_on_another_host_is_run_only_if_it_is_trusted(
+    endpoint: str, trusts: bool, runs: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever can pose as a plant would else have any program run on every host that joins."""
+    ran: list[str] = []
+    where = RunAddress(run="demo", connect=(endpoint,))
+    monkeypatch.setattr(
+        live_processes, "RunClient", lambda where: nullcontext(type("V", (), {"find_plant": lambda *_: None})())
+    )
+    monkeypatch.setattr(live_processes, "configuration", lambda client, name, wait: CONFIG)
+    monkeypatch.setattr(live_processes, "check_free", lambda client, name: None)
+    monkeypatch.setattr(
+        live_processes, "run_agents", lambda process, links: ran.extend(config.name for config in process) or ""
+    )
+    monkeypatch.setattr(live_processes, "stop_at_signals", lambda *_: None)
+
+    if runs:
+        live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
+    else:
+        with pytest.raises(UsageError, match=r"inv1: the plant of run demo .* run the law mine:Mine and .*--own-code"):
+            live_processes.agent_here(where, ("inv1",), None, 1.0, trusts=trusts)
+    assert ran == (["inv1"] if runs else [])
+
+
+class CutRecorder:
+    """A recorder to which the plant's last message never came."""
+
+    def __init__(self) -> None:
+        self.cut_short = self.failure = ""
+        self.recorded, self.client = None, SimpleNamespace(pacing=None, latest=None)
+        self.failed_laws: dict[str, object] = {}
+
+    def __enter__(self) -> CutRecorder:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.failure = f"the record ends at 9.20 s: {self.cut_short or 'then no word came of the plant'}"
+
+
+@pytest.mark.parametrize(
+    ("later", "why"),
+    [
+        (0.5 * SAME_REQUEST_TIME, "then no word came of the plant"),
+        (SAME_REQUEST_TIME, "SIGINT came again before the plant had ended"),
+    ],
+)
+def test_a_record_that_a_second_ctrl_c_cuts_short_says_so(later: float, why: str) -> None:
+    """The plant is not blamed for what the user asked for; a second signal at once is the first one's twin."""
+    times = [5.0, 5.0 + later]
+    requests = StopSignal(ctrl_c_or(StoppedError), lambda: times.pop(0))
+
+    def run(recorder: Any) -> str:
+        try:
+            requests(signal.SIGINT, None)
+        finally:  # as processes are ended
+            requests(signal.SIGINT, None)
+        return ""
+
+    outcome = _follow(cast("LiveRecorder", CutRecorder()), run, requests)
+
+    assert (outcome.interrupted, outcome.broke) == ("SIGINT", f"the record ends at 9.20 s: {why}")
+
+
+def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
+    """Its plant ended well by its own account: no link to it was made, so nobody knows what it did."""
+
+    class DeafRecorder(CutRecorder):
+        def __exit__(self, *_: object) -> None:
+            """End as a recorder that writes no files."""
+
+    outcome = _follow(cast("LiveRecorder", DeafRecorder()), lambda recorder: "", StopSignal(ctrl_c_or(StoppedError)))
+
+    assert outcome.broke == UNHEARD
