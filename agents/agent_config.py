@@ -199,7 +199,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Rate of the agent's own clock: 1.0001 gains 100 ppm. Wall-clock: the agent ticks that much more often; simulated:
     it takes a period for that much longer."""
     links: dict[str, Any] = {}
-    """Emulated links to this agent: `gridpeers.scenarios.emulation.emulation_config`, as a tree: agents know no netem.
+    """Emulated links to this agent: `gridpeers.scenarios.emulation.link_data`, as a tree: agents know no netem.
     Empty: none."""
     max_age: float = MAX_AGE
     """Age (s of run time) beyond which a measurement is not used; wall-clock: nor a neighbour's state."""

@@ -29,7 +29,7 @@ from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.plugins.plugin import Plugin
 

@@ -193,7 +193,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     listen: tuple[str, ...]
     """Endpoints the plant listens on; the rendezvous of the run."""
     links: dict[str, Any] = {}
-    """Emulated links to the plant: `gridpeers.scenarios.emulation.emulation_config`, a tree: the plant knows no netem.
+    """Emulated links to the plant: `gridpeers.scenarios.emulation.link_data`, a tree: the plant knows no netem.
     Empty: none."""
     connect: tuple[str, ...] = ()
     """Endpoints the plant connects to, beside listening."""

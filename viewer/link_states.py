@@ -7,7 +7,7 @@ from typing import Literal
 
 import msgspec
 
-from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.emulation.link_data import LinkStatus
 from gridpeers.wire.messages import AgentStatus
 
 State = Literal["used", "old", "apart", "unused"]

@@ -10,7 +10,7 @@ from time import monotonic
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.emulation.link_reports import decode_statuses
+from gridpeers.scenarios.emulation.link_data import decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus

@@ -12,7 +12,7 @@ from collections.abc import Collection, Mapping
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.emulation.link_data import LinkStatus
 from gridpeers.scenarios.live.feeder_map import FeederMap
 from gridpeers.scenarios.live.run_monitor import SILENT, InverterStatus, PlantStatus, RunMonitor
 from gridpeers.viewer.link_states import AGE_STEP, LinkStates, LinkView

@@ -19,7 +19,7 @@ from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.warm_servers import agent_server, plant_server
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.messages import PLANT
 
 

@@ -10,9 +10,8 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.console import in_order
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.emulation.link_command import LinkCommand
-from gridpeers.scenarios.emulation.link_reports import LinkStatus, decode_statuses
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkStatus, decode_statuses
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import configurations, data_of, request

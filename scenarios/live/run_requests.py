@@ -14,7 +14,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.own_nameplate import check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
 from gridpeers.scenarios.console import in_order
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus

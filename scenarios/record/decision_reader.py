@@ -17,7 +17,7 @@ from gridpeers.agents.topology import in_neighbours, rule_of
 from gridpeers.netem.liar import HeardFrom, lies_about
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.lie import Before
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.decision_entries import DecisionEntries
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire, heard_of, on_wire
 from gridpeers.scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision

@@ -16,7 +16,7 @@ from typing import TypeVar, get_args
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.console import short
-from gridpeers.scenarios.emulation.link_reports import data_of
+from gridpeers.scenarios.emulation.link_data import data_of
 from gridpeers.scenarios.record.decision_entries import DecisionEntries
 from gridpeers.scenarios.record.decision_reader import DecisionReader
 from gridpeers.scenarios.record.journal_coverage import Hole

@@ -17,7 +17,7 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import objections
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.changed_faults import spliced, without_loss
 from gridpeers.scenarios.replay.changed_scenario import with_links, with_title

@@ -13,7 +13,7 @@ from pathlib import Path
 import msgspec
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace, Outcome, combined, copies_of
-from gridpeers.scenarios.emulation.link_reports import data_of
+from gridpeers.scenarios.emulation.link_data import data_of
 from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.wire.messages import LinkReport
 

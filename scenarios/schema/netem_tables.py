@@ -12,7 +12,7 @@ from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.bus_islands import SwitchOperations, islands_after
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel

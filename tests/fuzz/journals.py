@@ -12,7 +12,7 @@ from msgspec.structs import replace
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
 from gridpeers.scenarios.checks.communication.record_pass import read_into
-from gridpeers.scenarios.emulation.link_reports import report_data
+from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.bounds import LATEST, MOST_COUNT

@@ -24,8 +24,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.telemetry_stream import TelemetryEndpoint, TelemetryStream
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
-from gridpeers.scenarios.emulation.link_reports import data_of, decode_statuses
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, data_of, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.link_requests import links_text
 from gridpeers.scenarios.live.run_client import RunClient

@@ -24,7 +24,7 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import Recorder

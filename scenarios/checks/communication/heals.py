@@ -16,7 +16,7 @@ from gridpeers.scenarios.checks.communication.neighbour_use import Uses
 from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
 from gridpeers.scenarios.checks.communication.sent_states import SentStates
 from gridpeers.scenarios.checks.communication.state_window import StateWindow
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 
 CUTS = ("cut", "partition")

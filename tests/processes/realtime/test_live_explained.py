@@ -16,7 +16,7 @@ from gridpeers.lab.trace.flows import flows
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.wire.bounds import LONGEST_MESSAGE

@@ -16,7 +16,7 @@ from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.process_driver import run_processes
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.recomputation import recomputed

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 
 from gridpeers.netem.ledger import LinkCounts
-from gridpeers.scenarios.emulation.link_reports import LinkStatus
+from gridpeers.scenarios.emulation.link_data import LinkStatus
 from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.viewer.liveness import FROZEN
 from gridpeers.viewer.run_view import Cursor, RunView

@@ -224,7 +224,7 @@ def test_telemetry_may_carry_what_is_not_finite() -> None:
 def test_a_process_that_decodes_ends_well() -> None:
     """Msgspec 0.22 corrupts memory over some unions of bounded types, which shows at the end of the process only."""
     done = subprocess.run(
-        [sys.executable, "-c", "import gridpeers.wire.codec, gridpeers.scenarios.emulation.link_reports"], check=False
+        [sys.executable, "-c", "import gridpeers.wire.codec, gridpeers.scenarios.emulation.link_data"], check=False
     )
 
     assert done.returncode == 0

@@ -11,7 +11,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import State

@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

@@ -9,7 +9,7 @@ import pytest
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.scenarios.drivers import supervisor
 from gridpeers.scenarios.drivers.supervisor import FaultInjector
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"}
 

@@ -14,7 +14,7 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.pattern import links_among
 from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.messages import State
 
 PAUSE = NodeFault(name="inv1", from_s=1.7, to_s=2.7, pause=True)

@@ -20,9 +20,8 @@ from gridpeers.netem.schema.pattern import links_among
 from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
 from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from gridpeers.scenarios.emulation.link_reports import decode_statuses
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, decode_statuses
 from gridpeers.wire.codec import decode
 from gridpeers.wire.links import CommandEffect
 from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State

@@ -14,7 +14,7 @@ from gridpeers.agents.agent_config import Control, LawChoice
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.start_words import COMPILING, LISTENING
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live import live_processes
 from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, limited, meaning
 from gridpeers.scenarios.live.live_recorder import LiveRecorder

@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.emulation.link_reports import LinkReportData, encode_data
+from gridpeers.scenarios.emulation.link_data import LinkReportData, encode_data
 from gridpeers.scenarios.live import run_client as client
 from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import RunClient

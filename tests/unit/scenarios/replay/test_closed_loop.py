@@ -15,7 +15,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import Control, LawChoice
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.scenarios.emulation.emulation_config import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.changes import ChangedRule, Changes
 from gridpeers.scenarios.replay.closed_loop import ClosedLoop

@@ -14,7 +14,7 @@ from gridpeers.netem.models.medium import Corrupt, Duplicate
 from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.scenarios.emulation.link_reports import report_data
+from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.results.link_record import COLUMNS, LinkRecord
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.messages import LinkReport, Telemetry
