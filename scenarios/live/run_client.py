@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
 from time import monotonic
-from types import TracebackType
 
 from gridpeers.scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
 from gridpeers.scenarios.live.run_address import PROBE, RunAddress, accepting, is_loopback_host
@@ -188,9 +187,7 @@ class RunClient:
     def __enter__(self) -> RunClient:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:

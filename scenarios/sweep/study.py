@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 
 from gridpeers.scenarios.results.run_files import (
     LOCK,
@@ -81,9 +80,7 @@ class SweepFolder:
     def __enter__(self) -> SweepFolder:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         with contextlib.suppress(OSError):  # a run that found no room; those that are kept are on the disk already
             self._journal.close()
         os.close(self._lock)
