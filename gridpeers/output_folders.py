@@ -21,7 +21,7 @@ from gridpeers.scenarios.results.run_files import (
     shown,
     write_whole,
 )
-from gridpeers.scenarios.run_request import versions
+from gridpeers.scenarios.versions import versions
 from gridpeers.wire.driver.output import OutputLostError
 from gridpeers.wire.schema.suggestion import suggestion
 

@@ -22,9 +22,10 @@ from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
 from gridpeers.scenarios.run_case import run_case
-from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request, version_of, versions
+from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import version_of, versions
 from gridpeers.wire.driver.open_files import too_few_files
 from gridpeers.wire.driver.output import OutputLostError
 from gridpeers.wire.messages import Pacing

@@ -18,9 +18,10 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.figure_processes import prepare_figures
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.recorded_events import ended_by_a_law
-from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request, versions
+from gridpeers.scenarios.run_request import BrokenRunError, LawStopError, Outcome, Progress, Request
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of
+from gridpeers.scenarios.versions import versions
 from gridpeers.wire.messages import Telemetry
 
 if TYPE_CHECKING:

@@ -1,12 +1,9 @@
-"""A run as it is asked for and as its driver ends it, and the versions of what decides its numbers."""
+"""A run as it is asked for, and as its driver ends it."""
 
 from __future__ import annotations
 
-import platform
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
-from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
@@ -34,23 +31,6 @@ class Outcome:
     """Wall time (s) from the first row to the end."""
     pacing: Pacing | None = None
     """How well the plant kept real time; only in wall-clock time."""
-
-
-_VERSIONS = ("gridpeers", "eclipse-zenoh", "msgspec", "numpy", "scipy", "numba")
-
-
-def versions() -> dict[str, str]:
-    """Versions of everything that has a part in the numbers of a run."""
-    return {"python": platform.python_version()} | {name: version_of(name) for name in _VERSIONS}
-
-
-@cache
-def version_of(package: str) -> str:
-    """Version of an installed package; one process does not need all of them."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"
 
 
 SPEEDS = (0.1, 50.0)

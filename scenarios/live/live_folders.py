@@ -23,9 +23,9 @@ from gridpeers.scenarios.results.run_files import (
     set_complete,
     write_whole,
 )
-from gridpeers.scenarios.run_request import versions
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import versions
 from gridpeers.wire.timing.clock import rounded_up
 
 

@@ -25,9 +25,10 @@ from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_o
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
-from gridpeers.scenarios.run_request import Progress, versions
+from gridpeers.scenarios.run_request import Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
+from gridpeers.scenarios.versions import versions
 from gridpeers.wire.messages import LinkReport, Telemetry
 
 

@@ -23,12 +23,12 @@ from gridpeers.scenarios.results.run_files import (
     write_whole,
 )
 from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
-from gridpeers.scenarios.run_request import versions
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import SweepRow, run_one
 from gridpeers.scenarios.sweep.sweep_reading import Plan
 from gridpeers.scenarios.sweep.sweep_table import as_written, results_frame, write_table
 from gridpeers.scenarios.sweep.workers import on_workers
+from gridpeers.scenarios.versions import versions
 
 MANIFEST = "sweep.json"
 

@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 import msgspec
 import pandas as pd
 
-from gridpeers.scenarios.run_request import versions
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.sweep_case import FATE, SweepRow
 from gridpeers.scenarios.sweep.sweep_reading import Plan
+from gridpeers.scenarios.versions import versions
 from gridpeers.wire.schema.table_schema import INLINE, Field, Label, fields_of
 
 _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
