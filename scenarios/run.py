@@ -192,7 +192,6 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
 
 
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
-    """Return notes on cases that cannot be repeated."""
     if clock == "wall":
         return ["in wall-clock time no two runs are the same: each has its own delays"]
     notes = []

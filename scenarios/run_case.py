@@ -116,7 +116,6 @@ def run_case(
 def _record_info(
     request: Request, case: str, toml: str, plant: PlantConfig, agents: tuple[AgentConfig, ...]
 ) -> RecordInfo:
-    """Return what the record of a case says about its run."""
     scenario, real = request.scenario, request.clock == "wall"
     return RecordInfo(
         level=plant.record,

@@ -143,7 +143,6 @@ class EmulatedLinks:
         return encode_statuses(statuses)
 
     def _counts(self) -> dict[str, LinkCounts]:
-        """Return the counts of the messages of each sender so far."""
         counts = self._receiver.counts()
         return counts | {src: replace(counts[src], lies=lies) for src, lies in self._lies.items()}
 

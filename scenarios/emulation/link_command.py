@@ -93,7 +93,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def _change(self) -> Change:
-        """The fault or the heal."""
         change = self.fault or self.heal
         if change is None or (self.fault and self.heal):
             raise ValueError("a command to links is either a fault or a heal")

@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import in_order
+from gridpeers.scenarios.console import aligned, in_order
 from gridpeers.scenarios.emulation.link_command import LinkCommand
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkStatus, decode_statuses
 from gridpeers.scenarios.live.run_address import UsageError
@@ -142,13 +142,7 @@ def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStatus])
     count = "no link is impaired" if not now else f"{len(now)} link{'s' if len(now) > 1 else ''} impaired"
     text = [f"run {run}   t = {t:.2f} s   {count}"]
     rows = [_HEAD, *((f"{src} -> {dst}", *_counts(stand), ", ".join(stand.holds)) for (src, dst), stand in now.items())]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEAD))]
-    for row in rows if now else []:
-        cells = [
-            cell.rjust(width) if 0 < i < 4 else cell.ljust(width)
-            for i, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ]
-        text.append("  ".join(cells).rstrip())
+    text += aligned(rows, right=range(1, 4)) if now else ()
     if before:
         books = [stand.counts for stand in before if stand.counts is not None]
         sent, dropped = sum(book.sent for book in books), sum(sum(book.dropped.values()) for book in books)

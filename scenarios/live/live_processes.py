@@ -275,7 +275,6 @@ def _follow(recorder: LiveRecorder, run: Callable[[LiveRecorder], str], requests
 
 
 def _say_end(recorder: LiveRecorder, config: PlantConfig) -> None:
-    """Say how far the run came and how well it kept pace."""
     pacing = recorder.client.pacing
     if pacing is None or pacing.steps == 0:
         say("the run ended before it began")

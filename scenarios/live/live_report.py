@@ -146,7 +146,6 @@ def _live_table(recorded: Recorded, departures: Departures) -> dict[str, object]
 
 
 def _notes(scenario: ScenarioModel, recorded: Recorded, departures: Departures) -> Iterable[str]:
-    """Yield notes that a reader of the numbers needs."""
     ended, end_s, windows = f"{recorded.ended:.2f} s", scenario.time.end_s, departures.windows
     if not scenario.events and not departures.live:
         yield "the scenario has no event, and nobody made one, so there is no window to measure in"
@@ -177,7 +176,6 @@ def _labels(windows: Iterable[Window]) -> list[str]:
 
 
 def _named(windows: Iterable[Window]) -> str:
-    """Return windows with their times."""
     return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
 
 

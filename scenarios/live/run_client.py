@@ -325,5 +325,4 @@ class RunClient:
 
     @property
     def _others(self) -> set[str]:
-        """Other runs whose plants are there."""
         return self.runs - {self.where.run}

@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import short
+from gridpeers.scenarios.console import aligned, short
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.run_requests import plant_status, read_config
@@ -91,14 +91,8 @@ def plain(snapshot: Snapshot) -> str:
     columns = _columns(snapshot)
     titles = [f"{column.head} {column.unit}".strip() for column in columns]
     rows = [titles, *([column.text(inverter) for column in columns] for inverter in snapshot.inverters)]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(columns))]
     text = [head(snapshot)]
-    for row in rows if snapshot.inverters else []:
-        cells = [
-            cell.rjust(width) if column.right else cell.ljust(width)
-            for cell, width, column in zip(row, widths, columns, strict=True)
-        ]
-        text.append("  ".join(cells).rstrip())
+    text += aligned(rows, right=[i for i, column in enumerate(columns) if column.right]) if snapshot.inverters else ()
     text += snapshot.events[-EVENTS:]
     return "\n".join(text) + "\n"
 

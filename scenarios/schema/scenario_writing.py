@@ -107,7 +107,6 @@ def _table(header: str, struct: msgspec.Struct, path: str, common: ScenarioModel
 
 
 def _entries(structs: Iterable[msgspec.Struct], path: str, common: ScenarioModel, *, terse: bool) -> Iterator[str]:
-    """Yield the entries of a list."""
     for struct in structs:
         yield ""
         yield f"[[{path}]]"

@@ -247,7 +247,6 @@ def _base(sweep: Sweep, path: Path, problems: Problems) -> BaseScenario:
 
 
 def _plan(sweep: Sweep, text: str, axes: Sequence[Axis], base: BaseScenario, problems: Problems) -> Plan:
-    """Check every sample of a sweep, and make its runs."""
     scenario = base.scenario
     cases = _cases(sweep, scenario, problems)
     names = [row.name for row in inverters_of(scenario, base.feeder)]
