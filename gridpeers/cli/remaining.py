@@ -18,7 +18,7 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from gridpeers.scenarios.console import duration
+from gridpeers.scenarios.short_texts import duration
 
 Tell = Callable[[str, float], None]
 """Takes the present work, with its part behind a comma, and the amount of all that is done."""

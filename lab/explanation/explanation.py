@@ -8,9 +8,9 @@ from gridpeers.agents.laws.law import Neighbour
 from gridpeers.lab.explanation.last_decision import aftermath
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.lab.explanation.unheard import absence, missed, reason, rejections, verdicts
-from gridpeers.scenarios.console import short
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
+from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.messages import PlantEvent
 
 RECENT = 1.0

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 
 from gridpeers.lab.trace.flows import Flow, flows
-from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.history import Nameplates
 from gridpeers.scenarios.results.metrics import MPSI
 from gridpeers.scenarios.results.run_files import write_whole
+from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.messages import PLANT
 
 CUTS = ("cut", "partition", "flap")

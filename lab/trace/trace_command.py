@@ -92,8 +92,8 @@ def _draw(record: RunRecord, file: Path, since: float, until: float, agents: str
     """Draw the messages of a window; return how many."""
     from gridpeers.lab.trace.flows import flows
     from gridpeers.lab.trace.space_time_diagram import space_time_diagram
-    from gridpeers.scenarios.console import in_order, short
     from gridpeers.scenarios.results.plots.style import save
+    from gridpeers.scenarios.short_texts import in_order, short
 
     if since > record.t_end:
         fail([f"--from {since:g}: the record ends at {record.t_end:.2f} s"], BAD_INPUT)

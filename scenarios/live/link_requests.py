@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import aligned, in_order
 from gridpeers.scenarios.emulation.link_command import LinkCommand
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkStatus, decode_statuses
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import configurations, data_of, request
+from gridpeers.scenarios.short_texts import aligned, in_order
 from gridpeers.wire.messages import PLANT, Answer, LinkAcknowledgement
 from gridpeers.wire.schema.table_schema import Problem
 

@@ -19,7 +19,6 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.start_words import COMPILING, READY
-from gridpeers.scenarios.console import short
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
@@ -32,6 +31,7 @@ from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_requests import ANSWER, check_free, configuration, own_code
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded
+from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.driver.stop_signal import StopSignal, stop_at_signals
 from gridpeers.wire.messages import PLANT, Pacing, PlantEvent

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import in_order, short
+from gridpeers.scenarios.short_texts import in_order, short
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 

@@ -13,11 +13,11 @@ import msgspec
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.own_nameplate import check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
+from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.command_line import command_line

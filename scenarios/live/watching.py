@@ -17,10 +17,10 @@ from rich.table import Table
 from rich.text import Text
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.scenarios.console import aligned, short
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import InverterStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.run_requests import plant_status, read_config
+from gridpeers.scenarios.short_texts import aligned, short
 from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
 from gridpeers.wire.timing.session_deadline import SessionDeadline

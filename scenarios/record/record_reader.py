@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TypeVar, get_args
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.console import short
 from gridpeers.scenarios.emulation.link_data import data_of
 from gridpeers.scenarios.record.decision_entries import DecisionEntries
 from gridpeers.scenarios.record.decision_reader import DecisionReader
@@ -24,6 +23,7 @@ from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import Entry
 from gridpeers.wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.schema.suggestion import suggestion

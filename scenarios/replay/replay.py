@@ -19,7 +19,6 @@ from msgspec.structs import replace
 from gridpeers.agents.carriers.make import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.plant.build import start_plant
-from gridpeers.scenarios.console import in_order
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
@@ -38,6 +37,7 @@ from gridpeers.scenarios.replay.replayed_process import (
     start_plant_of,
     tick_message,
 )
+from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import MessageReference, ReceivedMessage
 from gridpeers.wire.messages import PLANT, AnyMessage, Telemetry

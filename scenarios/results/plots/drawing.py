@@ -7,13 +7,13 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.console import in_order, short
 from gridpeers.scenarios.results.history import History, Nameplates
 from gridpeers.scenarios.results.island_membership import Island, IslandInterval, Islands, island_intervals
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
 from gridpeers.scenarios.schema.scenario_model import Event, LoadChange
+from gridpeers.scenarios.short_texts import in_order, short
 from gridpeers.wire.messages import PlantEvent
 
 

@@ -6,9 +6,10 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control
-from gridpeers.scenarios.console import short, terminal
+from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus, RunMonitor, Snapshot
 from gridpeers.scenarios.live.watching import plain, table
+from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 
 PACING = Pacing(steps=200, late=0, p50=1e-4, p95=2e-4, p99=1e-3, worst=0.1, slipped=0.0)
