@@ -1,4 +1,4 @@
-"""Configuration of one agent: its own nameplate and the run's rule, nothing about other agents."""
+"""Configuration of one agent, and its nameplate by it: its own data and the run's rule, nothing about others. Pure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import RecordLevel
+from gridpeers.wire.messages import Nameplate
 from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.schema.plausible import Plausible, Range, Unit
 from gridpeers.wire.schema.relations import Below
@@ -213,3 +215,28 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     def by_own_clock(self) -> AgentConfig:
         """Return the configuration in simulated time, where a clock that is off makes the period seem longer."""
         return self if self.clock_rate == 1.0 else msgspec.structs.replace(self, T_c=self.T_c * self.clock_rate)
+
+
+def nameplate_of(config: AgentConfig) -> Nameplate:
+    """Make the nameplate of an agent from its configuration."""
+    return Nameplate(
+        sender=config.name,
+        epoch=config.epoch,
+        seq=0,
+        t=0.0,
+        kind=config.kind,
+        microgrid=config.microgrid,
+        P_rated=config.P_rated,
+        V_nom=config.V_nom,
+        f_nom=config.f_nom,
+        m_p=config.m_p,
+        m_q=config.m_q,
+    )
+
+
+def check_nameplate(config: AgentConfig) -> None:
+    """Raise ValueError if a value of an agent's nameplate is out of bounds, so that every receiver would reject it."""
+    try:
+        decode(encode(nameplate_of(config)))
+    except RejectedError as rejected:
+        raise ValueError(f"{config.name}: every participant would reject this nameplate: {rejected.text}") from None

@@ -12,12 +12,10 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 
 from gridpeers.agents.agent import Agent
-from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.agents.decision_journal import DecisionJournal
-from gridpeers.agents.graphs import GraphError, RosterGraph
+from gridpeers.agents.graphs import GraphError, RosterGraph, rule_of, without_missing
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.own_nameplate import check_nameplate
-from gridpeers.agents.topology import rule_of, without_missing
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.messages import Journal, Measurement, State
 

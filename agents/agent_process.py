@@ -1,20 +1,28 @@
-"""One agent or several as a process: `LockstepAgent` or `RealtimeAgent`, behind one Zenoh session."""
+"""One agent or several as a process: `LockstepAgent` or `RealtimeAgent`, behind one Zenoh session after the other."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
+from threading import Timer
+from time import monotonic, sleep
 
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.agent_sessions import AgentSessions
-from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.carriers.law_registry import make_law
+from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
+from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.scheduling import schedule_as_batch
+from gridpeers.wire.driver.session import Session, SessionError
 from gridpeers.wire.keys import check_name
+from gridpeers.wire.node_group import NodeGroup
+from gridpeers.wire.trust.credentials import Credentials
 
 AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
@@ -100,3 +108,170 @@ def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
         except ValueError as error:
             raise ConfigurationError(f"{config.name}: {error}") from None
     return made
+
+
+AnyAgent = RealtimeAgent | LockstepAgent
+
+OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
+"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
+are copied, or files closed."""
+
+RUN_ENDS = 0.1
+"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
+does so first, and an agent that was still there has not left."""
+
+
+class AgentSessions:
+    """Agents of one process, which take part with one session, and with a new one whenever the last was broken.
+
+    Parameters
+    ----------
+    configs : Sequence[AgentConfig]
+        The agents.
+    laws : Sequence[Law]
+        The law of each.
+    make_links : MakeLinks
+        Makes the emulated links, if there are any.
+    """
+
+    def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> None:
+        first = configs[0]
+        self._configs, self._laws, self._make_links = configs, laws, make_links
+        self._credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
+        self._log = logging.getLogger(first.name)
+        self._nodes: tuple[AnyAgent, ...] = ()
+        self._core: AnyAgent | NodeGroup | None = None
+        """The agents as one; None before the first session."""
+        self._session: Session | None = None
+        self._asked: StoppedError | KeyboardInterrupt | None = None
+        """Request to end that came between two sessions."""
+
+    def run(self) -> tuple[AnyAgent, ...]:
+        """Take part until all agents have finished; return them.
+
+        Raises
+        ------
+        StoppedError, KeyboardInterrupt
+            The request to end, once the agents have left.
+        SessionError
+            If no session can be opened.
+        """
+        while self._core is None or self._core.session_broken:
+            try:
+                self._take_part()
+            except (StoppedError, KeyboardInterrupt) as stop:
+                if self._asked is not None or not any(node.between_sessions for node in _realtime(self._nodes)):
+                    raise
+                self._leave_over_new_session(stop)
+            except SessionError:
+                if self._asked is None:
+                    raise
+                break
+        if self._asked is not None:
+            raise self._asked
+        return self._nodes
+
+    def _take_part(self) -> None:
+        """Open a session, and take part with it until it is broken or all agents have finished."""
+        again = self._core is not None and self._asked is None
+        self._session = session = _opened(self._configs[0], self._credentials, again=again)
+        try:
+            core = self._make_nodes(session.id) if self._core is None else self._core
+            for agent in _realtime(self._nodes):
+                agent.host_moved = lambda: session.moved
+            if self._credentials is not None:
+                for node in self._nodes:
+                    node.vouches = session.vouches
+            take_part(core, self._nodes, session, self._log)
+        finally:
+            session.close(replaced=self._core is not None and self._core.session_broken)
+
+    def _make_nodes(self, instance: str) -> AnyAgent | NodeGroup:
+        """Make the agents, whose instance is the id of their first session."""
+        shared: list[KnownAgents] = []  # one for each rule among the agents
+        self._nodes = tuple(
+            _node(config, instance, self._make_links, law, shared)
+            for config, law in zip(self._configs, self._laws, strict=True)
+        )
+        self._core = self._nodes[0] if len(self._nodes) == 1 else NodeGroup(self._nodes)
+        return self._core
+
+    def _leave_over_new_session(self, stop: StoppedError | KeyboardInterrupt) -> None:
+        """Have the agents leave over a new session: with the last one they would be taken for dead."""
+        self._asked = stop.with_traceback(None)  # which would keep the session
+        if self._session is not None:
+            self._session.close(replaced=True)  # the request may have come before that was done
+        for node in _realtime(self._nodes):
+            node.leave_over_new_session(f"asked to leave: {stop}")
+
+
+def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
+    return [node for node in nodes if isinstance(node, RealtimeAgent)]
+
+
+def _opened(config: AgentConfig, credentials: Credentials | None, *, again: bool) -> Session:
+    """Open a session; one in place of another is tried again for a while, as its certificate may just be renewed."""
+    until = monotonic() + (OPENED_WITHIN if again else 0.0)
+    told = ""
+    while True:
+        try:
+            return Session(
+                config.name,
+                listen=config.listen,
+                connect=config.connect,
+                clock=config.clock,
+                star=config.star,
+                credentials=credentials,
+            )
+        except SessionError as error:
+            if monotonic() >= until:
+                raise
+            if str(error) != told:
+                told = str(error)
+                logging.getLogger(config.name).warning("%s; tries again for up to %g s", told, OPENED_WITHIN)
+        sleep(OPENED_AGAIN)
+
+
+def _node(config: AgentConfig, instance: str, make_links: MakeLinks, law: Law, shared: list[KnownAgents]) -> AnyAgent:
+    try:
+        links = make_links(config.name, config.links)
+        if config.clock == "wall":
+            return RealtimeAgent(config, instance, links, law)
+        known = next((each for each in shared if each.control == config.control), None)
+        if known is None:
+            known = KnownAgents(config.control)
+            shared.append(known)
+        return LockstepAgent(config, instance, links, law, known)
+    except ValueError as error:
+        raise ConfigurationError(str(error)) from None
+
+
+def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Session, log: logging.Logger) -> None:
+    """Take part with one session. All of an agent's sessions hold one token, so the others see one agent."""
+    for node in nodes:
+        session.answer(*node.nameplate)
+        for key in node.publications:
+            session.prepare(key)
+    try:
+        drive(core, session, log)
+    except (StoppedError, KeyboardInterrupt) as stop:
+        leaving = _realtime(nodes)
+        if any(node.between_sessions for node in leaving):
+            raise  # the plant does not know this session, or not yet
+        if leaving and isinstance(stop, StoppedOnLeashError):
+            _go_on(core, session, log)
+        for node in leaving:
+            node.asked_to_leave(f"asked to leave: {stop}")
+        if leaving:
+            serve(core, session, log)  # until the plant has acknowledged
+        raise
+
+
+def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
+    """Serve for `RUN_ENDS` more, or until the core has finished."""
+    over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
+    over.daemon = True
+    over.start()
+    with suppress(StoppedError):
+        serve(core, session, log)
+    over.cancel()

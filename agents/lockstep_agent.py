@@ -28,10 +28,9 @@ from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.decision_journal import DecisionJournal
-from gridpeers.agents.graphs import GraphError
+from gridpeers.agents.graphs import GraphError, in_neighbours, is_pairwise
 from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.topology import in_neighbours, is_pairwise
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.links import REPORT_TICKS, Links

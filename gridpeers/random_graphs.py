@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.agents.topology import adjacency
+from gridpeers.agents.graphs import adjacency
 from gridpeers.scenarios.sweep.axes import Edges, algebraic_connectivity, connected_graph, connected_graphs
 
 __all__ = [

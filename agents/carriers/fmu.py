@@ -1,24 +1,99 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
-Its variables are those of `gridpeers.agents.carriers.fmu_interface`. What is compiled cannot be interrupted, and may
+Its variables are those of `gridpeers.agents.carriers.fmu`. What is compiled cannot be interrupted, and may
 take its process with it: so an FMU runs in one of its own, `gridpeers.agents.carriers.fmu_host`, to which the lines of
 a law program go.
 """
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
+from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
 from tempfile import mkdtemp
+from typing import Any
 
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
 from gridpeers.agents.laws.call import LawError
+from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
 from gridpeers.wire.printable import printable
+from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import read_parameters
+
+OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
+"""Inputs of the own inverter."""
+
+OF_NEIGHBOUR = tuple(name for name in Neighbour._fields if name not in ("name", "shared"))
+"""Inputs of each neighbour, without their prefix."""
+
+NEIGHBOUR = re.compile(r"neighbour_([1-9][0-9]{0,3})_(?:shared_)?(\w+)")
+"""Name of an input of a neighbour: its place, and what it is."""
+
+
+def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return what keeps an FMU from carrying a law, each with the key of the scenario that it concerns."""
+    if not path.is_file():
+        return [("fmu", f"there is no file {path.name}; write its path, seen from the scenario")]
+    try:
+        import fmpy
+    except ModuleNotFoundError:
+        return [("fmu", "an FMU needs the package fmpy; install it: pip install 'gridpeers[fmu]'")]
+    try:
+        description = fmpy.read_model_description(str(path))
+        platforms = fmpy.supported_platforms(str(path))
+    except Exception as error:  # a file may be anything
+        return [("fmu", f"{path.name} is no FMU: {printable(f'{type(error).__name__}: {error}', 200)}")]
+    wrong = []
+    if description.coSimulation is None:
+        wrong.append(f"{path.name} is for model exchange; export it for co-simulation")
+    own = {fmpy.platform, fmpy.platform_tuple}
+    if not own & set(platforms):
+        wrong.append(f"{path.name} is for {', '.join(platforms) or 'no platform'}, and this is {fmpy.platform}")
+    inputs, outputs = named(description, "input"), named(description, "output")
+    for name in inputs:
+        if name not in (*OWN, "T", "neighbours") and not _is_of_neighbour(name):
+            known = (*OWN, "T", "neighbours", *(f"neighbour_1_{field}" for field in OF_NEIGHBOUR))
+            wrong.append(f"{path.name} has an input {name}; {suggestion(name, known, 'inputs')}")
+    wrong += [f"{path.name} has no output {name}" for name in ("P_set", "V_set") if name not in outputs]
+    settable = named(description, "parameter")
+    real = "Float64" if is_fmi3(description) else "Real"
+    used = inputs | outputs | {name: variable for name, variable in settable.items() if name in parameters}
+    for name, variable in used.items():
+        if variable.type != real or variable.dimensions:
+            array = "an array of " if variable.dimensions else ""
+            wrong.append(f"{path.name} has {name} as {array}{variable.type}; declare it as a scalar {real}")
+    unknown = [name for name in parameters if name not in (*settable, *LIMITS)]
+    found = [("fmu", text) for text in wrong]
+    found += [(name, f"unknown parameter; {suggestion(name, [*settable, *LIMITS], 'parameters')}") for name in unknown]
+    found += [
+        (name, f"must be a number, got {value!r}")
+        for name, value in parameters.items()
+        if name in settable and (isinstance(value, bool) or not isinstance(value, int | float))
+    ]
+    found += read_parameters(Law, limits_in(parameters))[1]
+    return found
+
+
+def is_fmi3(description: Any) -> bool:
+    """Whether an FMU is one of FMI 3, which has other names for types and functions than FMI 2."""
+    return str(description.fmiVersion).startswith("3")
+
+
+def _is_of_neighbour(name: str) -> bool:
+    match = NEIGHBOUR.fullmatch(name)
+    return match is not None and ("_shared_" in name or match[2] in OF_NEIGHBOUR)
+
+
+def named(description: Any, causality: str) -> dict[str, Any]:
+    """Return the variables of a causality, e.g. the inputs, by name."""
+    return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
+
 
 LOADING = 10.0
 """Least time (s) that an FMU has to be loaded."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.carriers.executable import executable_problem
 from gridpeers.agents.carriers.law_registry import CARRIERS, KEYS, LAWS
 from gridpeers.agents.carriers.time_limit import make_limited
 from gridpeers.agents.laws.law import Law, limits_in
@@ -17,6 +16,40 @@ from gridpeers.wire.plugins.plugin import scalar_objection
 from gridpeers.wire.plugins.registry import PluginError
 from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
+
+_BINARY = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
+"""First bytes of programs for Linux, of macOS and of Windows; the last may be run by an emulator."""
+
+
+def executable_problem(file: Path) -> str:
+    """Return why the system cannot run a file, as the end of a sentence; "" if it may.
+
+    Examples
+    --------
+    >>> executable_problem(Path(__file__))
+    'has no first line such as #!/usr/bin/env python3, and is no compiled program; write one, or name its ...'
+    """
+    try:
+        with file.open("rb") as opened:
+            first = opened.readline(256)
+    except OSError:  # a program that may be run but not read
+        return ""
+    if first.startswith(_BINARY):
+        return ""
+    if not first.startswith(b"#!"):
+        return (
+            "has no first line such as #!/usr/bin/env python3, and is no compiled program; write one, or name its "
+            "interpreter first"
+        )
+    interpreter, _, argument = first[2:].decode(errors="replace").strip().partition(" ")
+    if first.endswith(b"\r\n"):
+        return "has lines that end as those of Windows, which #! cannot have; write it with Unix line ends"
+    if not Path(interpreter).is_file():
+        return f"asks in its first line for {interpreter or 'nothing'}, and there is no such program"
+    if Path(interpreter).name == "env" and not argument.startswith("-") and not shutil.which(argument.strip()):
+        return f"asks in its first line for {argument.strip() or 'nothing'}, which is not on the PATH"
+    return ""
+
 
 PAPER = LawChoice().use
 """Name of the paper's law; its parameters are `[gains]` and `[degraded_communication]`."""
@@ -92,8 +125,7 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
 
 
 def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
-    from gridpeers.agents.carriers.fmu import load_problem
-    from gridpeers.agents.carriers.fmu_interface import fmu_problems
+    from gridpeers.agents.carriers.fmu import fmu_problems, load_problem
 
     path = Path(choice.folder) / choice.fmu
     found = [Problem(*problem) for problem in fmu_problems(path, parameters)]

@@ -1,9 +1,13 @@
-"""The registry of laws: what a scenario may name in `law`."""
+"""The registry of laws: what a scenario may name in `law`, how a law is made, and its end."""
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, Protocol, runtime_checkable
 
+from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.agents.carriers.time_limit import make_limited
+from gridpeers.agents.degraded_communication import law_in_force
 from gridpeers.agents.laws.law import Law
 from gridpeers.wire.plugins.plugin import class_objection
 from gridpeers.wire.plugins.registry import Registry
@@ -39,3 +43,48 @@ LAWS: Registry[type[Law]] = Registry(
     },
 )
 """Laws by name; those of gridpeers come first."""
+
+
+@runtime_checkable
+class Asked(Protocol):
+    """A law that is asked to end before it is waited for."""
+
+    def end_input(self) -> None:
+        """Ask it."""
+        ...
+
+
+def make_law(control: Control) -> Law:
+    """Return the law of one inverter.
+
+    Raises
+    ------
+    ValueError
+        If there is no such law, or it cannot be made with these parameters; the text says what would be right.
+    """
+    choice = control.law
+    if choice.command:
+        from gridpeers.agents.carriers.program import ProgramLaw
+
+        return ProgramLaw(choice)
+    if choice.fmu:
+        from gridpeers.agents.carriers.fmu import FmuLaw
+
+        return FmuLaw(choice)
+    if choice.use == LawChoice().use:
+        return law_in_force(control)
+    law = LAWS.resolve(choice.use, choice.folder)
+    try:
+        return make_limited(law, choice.parameters, choice.time_limit)
+    except ValueError as error:
+        raise ValueError(f"law {choice.use} {error}") from error
+
+
+def close_laws(laws: Iterable[Law]) -> None:
+    """End some laws; programs are all asked before the first is waited for."""
+    ended = tuple(laws)
+    for law in ended:
+        if isinstance(law, Asked):
+            law.end_input()
+    for law in ended:
+        law.close()

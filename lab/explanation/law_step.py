@@ -7,7 +7,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from math import isfinite
 
-from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law, SetPoints, Term, Terms
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision, limits_of

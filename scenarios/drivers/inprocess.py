@@ -19,7 +19,7 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig, Control
 from gridpeers.agents.agent_group import AgentGroup
-from gridpeers.agents.carriers.make import close_laws, make_law
+from gridpeers.agents.carriers.law_registry import close_laws, make_law
 from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.lockstep_agent import LockstepAgent

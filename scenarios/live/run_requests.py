@@ -10,8 +10,7 @@ from typing import Any, Literal, TypeVar
 
 import msgspec
 
-from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.own_nameplate import check_nameplate
+from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.plant.equipment.named_loads import FACTOR
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live.run_address import UsageError

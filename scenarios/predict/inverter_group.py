@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.agents.agent_config import Control, Gains
-from gridpeers.agents.topology import adjacency
+from gridpeers.agents.graphs import adjacency
 from gridpeers.plant.equipment import F_NOM, Feeder, InverterRow
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from gridpeers.plant.equipment.own_parameters import InverterParameters
@@ -38,7 +38,7 @@ class InverterGroup:
     GFM: Flags
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
-    """Adjacency c_ij (1), row = receiver, as `gridpeers.agents.topology.adjacency` gives it."""
+    """Adjacency c_ij (1), row = receiver, as `gridpeers.agents.graphs.adjacency` gives it."""
     acts: Flags = field(default_factory=lambda: np.zeros(0, bool))
     """Which run the secondary law; the others keep their set-points. All, if left out."""
     shares: Flags = field(default_factory=lambda: np.zeros(0, bool))

@@ -10,10 +10,8 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.graphs import GraphError
-from gridpeers.agents.own_nameplate import nameplate_of
-from gridpeers.agents.topology import in_neighbours, rule_of
+from gridpeers.agents.agent_config import AgentConfig, nameplate_of
+from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
 from gridpeers.netem.liar import HeardFrom, lies_about
 from gridpeers.netem.models import INSTANT
 from gridpeers.netem.models.lie import Before

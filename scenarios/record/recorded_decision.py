@@ -6,11 +6,11 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Literal
 
+from gridpeers.agents.agent import neighbour_of, own_of
 from gridpeers.agents.agent_config import AgentConfig, Control, LawChoice
 from gridpeers.agents.carriers.law_registry import LAWS
-from gridpeers.agents.laws.in_force import law_in_force
+from gridpeers.agents.degraded_communication import law_in_force
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from gridpeers.agents.laws.law_inputs import neighbour_of, own_of
 from gridpeers.wire.messages import Measurement, Nameplate, State
 
 Action = Literal["law", "hold", "off", "idle"]

@@ -6,7 +6,7 @@ from typing import Any
 
 from msgspec.structs import replace
 
-from gridpeers.agents.carriers.make import close_laws, make_law
+from gridpeers.agents.carriers.law_registry import close_laws, make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault

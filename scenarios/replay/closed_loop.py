@@ -14,9 +14,8 @@ from heapq import heappop, heappush
 from itertools import count
 from math import inf
 
-from gridpeers.agents.graphs import GraphError
-from gridpeers.agents.own_nameplate import nameplate_of
-from gridpeers.agents.topology import in_neighbours, rule_of
+from gridpeers.agents.agent_config import nameplate_of
+from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.changed_processes import ChangedProcesses
 from gridpeers.scenarios.replay.changes import ChangedRule

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from gridpeers.scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message

@@ -16,7 +16,7 @@ from math import inf
 
 from msgspec.structs import replace
 
-from gridpeers.agents.carriers.make import close_laws
+from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess

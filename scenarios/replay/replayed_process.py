@@ -9,9 +9,9 @@ from typing import NamedTuple
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.carriers.make import make_law
+from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant

@@ -6,8 +6,7 @@ import shutil
 from pathlib import Path
 from typing import NamedTuple
 
-from gridpeers.agents.graphs import GraphError
-from gridpeers.agents.topology import in_neighbours
+from gridpeers.agents.graphs import GraphError, in_neighbours
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.results.metrics_file import Clock

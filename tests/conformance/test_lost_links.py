@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gridpeers.agents.realtime.session_health import SessionHealth
+from gridpeers.agents.session_health import SessionHealth
 from gridpeers.scenarios.checks.communication.account_check import MessageAccount
 from gridpeers.scenarios.checks.communication.communication_summary import LINKED_WITHIN, summarise
 from tests.record.fake_clock import fake_clock_record

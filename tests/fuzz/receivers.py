@@ -18,7 +18,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig

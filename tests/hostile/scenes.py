@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.wire.actions import Fetch, Listen, Log, Publish

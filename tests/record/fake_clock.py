@@ -17,8 +17,8 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig, Control
-from gridpeers.agents.carriers.make import make_law
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.carriers.law_registry import make_law
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant

@@ -10,9 +10,8 @@ from time import monotonic
 import pytest
 
 from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.carriers.make import close_laws
-from gridpeers.agents.carriers.process_group import LEAVING
-from gridpeers.agents.carriers.program import ProgramLaw
+from gridpeers.agents.carriers.law_registry import close_laws
+from gridpeers.agents.carriers.program import LEAVING, ProgramLaw
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import Own
 

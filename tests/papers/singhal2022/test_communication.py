@@ -2,7 +2,7 @@
 
 import pytest
 
-from gridpeers.agents.topology import adjacency
+from gridpeers.agents.graphs import adjacency
 from gridpeers.scenarios.results import metrics
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.actions import Fetch, Listen, Log, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys

@@ -12,9 +12,8 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, DegradedCommunication, Gains
-from gridpeers.agents.degraded_communication import SaturationDetector, StalenessWeights, gains_in_force
-from gridpeers.agents.island_detector import IslandDetector
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.degraded_communication import IslandDetector, SaturationDetector, StalenessWeights, gains_in_force
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
 from gridpeers.wire.actions import Publish

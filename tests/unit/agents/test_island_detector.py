@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gridpeers.agents.island_detector import LONGEST_RETRY, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
+from gridpeers.agents.degraded_communication import LONGEST_RETRY, RETRY, T_GAP, T_LEAK, TRUSTED, IslandDetector
 
 T, F_NOM, SLIP_MAX = 0.02, 60.0, 0.01
 

@@ -5,7 +5,7 @@ from itertools import pairwise
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.messages import Leave, Stop
 from gridpeers.wire.plant_follower import MOST_PLANTS
 from tests.toy.toy_configs import agent_config

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.agents.realtime.realtime_agent import FOUND_AGAIN
+from gridpeers.agents.realtime_agent import FOUND_AGAIN
 from gridpeers.wire.messages import Leave, State, Stop, Waiting
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 

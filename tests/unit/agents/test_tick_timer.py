@@ -5,7 +5,7 @@ import random
 
 import pytest
 
-from gridpeers.agents.realtime.tick_timer import CONVINCED, EARLIEST, LATEST, TickTimer
+from gridpeers.agents.tick_timer import CONVINCED, EARLIEST, LATEST, TickTimer
 
 T = 0.020
 

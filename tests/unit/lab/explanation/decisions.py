@@ -6,11 +6,10 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any, cast
 
-from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.agents.agent_config import AgentConfig, nameplate_of
+from gridpeers.agents.degraded_communication import law_in_force
 from gridpeers.agents.laws.call import decide
-from gridpeers.agents.laws.in_force import law_in_force
 from gridpeers.agents.laws.law import Law
-from gridpeers.agents.own_nameplate import nameplate_of
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
 from gridpeers.wire.messages import Measurement, State

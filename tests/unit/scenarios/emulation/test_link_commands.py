@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from gridpeers.agents.realtime.link_command_receiver import LinkCommandReceiver
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
+from gridpeers.agents.link_command_receiver import LinkCommandReceiver
+from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem import fault_schedule
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault

@@ -13,10 +13,9 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents import agent_sessions
-from gridpeers.agents.agent_process import run_agents
-from gridpeers.agents.agent_sessions import _opened, take_part
-from gridpeers.agents.realtime.realtime_agent import RealtimeAgent
-from gridpeers.agents.realtime.session_health import SessionHealth
+from gridpeers.agents.agent_process import _opened, run_agents, take_part
+from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.agents.session_health import SessionHealth
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
 from gridpeers.wire.driver.inbox import Inbox

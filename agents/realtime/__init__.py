@@ -1,1 +1,0 @@
-"""The agent under real time: it ticks on its own timer with what it heard last. Pure."""
