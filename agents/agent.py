@@ -169,10 +169,6 @@ class Agent:
         """Whether the sides on which its inverter is saturated count."""
         return self._stops
 
-    def knows(self, name: str) -> bool:
-        """Whether the nameplate of an agent is known."""
-        return name in self._known
-
     @property
     def notes_arrivals(self) -> bool:
         """Whether it matters when a state arrives: else a state on the board is as good as one that was heard."""

@@ -13,7 +13,7 @@ parameters (annotated attributes, `docs/plugins.md`) and a method `__call__(self
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from types import FunctionType
 from typing import Annotated, Any, Protocol
@@ -281,17 +281,6 @@ def _shown(name: Any) -> str:
     return name if isinstance(name, str) and name.isprintable() else printable(repr(name), 60)
 
 
-__all__ = [
-    "adjacency",
-    "in_neighbours",
-    "is_pairwise",
-    "laplacian",
-    "link_problems",
-    "natural_order",
-    "rule_of",
-    "without_missing",
-]
-
 _OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "clustered": clustered, "ring": ring}
 
 
@@ -364,24 +353,6 @@ def without_missing(control: Control, name: str, heard: tuple[str, ...]) -> tupl
     return tuple(other for other in heard if other not in missing) if missing else heard
 
 
-def link_problems(control: Control, names: Sequence[str]) -> tuple[str, ...]:
-    """Return the problems of the listed links, given the names of all inverters.
-
-    Examples
-    --------
-    >>> control = Control(secondary="all", graph="links", links=(("inv1", "inv9"),))
-    >>> link_problems(control, ("inv1", "inv2"))
-    ('links[0]: no inverter "inv9"; inverters are inv1, inv2',)
-    """
-    problems = []
-    for i, link in enumerate(control.links):
-        unknown = [end for end in dict.fromkeys(link) if end not in names]
-        problems += [f'links[{i}]: no inverter "{end}"; inverters are {", ".join(names)}' for end in unknown]
-        if link[0] == link[1]:
-            problems.append(f"links[{i}]: {link[0]} is linked to itself; a link joins two inverters")
-    return tuple(problems)
-
-
 def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[float]]:
     """Return the adjacency matrix c_ij (1): row i is the receiver, in the order of `members`."""
     names = list(members)
@@ -390,17 +361,3 @@ def adjacency(control: Control, members: Mapping[str, Member]) -> list[list[floa
         heard = set(in_neighbours(control, name, members))
         rows.append([1.0 if other in heard else 0.0 for other in names])
     return rows
-
-
-def laplacian(control: Control, members: Mapping[str, Member]) -> list[list[float]]:
-    """Return the Laplacian diag(A 1) - A of the graph, in the order of `members`.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace as Plate
-    >>> pair = {"a": Plate(kind="GFM", microgrid="mg1"), "b": Plate(kind="GFL", microgrid="mg1")}
-    >>> laplacian(Control(secondary="all", graph="full"), pair)
-    [[1.0, -1.0], [-1.0, 1.0]]
-    """
-    A = adjacency(control, members)
-    return [[(sum(row) if i == j else 0.0) - c for j, c in enumerate(row)] for i, row in enumerate(A)]
