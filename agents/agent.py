@@ -102,18 +102,6 @@ class Agent:
     board : dict[str, State], optional
         Last state of each agent that neighbours may use, where all agents of a run share it
         (`gridpeers.agents.agent_group`); by default the agent keeps those that it hears.
-
-    Examples
-    --------
-    An inverter without secondary control keeps the set-points that the plant holds:
-
-    >>> from gridpeers.agents.agent_config import Control
-    >>> agent = Agent(AgentConfig(run="demo", name="inv1", kind="GFM", microgrid="mg1", P_rated=6e5, V_nom=277.0,
-    ...     f_nom=60.0, m_p=0.01, m_q=0.05, T_c=0.02, control=Control(secondary="none", graph="none"), deadline=10.0,
-    ...     connect=()))
-    >>> agent.tick(Measurement(sender="plant", epoch=1, seq=0, t=0.0, to="inv1", P=3e5, Q=0.0, V=277.0, f=59.9,
-    ...     P_set=3e5, V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",))).P_set
-    300000.0
     """
 
     def __init__(self, config: AgentConfig, law: Law | None = None, board: dict[str, State] | None = None) -> None:
@@ -244,10 +232,7 @@ class Agent:
         return state.island in self._islands
 
     def in_neighbours(self, roster: Iterable[str]) -> tuple[str, ...]:
-        """Return the in-neighbours among the known agents of a roster by the run's rule; none if the rule fails.
-
-        The same roster object gives the same neighbours without another evaluation, until the known agents change.
-        """
+        """Return the in-neighbours among the known agents of a roster by the run's rule; none if the rule fails."""
         if roster is self._neighbours[0] and not self.graph_error:
             return self._neighbours[1]
         members = {name: self._known[name] for name in roster if name in self._known}
@@ -274,23 +259,11 @@ class Agent:
     def tick(
         self, measurement: Measurement, neighbours: Sequence[str] = (), ages: Mapping[str, float] | None = None
     ) -> State:
-        """Decide the set-points of this tick by the law.
+        """Decide the set-points (W, V) of this tick by the law.
 
-        Parameters
-        ----------
-        measurement : Measurement
-            Present reading of the own sensors.
-        neighbours : Sequence[str], optional
-            In-neighbours. The last state of each counts, with the weight by `gridpeers.agents.degraded_communication`;
-            one without a state, or in another island, is left out of the sums.
-        ages : Mapping[str, float], optional
-            Ages of these states (s of run time) by the own clock. By default the time from each state to the own
-            measurement.
-
-        Returns
-        -------
-        State
-            The set-points (W, V) and the own var (var).
+        The last state of each of the `neighbours` counts with a weight (`gridpeers.agents.degraded_communication`); one
+        without a state, or in another island, is left out of the sums. `ages` are those of the states (s of run time)
+        by the own clock; by default the time from each state to the own measurement.
         """
         self.around, self.in_service = (), measurement.island != OFF
         if self.graph_error:

@@ -21,14 +21,7 @@ from gridpeers.wire.messages import Journal, Measurement, State
 
 
 class AgentGroup:
-    """The agents of a run.
-
-    Parameters
-    ----------
-    configs : Sequence[AgentConfig]
-        Their configurations, in the order of the roster; all with the same rule.
-    laws : Sequence[Law]
-        Law of each.
+    """The agents of a run, in the order of the roster; all with the same rule, each with its law.
 
     Raises
     ------

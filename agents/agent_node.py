@@ -23,18 +23,8 @@ from gridpeers.wire.plant_follower import PlantFollower
 class NeighbourStates:
     """Keep the own last measurement and each neighbour's last state that the links delivered.
 
-    Examples
-    --------
-    The age of a state counts from its arrival; but a state that was long on its way is as old as its own time:
-
-    >>> states = NeighbourStates()
-    >>> states.keep(State(sender="inv2", epoch=1, seq=7, t=0.5, P_set=0.0, V_set=0.0, Q=0.0), at=10.0)
-    >>> states.age("inv2", at=10.25), states.age("inv3", at=10.25)
-    (0.25, inf)
-    >>> states.keep(Measurement(sender="plant", epoch=1, seq=100, t=2.0, to="inv1", P=0.0, Q=0.0, V=277.0, f=60.0,
-    ...     P_set=0.0, V_set=277.0, grid_connected=False, island="inv1", roster=()), at=10.25)
-    >>> states.t, states.age("inv2", at=10.25)
-    (2.0, 1.5)
+    Times are run time (s). Simulated time takes them from the ticks. In real time the agent counts them on its own
+    clock, from an origin of its own.
     """
 
     def __init__(self) -> None:

@@ -29,20 +29,9 @@ AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 
 
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
-    """Take part in a run until it ends.
+    """Take part in a run until it ends; return why an agent could not continue, empty if the run ended with a `Stop`.
 
-    Parameters
-    ----------
-    process : AgentConfig or tuple[AgentConfig, ...]
-        Each agent's nameplate, the run's rule, and the rendezvous. Agents of one process share a session; they are of
-        one run, under one kind of time.
-    make_links : MakeLinks, optional
-        Makes the emulated links, if there are any.
-
-    Returns
-    -------
-    str
-        Why an agent could not continue; empty if the run ended with a `Stop`.
+    Agents of one process share a session; they are of one run, under one kind of time.
 
     Raises
     ------
@@ -122,17 +111,7 @@ does so first, and an agent that was still there has not left."""
 
 
 class AgentSessions:
-    """Agents of one process, which take part with one session, and with a new one whenever the last was broken.
-
-    Parameters
-    ----------
-    configs : Sequence[AgentConfig]
-        The agents.
-    laws : Sequence[Law]
-        The law of each.
-    make_links : MakeLinks
-        Makes the emulated links, if there are any.
-    """
+    """Agents of one process, which take part with one session, and with a new one whenever the last was broken."""
 
     def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> None:
         first = configs[0]

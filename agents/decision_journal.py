@@ -16,15 +16,7 @@ _NOT_SATURATED = (0, 0)
 
 
 class DecisionJournal:
-    """Note the decisions of one agent.
-
-    Parameters
-    ----------
-    agent : Agent
-        The agent.
-    journal : JournalBuffer
-        Takes the entries.
-    """
+    """Note the decisions of one agent in its journal."""
 
     def __init__(self, agent: Agent, journal: JournalBuffer) -> None:
         self._agent, self.journal = agent, journal
@@ -46,21 +38,9 @@ class DecisionJournal:
         return all_new and alike and not (measurement or unused or weights)
 
     def tick(self, tick: int, measurement: int, neighbours: Sequence[str]) -> bool:
-        """Note the decision of a tick of simulated time if it was made otherwise than the one before.
+        """Note the decision of a tick of simulated time if it was made otherwise than the last one; return whether it was.
 
-        Parameters
-        ----------
-        tick : int
-            k.
-        measurement : int
-            Age of the own measurement in ticks.
-        neighbours : Sequence[str]
-            In-neighbours by the graph, among those on the roster.
-
-        Returns
-        -------
-        bool
-            Whether an entry was made.
+        `measurement` is the age of the own measurement in ticks; `neighbours` are the in-neighbours on the roster.
         """
         agent = self._agent
         heard, used = agent.heard, agent.around
@@ -103,10 +83,8 @@ class DecisionJournal:
 
         Parameters
         ----------
-        tick : int
-            Number of the own state.
-        measurement : int
-            Number of the own measurement.
+        tick, measurement : int
+            Numbers of the own state and of the own measurement.
         ages : Mapping[str, float]
             Age of the last state of each in-neighbour (s of run time), infinite if none was heard.
         max_age : float

@@ -74,13 +74,7 @@ class GraphError(ValueError):
 
 @lru_cache(maxsize=8192)
 def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
-    """Sort key in which inv2 comes before inv10.
-
-    Examples
-    --------
-    >>> sorted(["inv10", "inv2", "inv1"], key=natural_order)
-    ['inv1', 'inv2', 'inv10']
-    """
+    """Sort key in which inv2 comes before inv10."""
     parts = re.findall(r"\d+|\D+", name)
     return tuple((0, int(part), part) if part.isascii() and part.isdigit() else (1, 0, part) for part in parts)
 
@@ -178,33 +172,13 @@ GRAPHS: Registry[Any] = Registry(
 def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = False) -> dict[str, tuple[str, ...]]:
     """Return each agent's in-neighbours by a rule, in the order of `members`.
 
-    Parameters
-    ----------
-    rule : Graph
-        The rule.
-    members : Members
-        Nameplates in any order; the rule gets them in natural order of the names.
-    name : str
-        Name of the rule in the scenario, for messages.
-    strict : bool, optional
-        Whether a name that is no member is a problem, as in the check of a scenario; else it is left out: in wall-clock
-        time agents meet one after the other, and may have died.
+    `name` is that of the rule in the scenario, for messages. With `strict` a name that is no member is a problem, as
+    in the check of a scenario; else it is left out: in wall-clock time agents meet one after the other.
 
     Raises
     ------
     GraphError
         If the rule raises, or its result is no graph of these agents.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace as Plate
-    >>> members = {f"inv{i}": Plate(kind="GFL") for i in (1, 2, 3)}
-    >>> neighbours_by(lambda members: {name: {"inv1"} - {name} for name in members}, members, "star")["inv3"]
-    ('inv1',)
-    >>> neighbours_by(lambda members: {"inv3": ["inv33"]}, members, "star", strict=True)
-    Traceback (most recent call last):
-        ...
-    gridpeers.agents.graphs.GraphError: graph star lets inv3 listen to inv33, ...; did you mean "inv3"? The agents ...
     """
     heard_by = _evaluated(rule, members, name)
     for one, heard in heard_by.items() if strict else ():
@@ -221,13 +195,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
 
 
 class RosterGraph:
-    """The graph on one roster, agent by agent. A rule by pairs costs one row, any other is evaluated once for all.
-
-    Parameters
-    ----------
-    rule, members, name
-        As of `neighbours_by`.
-    """
+    """The graph on one roster, agent by agent. A rule by pairs costs one row, any other is evaluated once for all."""
 
     def __init__(self, rule: Graph, members: Members, name: str) -> None:
         self._rule, self._members, self._name = rule, members, name
@@ -285,63 +253,24 @@ _OURS: dict[str, Graph] = {"full": full, "none": none, "GFM-only": GFM_only, "cl
 
 
 def rule_of(control: Control) -> Graph:
-    """Return the rule of a run.
-
-    Raises
-    ------
-    PluginError
-        If it is plugged in, and is missing or cannot be made with its parameters.
-    """
+    """Return the rule of a run; raise PluginError if a plugged-in one is missing or cannot be made."""
     if control.own_graph is not None:
         return make_graph(control.own_graph)
     return EdgeList(control.links) if control.graph == "links" else _OURS[control.graph]
 
 
 def is_pairwise(control: Control) -> bool:
-    """Whether a pair's link depends on the two alone, so that it can be made before the roster is known.
-
-    Examples
-    --------
-    >>> is_pairwise(Control(secondary="all", graph="ring"))
-    False
-    """
+    """Whether a pair's link depends on the two alone, so that it can be made before the roster is known."""
     return control.own_graph is None and control.graph != "ring"
 
 
 def in_neighbours(
     control: Control, name: str, members: Mapping[str, Member], rule: Graph | None = None
 ) -> tuple[str, ...]:
-    """Return the agents that an agent listens to.
+    """Return the agents that an agent listens to by the run's rule, in the order of `members`: sums then round alike.
 
-    Parameters
-    ----------
-    control : Control
-        The run's rule.
-    name : str
-        The agent; one of `members`.
-    members : Mapping[str, Member]
-        Nameplates of all agents on the roster, the agent's own included.
-    rule : Graph, optional
-        Result of `rule_of` for this control, where the caller keeps it.
-
-    Returns
-    -------
-    tuple[str, ...]
-        Names of the in-neighbours, in the order of `members`: sums over them then round alike in every process.
-
-    Raises
-    ------
-    GraphError
-        If the rule is plugged in, and fails or returns no graph.
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace as Plate
-    >>> members = {f"inv{i}": Plate(kind="GFL", microgrid="mg1") for i in (1, 2, 3, 4)}
-    >>> in_neighbours(Control(secondary="all", graph="ring"), "inv1", members)
-    ('inv2', 'inv4')
-    >>> in_neighbours(Control(secondary="all", graph="full", without=(("inv4", "inv1"),)), "inv1", members)
-    ('inv2', 'inv3')
+    `members` are all on the roster, the own one included; `rule` is `rule_of(control)` where the caller keeps it.
+    Raise GraphError if a plugged-in rule fails or returns no graph.
     """
     graph = RosterGraph(rule_of(control) if rule is None else rule, members, control.graph)
     return without_missing(control, name, graph.in_neighbours(name))

@@ -14,13 +14,7 @@ from gridpeers.wire.messages import Nameplate, Prepare
 
 
 class KnownAgents:
-    """Tokens, nameplates, the last roster and its graph; agents of one process and one rule share them.
-
-    Parameters
-    ----------
-    control : Control
-        The run's rule.
-    """
+    """Tokens, nameplates, the last roster and its graph; agents of one process and one rule share them."""
 
     def __init__(self, control: Control) -> None:
         self.control = control
@@ -76,13 +70,7 @@ class KnownAgents:
         return self.members.nameplates.get(name) or self._own[name]
 
     def in_neighbours(self, own: str) -> tuple[str, ...]:
-        """Return the in-neighbours of an agent on the roster, all of whose members have been met.
-
-        Raises
-        ------
-        GraphError
-            If the rule is plugged in, and fails or returns no graph.
-        """
+        """Return the in-neighbours of an agent, once all on the roster are met; raise GraphError if the rule fails."""
         if self._graph is None:
             roster = {name: self.nameplate(name) for name in self._latest[1]}
             self._graph = RosterGraph(self._rule, roster, self.control.graph)

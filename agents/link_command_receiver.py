@@ -12,15 +12,6 @@ class LinkCommandReceiver:
 
     The plant sends again what is not acknowledged, so a command may come twice, and one behind a lost one waits for it:
     which of two commands came later decides which of them holds.
-
-    Parameters
-    ----------
-    name : str
-        The agent.
-    epoch : int
-        Its epoch.
-    links : Links or None
-        Its links; without any, commands are rejected.
     """
 
     def __init__(self, name: str, epoch: int, links: Links | None) -> None:

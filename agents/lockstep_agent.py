@@ -1,23 +1,8 @@
 """An agent under simulated time: it ticks when all messages of a tick are here. Pure; `now` serves deadlines only.
 
-**Getting ready.** No agent has a list of the others: for every token of another agent it asks for the nameplate. It
-subscribes to each in-neighbour by the graph, and then asks for the nameplate once more: subscription and query
-take the same way in the same order, so the answer proves that the neighbour's publications will come. For graphs that
-look at pairs this happens at once; for a ring, when `Prepare` has named the roster. The agent sends `Ready` to the
-plant when it has met the whole roster and all in-neighbours are proven. The plant sends `Prepare` again as long as a
-`Ready` is missing: then the agent sends its own again, or asks again for what it misses.
-
-**Ticks.** Measurement(k) is the grant of tick k. With it and State(k-1) of every in-neighbour on roster k-1 the agent
-computes and sends State(k). It keeps a State(k) that overtakes the own Measurement(k) until tick k is done, so the used
-values never depend on the order of arrival. It leaves out an agent that is not on roster k at once, so it does not
-matter whether it hears that agent's last state or its end first. At its first tick an agent has no roster k-1 and waits
-for no state.
-
-**No deadlock.** State(k) waits only for Measurement(k) and States(k-1), Measurement(k) only for States(k-1): every wait
-is for an earlier message, so the earliest unsent message can always be sent, if its sender lives. The token of a dead
-process vanishes, which ends the wait for it: its last value counts once more, and the next roster leaves it out. A
-process that neither sends nor dies meets the deadline. The agent's deadline is twice the plant's, so that the plant,
-which sees all agents, names the culprit. Receivers only enqueue, without bound, so no receiver blocks a sender.
+docs/protocol.md has the protocol and why it cannot deadlock: getting ready ("Why each agent asks twice"), what a tick
+waits for, and what ends each wait. The agent's deadline is twice the plant's, so that the plant, which sees all agents,
+names the culprit.
 """
 
 from __future__ import annotations
@@ -51,20 +36,9 @@ DEADLINES = 2.0
 
 
 class LockstepAgent(AgentNode):
-    """One agent under simulated time.
+    """One agent under simulated time; parameters as of `AgentNode`, and `known`.
 
-    Parameters
-    ----------
-    config : AgentConfig
-        The agent's nameplate and the run's rule.
-    instance : str
-        Id of this process, unique in the run; part of the agent's token.
-    links : Links, optional
-        Emulated links to the agent; by default none.
-    law : Law, optional
-        Law that decides the set-points; by default the paper's.
-    known : KnownAgents, optional
-        What the agents of this process know of the others; by default this agent shares it with nobody.
+    `known` is what the agents of this process know of the others; by default this agent shares it with nobody.
     """
 
     def __init__(

@@ -27,24 +27,7 @@ STAGGER = 0.5
 
 
 class SessionHealth:
-    """Judge whether the agent's session brings the messages that it should, one session after the other.
-
-    Parameters
-    ----------
-    name : str
-        The agent.
-
-    Examples
-    --------
-    The plant hears inv3, nothing comes from it here, and so the session is given up after 3.5 s:
-
-    >>> health = SessionHealth("inv1")
-    >>> health.came("plant", now=9.0)
-    >>> [health.problem(("inv1", "inv3"), met=("inv3",), neighbours=("inv3",), now=now) for now in (9.0, 9.5)]
-    ['', '']
-    >>> health.came("plant", now=12.5); health.problem(("inv1", "inv3"), met=("inv3",), neighbours=("inv3",), now=12.5)
-    'the plant hears inv3, but nothing comes from it here'
-    """
+    """Judge whether the agent's session brings the messages that it should, one session after the other."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -97,14 +80,8 @@ class SessionHealth:
     ) -> str:
         """Return the reason why a new session is needed; "" if none is.
 
-        Parameters
-        ----------
-        roster : Sequence[str] or None
-            Agents that the plant hears, as the last measurement says; None if there is no recent one.
-        met, neighbours : Collection[str]
-            Agents whose nameplate is known, and those of them that the agent listens to.
-        now : float
-            s on the own clock.
+        `roster` has the agents that the plant hears, as the last measurement says, None if there is no recent one;
+        `met` those whose nameplate is known, and `neighbours` those of them that the agent listens to.
         """
         others = () if roster is None else _expected(roster, self._name, met, neighbours)
         silent = self._silent(roster, others, now)

@@ -18,25 +18,7 @@ CONVINCED = 5
 
 
 class TickTimer:
-    """Due times of an agent's ticks.
-
-    Parameters
-    ----------
-    period : float
-        Control period (s of wall time).
-    keeps_clear : bool, optional
-        Whether the ticks are kept clear of the measurements; if not, they drift as the own clock does.
-
-    Examples
-    --------
-    A measurement came 1 ms before the first tick. The second is moved to the middle of its period:
-
-    >>> timer = TickTimer(0.020)
-    >>> timer.start(10.0)
-    >>> timer.measured(9.999)
-    >>> timer.take(10.0), round(timer.due, 3)
-    (0, 10.029)
-    """
+    """Due times of an agent's ticks; unless it `keeps_clear` of the measurements, they drift as the own clock does."""
 
     def __init__(self, period: float, *, keeps_clear: bool = True) -> None:
         self.period = period

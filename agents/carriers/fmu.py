@@ -1,8 +1,14 @@
 """A law that is a functional mock-up unit for co-simulation, FMI 2 or 3, by the package fmpy (extra `fmu`).
 
-Its variables are those of `gridpeers.agents.carriers.fmu`. What is compiled cannot be interrupted, and may
-take its process with it: so an FMU runs in one of its own, `gridpeers.agents.carriers.fmu_host`, to which the lines of
-a law program go.
+What is compiled cannot be interrupted, and may take its process with it: so an FMU runs in one of its own,
+`gridpeers.agents.carriers.fmu_host`, to which the lines of a law program go.
+
+All its variables are scalar, Real (FMI 2) or Float64 (FMI 3), by these names; an FMU declares those that it uses:
+
+- inputs: own_P, own_e and so on (`Own`); neighbours, how many there are; neighbour_1_P_set and so on (`Neighbour`),
+  neighbour_1_shared_NAME for what a neighbour shares, for as many neighbours as the FMU has room for;
+- outputs: P_set, V_set, and send (1 or 0), shared_NAME;
+- parameters: those of the law, as a scenario gives them.
 """
 
 from __future__ import annotations
@@ -100,18 +106,7 @@ LOADING = 10.0
 
 
 class FmuLaw(ProgramLaw):
-    """A law carried by an FMU.
-
-    Parameters
-    ----------
-    choice : LawChoice
-        Its path, parameters and folder.
-
-    Raises
-    ------
-    ValueError
-        If its process cannot be started.
-    """
+    """A law carried by an FMU; raise ValueError if its process cannot be started."""
 
     def __init__(self, choice: LawChoice) -> None:
         path = (Path(choice.folder) / choice.fmu).absolute()
@@ -128,13 +123,7 @@ class FmuLaw(ProgramLaw):
         self._patience = max(LOADING, self._patience)
 
     def load(self) -> None:
-        """Wait until the FMU is loaded.
-
-        Raises
-        ------
-        LawError
-            If it cannot be.
-        """
+        """Wait until the FMU is loaded; raise LawError if it cannot be."""
         self._ask({"type": "load"}, ProgramReady, 0.0)
 
     def close(self) -> None:

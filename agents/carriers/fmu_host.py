@@ -22,20 +22,7 @@ from gridpeers.wire.plugins.anybody import ANYTHING, named
 
 
 class LoadedFmu(Law):
-    """An FMU in this process, as a law.
-
-    Parameters
-    ----------
-    path : Path
-        The FMU.
-    folder : Path
-        Where it is unpacked.
-
-    Raises
-    ------
-    Exception
-        Whatever fmpy or the FMU has to say if it cannot be loaded.
-    """
+    """An FMU in this process, unpacked in a folder, as a law; whatever fmpy or the FMU raises comes through."""
 
     def __init__(self, path: Path, folder: Path) -> None:
         super().__init__()

@@ -22,13 +22,7 @@ _BINARY = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\
 
 
 def executable_problem(file: Path) -> str:
-    """Return why the system cannot run a file, as the end of a sentence; "" if it may.
-
-    Examples
-    --------
-    >>> executable_problem(Path(__file__))
-    'has no first line such as #!/usr/bin/env python3, and is no compiled program; write one, or name its ...'
-    """
+    """Return why the system cannot run a file, as the end of a sentence; "" if it may."""
     try:
         with file.open("rb") as opened:
             first = opened.readline(256)
@@ -56,13 +50,7 @@ PAPER = LawChoice().use
 
 
 def law_problems(table: Mapping[str, Any]) -> list[Problem]:
-    """Return all that is wrong with the table `law` of a scenario, at its keys, or at "" for the whole.
-
-    Examples
-    --------
-    >>> law_problems({"use": "dapi", "k": -1.0, "time_limit_s": 0})[0]
-    Problem(path='time_limit_s', text='must be from 0.001 to 60 s, got 0')
-    """
+    """Return all that is wrong with the table `law` of a scenario, at its keys, or at "" for the whole."""
     given = [key for key in CARRIERS if key in table]
     if len(given) != 1:
         text = f"needs one of use, command, fmu; got {' and '.join(given) or 'none'}"

@@ -55,13 +55,7 @@ class Asked(Protocol):
 
 
 def make_law(control: Control) -> Law:
-    """Return the law of one inverter.
-
-    Raises
-    ------
-    ValueError
-        If there is no such law, or it cannot be made with these parameters; the text says what would be right.
-    """
+    """Return the law of one inverter; raise ValueError if there is no such law, or it cannot be made."""
     choice = control.law
     if choice.command:
         from gridpeers.agents.carriers.program import ProgramLaw

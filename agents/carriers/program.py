@@ -33,21 +33,10 @@ _GUARD = 'read -r _; sleep "$1"; test -z "$2" || rm -rf -- "$2"; kill -KILL 0'
 
 
 class ProcessGroup:
-    """A program with pipes to its standard input and output, and all that it starts itself.
+    """A program with pipes to its standard input and output, and all that it starts itself; raise OSError if it cannot start.
 
-    Parameters
-    ----------
-    command : Sequence[str]
-        What to run.
-    folder : str
-        Where to run it; "" is here.
-    litter : str, optional
-        Folder that is removed if whoever started the program dies; else it is theirs to remove.
-
-    Raises
-    ------
-    OSError
-        If it cannot be started.
+    The group ends whole: with whoever started it too, however that ended. Then the folder `litter` is removed; else it
+    is the starter's to remove.
     """
 
     def __init__(self, command: Sequence[str], folder: str, litter: str = "") -> None:
@@ -122,16 +111,7 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ProgramLaw(Law):
-    """A law carried by a program.
-
-    Parameters
-    ----------
-    choice : LawChoice
-        The command, its parameters and the folder to run it in.
-    name : str, optional
-        What people call it; the name of the program if left out.
-    litter : str, optional
-        Folder that is removed if the agent dies.
+    """A law carried by a program; `name` is what people call it, `litter` a folder that is removed if the agent dies.
 
     Raises
     ------
@@ -191,13 +171,7 @@ class ProgramLaw(Law):
         self._group = None
 
     def _ask(self, line: dict[str, Any], answer: type[Any], t: float) -> Any:
-        """Send a line and return the answer.
-
-        Raises
-        ------
-        LawError
-            If the program is dead, does not answer in time, or answers something else.
-        """
+        """Send a line and return the answer; raise LawError if there is none in time, or something else."""
         what = f"{line['type']} at t = {t:.6g} s"
         if self._group is None:
             raise LawError(f"{self._name} has ended before the {what}")

@@ -36,18 +36,10 @@ class _OverError(BaseException):
 
 @contextmanager
 def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
-    """Interrupt what is inside when it lasts too long.
+    """Interrupt what is inside when it lasts longer than so many seconds (real time).
 
-    It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not return.
-
-    Parameters
-    ----------
-    what : str
-        What is inside, for the message.
-    seconds : float
-        Longest time (s of real time).
-    limit : str
-        How a scenario calls the limit.
+    It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not return. The error
+    names `what` is inside, and the `limit` as a scenario calls it.
 
     Raises
     ------
@@ -98,13 +90,7 @@ def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
 
 
 def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: float) -> TimeLimited:
-    """Return a law of a class, each call of which may last only so long.
-
-    Raises
-    ------
-    ValueError
-        If it cannot be made.
-    """
+    """Return a law of a class, each call of which may last only so long; raise ValueError if it cannot be made."""
     seconds = FIRST * time_limit
     try:
         with limited("its __init__", seconds, f"{seconds:g} s, ten times time_limit_s"):
@@ -117,15 +103,7 @@ def make_limited(law: type[Law], parameters: Mapping[str, Any], time_limit: floa
 
 
 class TimeLimited(Law):
-    """A law, each call of which may last only so long.
-
-    Parameters
-    ----------
-    law : Law
-        The law.
-    time_limit : float
-        Longest time (s of real time) of one call; see `limited`.
-    """
+    """A law, each call of which may last only so long (s of real time); see `limited`."""
 
     def __init__(self, law: Law, time_limit: float) -> None:
         super().__init__(**{name: getattr(law, name) for name in LIMITS})

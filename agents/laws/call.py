@@ -33,22 +33,7 @@ def start_law(law: Law, own: Own) -> None:
 
 
 def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-    """Return a law's decision, within its limits.
-
-    Raises
-    ------
-    LawError
-        If it fails, or returns no decision.
-
-    Examples
-    --------
-    >>> class Far(Law):
-    ...     def step(self, own, neighbours, T):
-    ...         return SetPoints(7.0, 1.0)
-    >>> own = Own("inv1", True, 0.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
-    >>> decide(Far(), own, (), 0.02).P_set
-    1.0
-    """
+    """Return a law's decision, within its limits; raise LawError if it fails, or returns no decision."""
     try:
         result = law.step(own, neighbours, T)
     except LawError:
@@ -66,14 +51,7 @@ def decide(law: Law, own: Own, neighbours: Sequence[Neighbour], T: float) -> Set
 def failed_at(law: Law, error: LawError, folder: str) -> str:
     """Return where a law in Python failed, as " (mine.py:12)"; empty for a program or an FMU, which have no line here.
 
-    Parameters
-    ----------
-    law : Law
-        The law.
-    error : LawError
-        Its failure.
-    folder : str
-        Folder of the scenario: a file in it is named from there.
+    A file in `folder`, that of the scenario, is named from there.
     """
     carried = getattr(law, "carried", law)
     return (

@@ -14,49 +14,17 @@ with g_i = 1 for a leader (GFM) and 0 for a follower (GFL).
 have no s. Here P is always pu of own rating and w pu of nominal, so m_p is 0.01 for 1 % droop, every term of (12), (13)
 is a pu frequency and k_p is in seconds. Hz or rad/s enter nowhere.
 
-**Discretisation.** Explicit Euler needs kappa T lambda_max < 2, but nine fully meshed agents at T = 20 ms have
-2.6 with kappa = 14 1/s. Instead, all terms come from the same old values and are added:
+**Discretisation.** All terms come from the same old values and are added; d is the sum of c_ij, and a bar the
+neighbours' mean with weights c_ij. To first order in T this is (12)-(15). docs/laws.md derives it, with its equilibria
+and its stability.
 
 .. math::
     y &\leftarrow y + \tfrac12 (1 - e^{-2 \kappa d T}) (\bar y - y) - g (1 - e^{-\kappa T}) e \\
     V_{set} &\leftarrow V_{set} - F \big[ \beta d (z - \bar z) + g \alpha (v - 1) \big], \quad
         F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(g \alpha, 2 \beta d)
 
-where d is the sum of c_ij and a bar the neighbours' mean with weights c_ij. To first order in T this is (12)-(15).
-
-- *Consensus term*: the exact solution when the neighbours move towards agent i as it moves towards them. They do,
-  because they run the same law; so i goes at most half of the way. Holding them still,
-  y += (1 - exp(-kappa d T)) (ybar - y), lets a pair with kappa d T >> 1 swap its values for ever, and with a leader
-  added stars, even rings and bipartite graphs have spectral radii up to 1.6. Half of the way leaves no eigenvalue of
-  the consensus below 0, whatever T and d, and nine meshed agents at 20 ms still share within 0.1 s. For vars it is the
-  same wherever 2 beta d >= alpha.
-- *Leader term of P_set*: the exact solution against the own quasi-steady response de/dy = 1, that of a lone leader,
-  which is the strongest. Under one exponential with the consensus term it would be multiplied by
-  (1 - exp(-kappa d T))/(kappa d T): restoration with eight neighbours at 20 ms would be 2.5 times slower.
-- *Leader term of V_set*: under one factor F with the consensus term, and therefore slower (see Equilibrium). F does not
-  overshoot either: on the droop v + z = V_set, so dv/dV_set + dz/dV_set = 1, and max(alpha, 2 beta d) bounds
-  alpha dv/dV_set + 2 beta d dz/dV_set. A leader without neighbours has F = (1 - exp(-alpha T/k_q))/alpha.
-- *Equilibrium of P*, the paper's: followers have y = ybar and leaders a (ybar - y) = b e, a and b the two factors
-  above. With L the Laplacian whose rows are weighted by a/d that is L y = -g b e; the left null vector of L is positive
-  and all e of an island are equal, so e = 0, and then all y agree. So a and b may differ.
-- *Equilibrium of V*, the paper's at every T: V_set rests exactly where the bracket, the right-hand side of (14), (15),
-  is 0. There alpha (v - 1) and beta d (z - zbar) need not be 0 each, they cancel; so their factors must be as alpha to
-  beta d. With factors like those of P_set, one capped and the other not, a longer T makes vars less equal: MQSI
-  on the scenario islanding is 0.0062, 0.0098, 0.0295 at T = 2, 20, 100 ms, where the paper's law has 0.0058. The price:
-  voltage with eight neighbours at 20 ms recovers 1.7 times slower than with the factor 1 - exp(-alpha T/k_q), and a
-  leader corrects at most alpha/(2 beta d) of its voltage error in a period.
-- *Stability* was found by search over random and structured graphs, not proven. With the quasi-steady plant
-  e = sum_i w_i y_i + const, w_i = (s_i/m_p,i)/sum_j (s_j/m_p,j), the spectral radius is below 1 for every connected
-  graph tried, of up to 30 inverters with one leader or more, for every T, with one rating up to thirtyfold the others.
-  Where one inverter far from the leaders on a sparse graph outweighs all others by hundredfold, the paper's own
-  continuous law loses stability too. For the voltage, over random networks v = H V_set, z = (1 - H) V_set, gains
-  and periods from 1 ms to 10 s: none of 16000 unstable with ratings up to threefold apart. Of 36000 with ratings up to
-  thirtyfold apart 99 were, each of them under the continuous law too.
-  `tests/unit/agents/test_law.py` repeats the searches, for the paper's weights and for degree-normalised ones.
-
 **Limits.** P_set and V_set are clamped (anti-windup). The paper has no limits and accepts wind-up (its Remark 2).
-`gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1; the law itself
-stays the same.
+`gridpeers.agents.degraded_communication` has these and other options, and other weights c_ij than 1.
 """
 
 from __future__ import annotations
@@ -71,21 +39,9 @@ from gridpeers.wire.schema.plausible import Range, Unit
 
 
 def towards(rate: float, d: float, T: float) -> float:
-    """Return the part of the way to the neighbours' mean in one period; at most a half, because they move as well.
+    """Return the part of the way to the neighbours' mean in one period T (s); at most half, because they move as well.
 
-    Parameters
-    ----------
-    rate : float
-        Gain of each unit of c_ij (1/s): kappa for P_set, beta/k_q for V_set.
-    d : float
-        Sum of c_ij over the neighbours that count.
-    T : float
-        Control period (s).
-
-    Examples
-    --------
-    >>> towards(14.0, 8.0, 0.0), towards(14.0, 8.0, 10.0)
-    (0.0, 0.5)
+    `rate` is the gain of each unit of c_ij (1/s): kappa for P_set, beta/k_q for V_set; `d` is their sum.
     """
     return 0.5 * (1.0 - exp(-2.0 * rate * d * T))
 
@@ -102,35 +58,16 @@ def P_set_step(
     T: float,
     kappa_c: float | None = None,
 ) -> float:
-    """Return P_set (pu of own rating) after one control period, (12) for a follower, (13) for a leader.
+    """Return P_set (pu of own rating) after one control period T (s), (12) for a follower, (13) for a leader.
 
     Parameters
     ----------
-    P_set : float
-        Own set-point (pu).
-    y_bar : float
-        Weighted mean of the neighbours' m_p P_set (pu); without effect when `d` is 0.
-    d : float
-        Sum of c_ij over the neighbours that count.
-    e : float
-        Own frequency error (f - f_nom)/f_nom (pu).
-    leader : bool
-        Whether the inverter is a GFM.
-    m_p : float
-        Own droop (pu frequency per pu power).
-    gains : Gains
-        k_p and the limits.
-    T : float
-        Control period (s).
+    P_set, y_bar : float
+        Own set-point (pu), and the weighted mean of the neighbours' m_p P_set (pu); without effect when `d` is 0.
+    d, e : float
+        Sum of c_ij over the neighbours that count, and own frequency error (pu).
     kappa_c : float, optional
         Gain of each unit of c_ij (1/s); by default the leader's kappa = m_p/k_p.
-
-    Examples
-    --------
-    A lone leader 0.1 % below nominal frequency raises its set-point at once by nearly 0.1 when the period is long:
-
-    >>> P_set_step(0.5, 0.0, 0.0, -0.001, leader=True, m_p=0.01, gains=Gains(), T=1.0)
-    0.5999999375...
     """
     kappa = m_p / gains.k_p
     y = m_p * P_set
@@ -141,20 +78,13 @@ def P_set_step(
 
 
 def alpha_in_force(gains: Gains, v: float) -> float:
-    r"""Return the weight of the voltage error (1): alpha, or less near nominal voltage if V_full is positive.
+    r"""Return the weight of the voltage error (1) at a voltage v (pu): alpha, or less near nominal with V_full.
 
     .. math:: \alpha(v) = \max(\alpha_{min}, \alpha \min(1, |v - 1| / V_{full}))
 
     In equilibrium a leader's alpha (v - 1) balances its beta times the difference of vars. So alpha decides both
     how soon voltage recovers and how equal vars become. An alpha that is large far from nominal voltage and
     small near it eases this conflict. The paper mentions adaptive weights and gives none; this one is ours.
-
-    Parameters
-    ----------
-    gains : Gains
-        alpha, alpha_min and V_full.
-    v : float
-        Own terminal voltage (pu of nominal).
 
     Examples
     --------
@@ -168,29 +98,10 @@ def alpha_in_force(gains: Gains, v: float) -> float:
 
 
 def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> tuple[float, float]:
-    r"""Return the factors of z - z_bar and of v - 1 in one period: beta d and alpha of (15), times one F.
+    """Return the factors of z - z_bar and of v - 1 in one period: beta d and alpha of (15), times one F.
 
-    .. math:: F = (1 - e^{-\lambda T/k_q}) / \lambda, \quad \lambda = \max(\alpha, 2 \beta d)
-
-    With one F for both, they cancel where the paper's terms do, for every T. F is T/k_q for a short T.
-
-    Parameters
-    ----------
-    alpha : float
-        Weight of the voltage error (1) in force; 0 for a follower, which makes it (14).
-    beta : float
-        Weight of equal var sharing (1).
-    d : float
-        Sum of c_ij over the neighbours that count.
-    k_q : float
-        Gain (s).
-    T : float
-        Control period (s).
-
-    Examples
-    --------
-    >>> V_factors(1.0, 1.0, 8.0, k_q=0.25, T=10.0), V_factors(1.0, 1.0, 0.0, k_q=0.25, T=10.0)
-    ((0.5, 0.0625), (0.0, 1.0))
+    With one F for both, they cancel where the paper's terms do, for every T (s). `alpha` is 0 for a follower, which
+    makes it (14).
     """
     vars_ = beta * d
     if alpha > 2.0 * vars_:
@@ -203,33 +114,10 @@ def V_factors(alpha: float, beta: float, d: float, *, k_q: float, T: float) -> t
 def V_set_step(
     V_set: float, z: float, z_bar: float, d: float, v: float, *, leader: bool, gains: Gains, T: float
 ) -> float:
-    """Return V_set (pu of nominal) after one control period, (14) for a follower, (15) for a leader.
+    """Return V_set (pu of nominal) after one control period T (s), (14) for a follower, (15) for a leader.
 
-    Parameters
-    ----------
-    V_set : float
-        Own set-point (pu).
-    z : float
-        Own m_q q, q measured (pu of own rating).
-    z_bar : float
-        Weighted mean of the neighbours' m_q q; without effect when `d` is 0.
-    d : float
-        Sum of c_ij over the neighbours that count.
-    v : float
-        Own terminal voltage (pu of nominal).
-    leader : bool
-        Whether the inverter is a GFM; only a GFM restores the voltage.
-    gains : Gains
-        k_q, alpha, beta and the limits.
-    T : float
-        Control period (s).
-
-    Examples
-    --------
-    A follower with more vars than its neighbours lowers its voltage set-point:
-
-    >>> V_set_step(1.0, 0.02, 0.01, 8.0, 1.0, leader=False, gains=Gains(), T=0.02)
-    0.99639...
+    `z` is the own m_q q (pu), `z_bar` the weighted mean of the neighbours', without effect when `d`, the sum of c_ij,
+    is 0; `v` is the own terminal voltage (pu).
     """
     alpha, beta = (alpha_in_force(gains, v), gains.beta_GFM) if leader else (0.0, gains.beta_GFL)
     a, b = V_factors(alpha, beta, d, k_q=gains.k_q, T=T)

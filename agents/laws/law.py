@@ -122,31 +122,12 @@ class Terms(NamedTuple):
 
 
 class Law:
-    """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`).
-
-    Parameters
-    ----------
-    **parameters
-        Values of the parameters that do not keep their default.
+    """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`; docs/laws.md).
 
     Raises
     ------
     ValueError
-        If a value is wrong, unknown or missing.
-
-    Examples
-    --------
-    >>> class Hold(Law):
-    ...     '''Stay below a set-point.'''
-    ...     most: Annotated[float, Unit("pu"), Range(0, 1)] = 1.0
-    ...     def step(self, own, neighbours, T):
-    ...         return SetPoints(min(own.P_set, self.most), own.V_set)
-    >>> Hold(most=0.5).most
-    0.5
-    >>> Hold(most=2)
-    Traceback (most recent call last):
-        ...
-    ValueError: most: must be from 0 to 1 pu, got 2
+        If the value of a parameter is wrong, unknown or missing.
     """
 
     source: ClassVar[str] = ""
@@ -169,16 +150,9 @@ class Law:
         """Start, or restart, from the set-points that the plant holds, and clear the law's memory."""
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide the set-points of one control period.
+        """Decide the set-points of one control period T (s).
 
-        Parameters
-        ----------
-        own : Own
-            The own inverter.
-        neighbours : Sequence[Neighbour]
-            Neighbours whose states count, in the order of the inverters.
-        T : float
-            Control period (s).
+        The neighbours are those whose states count, in the order of the inverters.
         """
         raise NotImplementedError
 
@@ -199,11 +173,5 @@ LIMITS = ("P_set_min", "P_set_max", "V_set_min", "V_set_max")
 
 
 def limits_in(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the limits among the parameters of a law.
-
-    Examples
-    --------
-    >>> limits_in({"k_p": 0.001, "P_set_max": 0.9})
-    {'P_set_max': 0.9}
-    """
+    """Return the limits among the parameters of a law."""
     return {name: value for name, value in parameters.items() if name in LIMITS}
