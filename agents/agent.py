@@ -132,35 +132,22 @@ class Agent:
         self._takes_part = config.control.acts(config.name, config.kind)
         options = config.control.degraded_communication
         self._weights = StalenessWeights(options)
+        self.weighs_alike = self._weights.all_count
+        """Whether every state has the weight 1, whatever its age."""
+        self.notes_arrivals = self._weights.ages_count
+        """Whether it matters when a state arrives: else a state on the board is as good as one that was heard."""
         self._silent_at_most = SIGN_OF_LIFE * (options.max_age or (config.max_age if config.clock == "wall" else inf))
-        self._stops = options.anti_windup == "conditional"
+        self.watches_saturation = options.anti_windup == "conditional"
+        """Whether the sides on which its inverter is saturated count."""
         self._islands_from_switches = options.islands == "switches"
         self._detector = IslandDetector(config.f_nom, options.slip_max) if options.islands == "frequency" else None
-        self._saturation_P, self._saturation_V = (
-            SaturationDetector(options.T_sat),
-            SaturationDetector(options.T_sat),
-        )
+        self._saturation_P, self._saturation_V = SaturationDetector(options.T_sat), SaturationDetector(options.T_sat)
         self._P_set: float | None = None
         self._V_set: float | None = None
         self._islands: tuple[str, str] = ("", "")
         """Own island at the last two measurements, the latest first."""
         self._apart: frozenset[str] = frozenset()
         """Neighbours out of step."""
-
-    @property
-    def weighs_alike(self) -> bool:
-        """Whether every state has the weight 1, whatever its age."""
-        return self._weights.all_count
-
-    @property
-    def watches_saturation(self) -> bool:
-        """Whether the sides on which its inverter is saturated count."""
-        return self._stops
-
-    @property
-    def notes_arrivals(self) -> bool:
-        """Whether it matters when a state arrives: else a state on the board is as good as one that was heard."""
-        return self._weights.ages_count
 
     def meet(self, nameplate: Nameplate) -> None:
         """Note an agent's nameplate, and forget the states of its other epochs."""
@@ -188,22 +175,11 @@ class Agent:
         It knows the same nameplates and states, and its law begins anew from the same set-points.
         """
         agent = Agent(config, law)
-        agent._go_on(self._known, self.heard, self.set_points, self._islands, self._sent_at)
+        agent._known = {**self._known, config.name: agent.nameplate}
+        agent.heard.update(self.heard)
+        agent._P_set, agent._V_set = self.set_points or (None, None)
+        agent._islands, agent._sent_at = self._islands, self._sent_at
         return agent
-
-    def _go_on(
-        self,
-        known: Mapping[str, Nameplate],
-        heard: Mapping[str, State],
-        set_points: tuple[float, float] | None,
-        islands: tuple[str, str],
-        sent_at: float,
-    ) -> None:
-        """Go on from what another agent of this inverter knew."""
-        self._known = {**known, self.config.name: self.nameplate}
-        self.heard.update(heard)
-        self._P_set, self._V_set = set_points or (None, None)
-        self._islands, self._sent_at = islands, sent_at
 
     @property
     def set_points(self) -> tuple[float, float] | None:
@@ -253,7 +229,7 @@ class Agent:
         if state.quiet:
             return  # its law sends nothing: its last state stays valid
         self.heard[state.sender] = state
-        if self._weights.ages_count:
+        if self.notes_arrivals:
             self._weights.arrived(state.sender)
 
     def tick(
@@ -289,7 +265,8 @@ class Agent:
         self.around = around
         shared, send = NOTHING_SHARED, True
         if self._takes_part and not measurement.grid_connected:
-            own = self._own(measurement)
+            self.saturated = self._saturated_sides(measurement) if self.watches_saturation else (0, 0)
+            own = own_of(config, measurement, self._P_set, self._V_set, self.saturated)
             try:
                 if not self._law_runs:
                     start_law(self._law, own)
@@ -340,13 +317,6 @@ class Agent:
                 detector.heard(name, self.heard[name].t, self.heard[name].angle)
         return frozenset(name for name in neighbours if detector.apart(name, t))
 
-    def _own(self, m: Measurement) -> Own:
-        """Return the own inverter as the law sees it."""
-        assert self._P_set is not None
-        assert self._V_set is not None
-        self.saturated = self._saturated_sides(m) if self._stops else (0, 0)
-        return own_of(self.config, m, self._P_set, self._V_set, self.saturated)
-
     def _around(self, t: float, neighbours: Sequence[str], ages: Mapping[str, float] | None) -> list[Neighbour]:
         """Return the neighbours that count, with the age (s) and the weight of their last states."""
         heard, known, islands = self.heard, self._known, self._islands
@@ -358,7 +328,7 @@ class Agent:
             ]
         else:
             here = [heard[name] for name in neighbours if self.shares_island(name)]
-        if ages is None and self._weights.all_count:
+        if ages is None and self.weighs_alike:
             return neighbours_alike(known, here, t)
         aged = {state.sender: t - state.t if ages is None else ages[state.sender] for state in here}
         weights = self._weights.at_tick(aged)

@@ -38,7 +38,7 @@ class DecisionJournal:
         return all_new and alike and not (measurement or unused or weights)
 
     def tick(self, tick: int, measurement: int, neighbours: Sequence[str]) -> bool:
-        """Note the decision of a tick of simulated time if it was made otherwise than the last one; return whether it was.
+        """Note the decision of a tick of simulated time if it was made otherwise than the last; return whether it was.
 
         `measurement` is the age of the own measurement in ticks; `neighbours` are the in-neighbours on the roster.
         """

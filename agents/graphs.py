@@ -81,22 +81,40 @@ def natural_order(name: str) -> tuple[tuple[int, int, str], ...]:
 
 def full(members: Members) -> Mapping[str, Iterable[str]]:
     """Let every agent listen to all others."""
-    return _pairwise(members, _any_pair)
+    return _by_pairs(full, members)
 
 
 def none(members: Members) -> Mapping[str, Iterable[str]]:
     """Let no agent listen to any other."""
-    return _pairwise(members, _no_pair)
+    return _by_pairs(none, members)
 
 
 def GFM_only(members: Members) -> Mapping[str, Iterable[str]]:
     """Let the grid-forming inverters listen to each other."""
-    return _pairwise(members, _both_forming)
+    return _by_pairs(GFM_only, members)
 
 
 def clustered(members: Members) -> Mapping[str, Iterable[str]]:
     """Let the inverters of a microgrid listen to each other, and all grid-forming ones too."""
-    return _pairwise(members, _same_microgrid_or_both_forming)
+    return _by_pairs(clustered, members)
+
+
+_PAIRWISE: dict[Any, Callable[[Member, Member], bool]] = {
+    full: lambda a, b: True,
+    none: lambda a, b: False,
+    GFM_only: lambda a, b: a.kind == b.kind == "GFM",
+    clustered: lambda a, b: a.microgrid == b.microgrid or a.kind == b.kind == "GFM",
+}
+"""Rules by pairs: an agent evaluates its own pairs alone, so that its cost grows with the roster and not its square."""
+
+
+def _by_pairs(rule: Graph, members: Members) -> dict[str, list[str]]:
+    return {name: _linked_to(name, members, _PAIRWISE[rule]) for name in members}
+
+
+def _linked_to(name: str, members: Members, linked: Callable[[Member, Member], bool]) -> list[str]:
+    own = members[name]
+    return [other for other, nameplate in members.items() if other != name and linked(own, nameplate)]
 
 
 def ring(members: Members) -> Mapping[str, Iterable[str]]:
@@ -117,40 +135,6 @@ class EdgeList:
         """Return the in-neighbours of each agent."""
         both = [pair for a, b in self.links for pair in ((a, b), (b, a))]
         return {name: {b for a, b in both if a == name and b in members} for name in members}
-
-
-def _any_pair(a: Member, b: Member) -> bool:
-    return True
-
-
-def _no_pair(a: Member, b: Member) -> bool:
-    return False
-
-
-def _both_forming(a: Member, b: Member) -> bool:
-    return a.kind == b.kind == "GFM"
-
-
-def _same_microgrid_or_both_forming(a: Member, b: Member) -> bool:
-    return a.microgrid == b.microgrid or a.kind == b.kind == "GFM"
-
-
-_PAIRWISE: dict[Any, Callable[[Member, Member], bool]] = {
-    full: _any_pair,
-    none: _no_pair,
-    GFM_only: _both_forming,
-    clustered: _same_microgrid_or_both_forming,
-}
-"""Rules by pairs: an agent evaluates its own pairs alone, so that its cost grows with the roster and not its square."""
-
-
-def _pairwise(members: Members, linked: Callable[[Member, Member], bool]) -> dict[str, list[str]]:
-    return {name: _linked_to(name, members, linked) for name in members}
-
-
-def _linked_to(name: str, members: Members, linked: Callable[[Member, Member], bool]) -> list[str]:
-    own = members[name]
-    return [other for other, nameplate in members.items() if other != name and linked(own, nameplate)]
 
 
 GRAPHS: Registry[Any] = Registry(

@@ -25,7 +25,7 @@ from typing import Literal
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.agents.agent_node import AgentNode, NeighbourStates
+from gridpeers.agents.agent_node import AgentNode
 from gridpeers.agents.decision_journal import DecisionJournal
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.link_command_receiver import LinkCommandReceiver
@@ -56,6 +56,22 @@ from gridpeers.wire.traffic import TimedTraffic
 Phase = Literal["seeking", "waiting", "running"]
 
 
+STATUS_PERIOD = 0.5
+"""Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
+
+JOURNAL_PERIOD, LINKS_PERIOD = 0.2, 0.5
+"""Time (s, wall) between two parts of the journal, and between two reports on links beside it: a record loses no more
+when a process is killed."""
+
+LEAVING = 1.0
+"""Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
+take what was sent last with it."""
+
+FOUND_AGAIN = 2.0
+"""Longest wait (s, wall) for the plant over a new session, of an agent that is asked to leave while it has none; it
+takes 0.1 to 0.3 s."""
+
+
 @dataclass
 class AgentStatistics:
     """Counts since the start."""
@@ -72,71 +88,6 @@ class AgentStatistics:
     """Messages that did not come off the wire, as the numbers of those that did show."""
     lateness: float = 0.0
     """Longest delay of a tick behind its time since the last status (s of wall time)."""
-
-    def woken(self, late: float, skipped: int) -> None:
-        """Note a tick: how late it was (s of wall time), and how many were skipped for it."""
-        self.missed += skipped
-        self.lateness = max(self.lateness, late)
-
-    def take_status(
-        self,
-        config: AgentConfig,
-        phase: Phase,
-        states: NeighbourStates,
-        at: float,
-        *,
-        missing_agents: tuple[str, ...],
-        neighbours: tuple[str, ...],
-        used: tuple[str, ...],
-        rejected: int,
-        dropped: int,
-        impaired: tuple[str, ...],
-    ) -> AgentStatus:
-        """Report the agent's condition at this time (s of run time on its clock); see `AgentStatus`."""
-        others = f", which waits for {', '.join(missing_agents)}" if missing_agents else ""
-        waits_for = {
-            "seeking": f"the plant of run {config.run}",
-            "waiting": f"a measurement of {config.name} from the plant{others}",
-            "running": "",
-        }
-        ages = [states.age(name, at) for name in neighbours]
-        lateness, self.lateness = self.lateness, 0.0
-        return AgentStatus(
-            sender=config.name,
-            epoch=config.epoch,
-            seq=self.sent,
-            t=states.t,
-            phase=phase,
-            waits_for=printable(waits_for[phase]),
-            island="" if states.measurement is None else states.measurement.island,
-            neighbours=neighbours,
-            ages=tuple(age if age < inf else -1.0 for age in ages),
-            used=used,
-            received=self.used,
-            sent=self.sent,
-            rejected=rejected,
-            lost=min(self.lost + dropped, MOST_COUNT),
-            ticks=self.ticks,
-            missed=self.missed,
-            lateness=lateness,
-            impaired=impaired,
-        )
-
-
-STATUS_PERIOD = 0.5
-"""Time (s, wall) between two `AgentStatus`; one more goes out whenever the phase or the neighbours in use change."""
-
-JOURNAL_PERIOD, LINKS_PERIOD = 0.2, 0.5
-"""Time (s, wall) between two parts of the journal, and between two reports on links beside it: a record loses no more
-when a process is killed."""
-
-LEAVING = 1.0
-"""Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
-take what was sent last with it."""
-
-FOUND_AGAIN = 2.0
-"""Longest wait (s, wall) for the plant over a new session, of an agent that is asked to leave while it has none; it
-takes 0.1 to 0.3 s."""
 
 
 class RealtimeAgent(AgentNode):
@@ -157,7 +108,6 @@ class RealtimeAgent(AgentNode):
         self._journal_timer = Timer(JOURNAL_PERIOD, 0.0)
         self.phase: Phase = "seeking"
         self.statistics = AgentStatistics()
-        """Its counts."""
         self._plant_epoch = 0
         """Epoch of the plant that was followed last; 0 before the first."""
         self._link_commands = LinkCommandReceiver(config.name, config.epoch, links)
@@ -210,15 +160,7 @@ class RealtimeAgent(AgentNode):
     def publications(self) -> tuple[str, ...]:
         """Keys to be published on."""
         keys, name = self.keys, self._name
-        own = (
-            keys.state,
-            keys.set_points,
-            keys.leave,
-            keys.status,
-            keys.report,
-            keys.link_acknowledgement,
-            keys.journal,
-        )
+        own = keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement, keys.journal
         return tuple(key(name) for key in own)
 
     @property
@@ -269,7 +211,8 @@ class RealtimeAgent(AgentNode):
             self.failed = f"{self._name}: no plant of run {self._config.run} within {self._config.deadline:g} s"
             return
         if self.phase == "running":
-            self.statistics.woken(late, skipped)
+            self.statistics.missed += skipped
+            self.statistics.lateness = max(self.statistics.lateness, late)
             if late * self._config.speed > self._config.max_age:
                 self._hold(f"woken {late:.2f} s late; waits for news")
         at = now * self._config.speed
@@ -296,17 +239,8 @@ class RealtimeAgent(AgentNode):
         roster = None if measured is None else measured.roster
         if roster is not None and self._agent.fault:
             roster = (*roster, self._name)  # who says nothing is not heard, and no session changes that
-        problem = (
-            "this host has another address"
-            if self.host_moved()
-            else self._health.problem(
-                roster,
-                met=self.members.nameplates,
-                neighbours=self._neighbours,
-                now=now,
-            )
-        )
-        if problem:
+        met, moved = self.members.nameplates, "this host has another address" if self.host_moved() else ""
+        if problem := moved or self._health.problem(roster, met=met, neighbours=self._neighbours, now=now):
             self.session_broken = True
             self._say(f"{problem}; opens a new session")
 
@@ -490,16 +424,34 @@ class RealtimeAgent(AgentNode):
             self._publish(self.keys.state(self._name), encode(state))
 
     def _publish_status(self, at: float) -> None:
-        status = self.statistics.take_status(
-            self._config,
-            self.phase,
-            self.states,
-            at,
-            missing_agents=self._missing_agents,
+        config, statistics, states = self._config, self.statistics, self.states
+        missing = f", which waits for {', '.join(self._missing_agents)}" if self._missing_agents else ""
+        waits_for = {
+            "seeking": f"the plant of run {config.run}",
+            "waiting": f"a measurement of {config.name} from the plant{missing}",
+            "running": "",
+        }
+        dropped = 0 if self._links is None else self._links.dropped
+        ages = [states.age(name, at) for name in self._neighbours]
+        status = AgentStatus(
+            sender=config.name,
+            epoch=config.epoch,
+            seq=statistics.sent,
+            t=states.t,
+            phase=self.phase,
+            waits_for=printable(waits_for[self.phase]),
+            island="" if states.measurement is None else states.measurement.island,
             neighbours=self._neighbours,
+            ages=tuple(age if age < inf else -1.0 for age in ages),
             used=self._used_neighbours,
+            received=statistics.used,
+            sent=statistics.sent,
             rejected=sum(self.rejects.counts.values()),
-            dropped=0 if self._links is None else self._links.dropped,
+            lost=min(statistics.lost + dropped, MOST_COUNT),
+            ticks=statistics.ticks,
+            missed=statistics.missed,
+            lateness=statistics.lateness,
             impaired=() if self._links is None else self._links.impaired(self._run_time),
         )
+        statistics.lateness = 0.0
         self._publish(self.keys.status(self._name), encode(status))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 from gridpeers.agents.agent_config import Control, LawChoice
 from gridpeers.agents.carriers.time_limit import make_limited
@@ -45,15 +45,6 @@ LAWS: Registry[type[Law]] = Registry(
 """Laws by name; those of gridpeers come first."""
 
 
-@runtime_checkable
-class Asked(Protocol):
-    """A law that is asked to end before it is waited for."""
-
-    def end_input(self) -> None:
-        """Ask it."""
-        ...
-
-
 def make_law(control: Control) -> Law:
     """Return the law of one inverter; raise ValueError if there is no such law, or it cannot be made."""
     choice = control.law
@@ -78,7 +69,6 @@ def close_laws(laws: Iterable[Law]) -> None:
     """End some laws; programs are all asked before the first is waited for."""
     ended = tuple(laws)
     for law in ended:
-        if isinstance(law, Asked):
-            law.end_input()
+        getattr(law, "end_input", lambda: None)()
     for law in ended:
         law.close()

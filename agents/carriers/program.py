@@ -33,7 +33,7 @@ _GUARD = 'read -r _; sleep "$1"; test -z "$2" || rm -rf -- "$2"; kill -KILL 0'
 
 
 class ProcessGroup:
-    """A program with pipes to its standard input and output, and all that it starts itself; raise OSError if it cannot start.
+    """A program with pipes to its standard input and output, and all that it starts itself; OSError if it cannot start.
 
     The group ends whole: with whoever started it too, however that ended. Then the folder `litter` is removed; else it
     is the starter's to remove.
