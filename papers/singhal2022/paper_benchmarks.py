@@ -1,11 +1,109 @@
-"""Benchmarks: the paper's numbers and claims for a run of each experiment, named in the scenario's key `paper`."""
+"""Benchmarks: the paper's numbers and claims for each experiment, and how near ours are, in a few lines.
+
+An experiment is named in the scenario's key `paper`. The lines leave nothing out: judged, not
+judged, beside its own size.
+"""
 
 from __future__ import annotations
 
-from gridpeers.benchmarks import Benchmark
-from gridpeers.papers.singhal2022.claims import CLAIMS
-from gridpeers.papers.singhal2022.headline import headline, numbers
-from gridpeers.papers.singhal2022.tables import tables_of
+import math
+from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
+
+from gridpeers.benchmarks import Benchmark, Claim, Findings
+from gridpeers.papers.singhal2022 import communication_claims, islanding_claims, plant_claims, topology_claims
+from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable, tables_of
+
+
+class ComparedNumber(NamedTuple):
+    """A number of the paper with ours."""
+
+    cell: Cell
+    ours: float
+    """Not a number where ours is not steady."""
+
+
+def numbers(found: Findings, tables: Iterable[PaperTable]) -> list[ComparedNumber]:
+    """Return all numbers of tables that were run, ours beside the paper's."""
+    return [
+        ComparedNumber(cell, float("nan") if found.reason(cell) else found.value(cell))
+        for table in tables
+        for cell in table.cells
+        if found.has(cell)
+    ]
+
+
+def headline(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    """Return lines on numbers within their tolerance, numbers that have none, and V_error beside its own size."""
+    return [*_judged(all_numbers), *_by_factor(all_numbers), *_relative(all_numbers)]
+
+
+def within(all_numbers: Iterable[ComparedNumber], judge: Callable[[Cell, float], bool | None]) -> tuple[int, int]:
+    """Return how many numbers pass a judgement, and how many it is about."""
+    passed = [judge(cell, ours) for cell, ours in all_numbers]
+    return sum(map(bool, passed)), sum(verdict is not None for verdict in passed)
+
+
+def _judged(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    near, judged = within(all_numbers, Cell.within)
+    if not judged:
+        return []
+    named = _tables(all_numbers)
+    return [f"{near} of the {judged} numbers of {named} that are judged by a tolerance are within it."]
+
+
+def _by_factor(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    """Return the numbers that the first line leaves out."""
+    left = [number for number in all_numbers if number.cell.tolerance.value is None]
+    if not left:
+        return []
+    near, _ = within(left, Cell.within_factor)
+    times = [ours / cell.paper for cell, ours in left if not math.isnan(ours)]
+    times_off = f"they are {min(times):.2g} to {max(times):.2g} times the paper's, " if times else ""
+    far = _farthest(left, lambda cell, ours: abs(math.log(ours / cell.paper)) if ours > 0.0 else math.inf)
+    return [
+        f"The other {len(left)}, all MQSI of {_tables(left)}, are not judged by a tolerance: {times_off}"
+        f"{near} of {len(left)} within a factor of {MQSI_FACTOR.value:g}; farthest off: {far}."
+    ]
+
+
+def _relative(all_numbers: Sequence[ComparedNumber]) -> list[str]:
+    about = [number for number in all_numbers if number.cell.relative is not None]
+    if not about:
+        return []
+    near, judged = within(about, Cell.within_relative)
+    far = _farthest(about, lambda cell, ours: abs(ours - cell.paper) / (cell.relative or math.nan))
+    return [
+        f"V_error beside its own size: {near} of {judged} within {100 * V_RELATIVE.value:g} % of the paper's number or "
+        f"half of its last digit; farthest off: {far}."
+    ]
+
+
+def _farthest(some: Sequence[ComparedNumber], off: Callable[[Cell, float], float]) -> str:
+    """Return the number that is farthest off, ours for the paper's; one that is no number is farther than all."""
+    cell, ours = max(some, key=lambda one: math.inf if math.isnan(one.ours) else off(*one))
+    shown = "not steady" if math.isnan(ours) else f"{ours:.{cell.digits + 1}f}"
+    return f"{shown} for {cell.paper:.{cell.digits}f} (Table {cell.table}, {cell.where})"
+
+
+def _tables(some: Iterable[ComparedNumber]) -> str:
+    """Return the tables by their numbers, e.g. "Tables I and II"."""
+    named = list(dict.fromkeys(number.cell.table for number in some))
+    if len(named) == 1:
+        return f"Table {named[0]}"
+    return f"Tables {', '.join(named[:-1])} and {named[-1]}"
+
+
+CLAIMS: dict[str, tuple[Claim, ...]] = {
+    "islanding": islanding_claims.claims.all,
+    "intermittency": plant_claims.intermittency.all,
+    "communication": communication_claims.claims.all,
+    "topology": topology_claims.claims.all,
+    "plug-n-play": plant_claims.plug_n_play.all,
+    "switching": plant_claims.switching.all,
+    "wind-up": plant_claims.wind_up.all,
+}
+"""Claims by experiment, named as in the scenario's key `paper`; the topologies are a sweep and have no scenario."""
 
 
 def _benchmark(experiment: str) -> Benchmark:

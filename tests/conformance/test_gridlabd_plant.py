@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
-from gridpeers.papers.singhal2022.tolerances import TABLE
+from gridpeers.papers.singhal2022.tables import TABLE
 from gridpeers.plant.build import start_plant
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network

@@ -6,14 +6,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from gridpeers.papers.singhal2022.experiments.degraded_communication_experiment import degraded_communication
-from gridpeers.papers.singhal2022.experiments.delay_experiment import communication, delay
 from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import hostile
-from gridpeers.papers.singhal2022.experiments.loss_experiment import loss
+from gridpeers.papers.singhal2022.experiments.link_experiments import communication, delay, loss, topology
 from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping, partition
 from gridpeers.papers.singhal2022.experiments.places_experiment import places
-from gridpeers.papers.singhal2022.experiments.topology_experiment import topology
 
 
 @dataclass(frozen=True)

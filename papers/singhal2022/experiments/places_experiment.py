@@ -11,7 +11,6 @@ from itertools import product
 import numpy as np
 
 from gridpeers.measures import Flags, Floats
-from gridpeers.papers.singhal2022.experiments.delay_experiment import ALONE, DELAY, K_Q, WHOLE
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
@@ -21,6 +20,7 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Page,
     Panel,
 )
+from gridpeers.papers.singhal2022.experiments.link_experiments import ALONE, DELAY, K_Q, WHOLE
 from gridpeers.theory import delay_limit, var_delay_limit, var_growth
 
 ON = "link[0].on"

@@ -76,7 +76,7 @@ def _reproduce(
     from gridpeers.cli.interruption import exit_code, interruptible
     from gridpeers.cli.remaining import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
-    from gridpeers.papers.singhal2022.reproduce.report_writing import write
+    from gridpeers.papers.singhal2022.reproduce.report import write
     from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
     from gridpeers.papers.singhal2022.reproduce.work import Work
 
@@ -123,7 +123,7 @@ def _reproduce(
 
 def _summary(whole: object) -> list[str]:
     """Return the end in lines: every claim that does not hold, and the counts."""
-    from gridpeers.papers.singhal2022.headline import headline
+    from gridpeers.papers.singhal2022.paper_benchmarks import headline
     from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
 
     assert isinstance(whole, Reproduction)

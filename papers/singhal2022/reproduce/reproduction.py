@@ -12,10 +12,10 @@ from typing import Any
 
 from gridpeers.benchmarks import Findings, Verdict
 from gridpeers.output_folders import versions
-from gridpeers.papers.singhal2022.claims.topology_claims import graph_runs
-from gridpeers.papers.singhal2022.headline import ComparedNumber, numbers
+from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, numbers
 from gridpeers.papers.singhal2022.reproduce.parts import Part, Picture
 from gridpeers.papers.singhal2022.tables import Cell, PaperTable
+from gridpeers.papers.singhal2022.topology_claims import graph_runs
 
 
 @dataclass(frozen=True, kw_only=True)

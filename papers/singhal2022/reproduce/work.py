@@ -12,12 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import gridpeers as gp
 from gridpeers.benchmarks import Findings, judge
 from gridpeers.cli.remaining import Tell
-from gridpeers.papers.singhal2022.claims import CLAIMS
-from gridpeers.papers.singhal2022.claims.islanding_claims import CASES, EVENTS
-from gridpeers.papers.singhal2022.reproduce import capacitor_banks as banks
-from gridpeers.papers.singhal2022.reproduce import topology_study as topology
+from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.papers.singhal2022.reproduce.parts import Part
 from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult
+from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, bank_study, graphs, topology_study
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.theory import ScenarioModel
 
@@ -107,10 +106,10 @@ class Work:
 
     def _length(self, part: Part) -> float:
         if part.name == "topology":
-            return topology.END_S * sum(1 for _ in topology.graphs(9, self.seed))
+            return END_S * sum(1 for _ in graphs(9, self.seed))
         scenario = self.spec(part.name)
         if part.name == "var-sharing":
-            return scenario.time.end_s * len(banks.BANKS) * len(CASES)
+            return scenario.time.end_s * len(BANKS) * len(CASES)
         return scenario.time.end_s * len(scenario.cases)
 
     def _scenario(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
@@ -132,12 +131,12 @@ class Work:
         folder = self._folder_of(part)
 
         def note(done: int, of: int) -> None:
-            tell(f"topology, {done} of {of} graphs", self._before + done * topology.END_S)
+            tell(f"topology, {done} of {of} graphs", self._before + done * END_S)
 
-        found = topology.study(self.seed, note, jobs=self.jobs, dask=self.dask)
+        found = topology_study(self.seed, note, jobs=self.jobs, dask=self.dask)
         if figures:
             from gridpeers.figures import save
-            from gridpeers.papers.singhal2022.figures.topologies import topologies
+            from gridpeers.papers.singhal2022.figures import topologies
 
             save(topologies(found.graphs), folder, part.pictures[0].stem, FORMATS)
         return found, {}, None, folder
@@ -148,12 +147,12 @@ class Work:
         def note(done: int, of: int) -> None:
             tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
 
-        ours = banks.study(scenario, folder, note, self.jobs, self.dask)
+        ours = bank_study(scenario, folder, note, self.jobs, self.dask)
         cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
         paper = {(cell.case, cell.event): cell.paper for cell in cells}
         if figures:
             from gridpeers.figures import save
-            from gridpeers.papers.singhal2022.figures.var_sharing import var_sharing
+            from gridpeers.papers.singhal2022.figures import var_sharing
 
             save(var_sharing(paper, ours, CASES, EVENTS), folder, part.pictures[0].stem, FORMATS)
         metrics = [

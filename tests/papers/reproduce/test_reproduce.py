@@ -7,14 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.papers.singhal2022.claims import CLAIMS
-from gridpeers.papers.singhal2022.headline import within
+from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, within
 from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
-from gridpeers.papers.singhal2022.reproduce.report_tables import lines
-from gridpeers.papers.singhal2022.reproduce.report_writing import render
+from gridpeers.papers.singhal2022.reproduce.report import lines, render, settings
 from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
-from gridpeers.papers.singhal2022.reproduce.settings import settings
-from gridpeers.papers.singhal2022.reproduce.topology_study import graphs
+from gridpeers.papers.singhal2022.reproduce.studies import graphs
 from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
 from gridpeers.scenarios.results.evaluation.claims import judge
 from gridpeers.scenarios.results.findings import Findings

@@ -3,9 +3,8 @@
 import numpy as np
 
 from gridpeers.benchmarks import Settling, Steady
-from gridpeers.papers.singhal2022.claims.topology_claims import GraphRun
-from gridpeers.papers.singhal2022.figures.topologies import topologies
-from gridpeers.papers.singhal2022.figures.var_sharing import var_sharing
+from gridpeers.papers.singhal2022.figures import topologies, var_sharing
+from gridpeers.papers.singhal2022.topology_claims import GraphRun
 
 
 def graph_run(links: int, t: float | None, *, connected: bool) -> GraphRun:

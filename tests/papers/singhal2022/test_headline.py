@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from gridpeers.papers.singhal2022.headline import headline, numbers
+from gridpeers.papers.singhal2022.paper_benchmarks import headline, numbers
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady

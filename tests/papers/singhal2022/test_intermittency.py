@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gridpeers.papers.singhal2022.claims.intermittency_claims import CLOUDS, CUT
+from gridpeers.papers.singhal2022.plant_claims import CLOUDS, CUT
 
 from .conftest import Experiment, expected
 

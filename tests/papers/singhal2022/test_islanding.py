@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from gridpeers.papers.singhal2022.claims.islanding_claims import EVENTS
+from gridpeers.papers.singhal2022.islanding_claims import EVENTS
 from gridpeers.scenarios.results import metrics
 
 from .conftest import Experiment, expected

@@ -2,8 +2,7 @@
 
 import pytest
 
-from gridpeers.papers.singhal2022.tables import TABLES, Cell
-from gridpeers.papers.singhal2022.tolerances import TABLE
+from gridpeers.papers.singhal2022.tables import TABLE, TABLES, Cell
 
 from .conftest import Experiment
 

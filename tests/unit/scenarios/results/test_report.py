@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.papers.singhal2022.claims import CLAIMS
-from gridpeers.papers.singhal2022.paper_benchmarks import ISLANDING
+from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, judge

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gridpeers.papers.singhal2022.claims import CLAIMS
-from gridpeers.papers.singhal2022.paper_benchmarks import ISLANDING
+from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.scenarios.results.evaluation.claims import judge
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings

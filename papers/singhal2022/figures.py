@@ -1,8 +1,8 @@
-"""Time to share power over random communication graphs: the paper's figure of topologies."""
+"""Figures of no single run: time to share power over random graphs, and MQSI with capacitors at other buses."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.figures import PAGE
-from gridpeers.papers.singhal2022.claims.topology_claims import TREE, GraphRun, medians
+from gridpeers.papers.singhal2022.tables import MQSI_FACTOR
+from gridpeers.papers.singhal2022.topology_claims import TREE, GraphRun, medians
 
 LEAST = 1e-6
 """MPSI below this is drawn as this: on an axis of logarithms there is no 0."""
@@ -62,3 +63,46 @@ def _times(panel: Axes, runs: Sequence[GraphRun], marks: dict[str, Any]) -> None
     panel.plot(never, [0.965] * len(never), transform=panel.get_xaxis_transform(), **marks)
     if never:
         panel.annotate("never", (0.005, 0.965), xycoords="axes fraction", va="center", fontsize=7, color="#444444")
+
+
+_COLOURS = ("#0072b2", "#56b4e9", "#009e73", "#e69f00")
+_MARKERS = "os^D"
+
+EventValues = Mapping[tuple[str, str], float]
+"""MQSI by case and event."""
+
+
+def var_sharing(
+    paper: EventValues, ours: Mapping[str, EventValues], cases: Sequence[str], events: Sequence[str]
+) -> Figure:
+    """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
+
+    The axis is one of logarithms, as MQSI is 100 times smaller in case IV than in case II; marks stand on it instead of
+    bars, which would have no foot there.
+    """
+    with mpl.rc_context(PAGE):
+        figure = Figure(figsize=(7.4, 3.6), layout="constrained")
+        (panels,) = figure.subplots(1, len(events), sharey=True, squeeze=False)
+        for panel, event in zip(panels, events, strict=True):
+            for x, case in enumerate(cases):
+                number = paper[case, event]
+                ends = np.array([number / MQSI_FACTOR.value, number * MQSI_FACTOR.value])
+                panel.fill_between([x - 0.42, x + 0.42], *ends, color="#000000", alpha=0.10, lw=0)
+                panel.hlines(number, x - 0.42, x + 0.42, color="#000000", lw=1.6)
+            for number, (variant, values) in enumerate(ours.items()):
+                at = np.arange(len(cases)) + (number - 0.5 * (len(ours) - 1)) * 0.18
+                heights = [values[case, event] for case in cases]
+                marks = {"marker": _MARKERS[number % 4], "color": _COLOURS[number % 4]}
+                panel.plot(at, heights, lw=0, ms=6, mec="#ffffff", mew=0.5, label=variant, **marks)
+            panel.set_yscale("log")
+            panel.set_xticks(range(len(cases)), [f"case {case}" for case in cases])
+            panel.set_title(f"Var sharing after {event}", loc="left")
+            panel.yaxis.set_major_formatter("{x:g}")
+            panel.grid(visible=False, axis="x")
+        panels[0].set_ylabel("MQSI")
+        handles, labels = panels[0].get_legend_handles_labels()
+        band = panels[0].collections[0]
+        line = panels[0].collections[1]
+        handles, labels = [line, band, *handles], ["the paper", f"a factor of {MQSI_FACTOR.value:g} of it", *labels]
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
+    return figure

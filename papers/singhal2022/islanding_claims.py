@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Findings, Quantity
-from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, ratio, seconds
-from gridpeers.papers.singhal2022.tolerances import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
+from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, ratio, seconds
+from gridpeers.papers.singhal2022.tables import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
 
 CASES = ("I", "II", "III", "IV")
 EVENTS = ("event1", "event2")

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from statistics import median
 
 from gridpeers.benchmarks import MPSI_BAND, Findings, Settling, Steady
-from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims
-from gridpeers.papers.singhal2022.tolerances import FEW_LINKS, SAME_END, STEEPER
+from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims
+from gridpeers.papers.singhal2022.tables import FEW_LINKS, SAME_END, STEEPER
 
 
 @dataclass(frozen=True, kw_only=True)

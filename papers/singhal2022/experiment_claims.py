@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from gridpeers.benchmarks import UNITS, Claim, Findings, Judge, Quantity, label
-from gridpeers.papers.singhal2022.tables import Cell, tables_of
-from gridpeers.papers.singhal2022.tolerances import TABLE, V_RELATIVE, TableNumber
+from gridpeers.papers.singhal2022.tables import TABLE, V_RELATIVE, Cell, TableNumber, tables_of
 
 
 class ExperimentClaims:

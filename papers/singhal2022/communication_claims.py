@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from gridpeers.benchmarks import Findings
-from gridpeers.papers.singhal2022.claims.experiment_claims import ExperimentClaims, listed, seconds
-from gridpeers.papers.singhal2022.tolerances import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
+from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, seconds
+from gridpeers.papers.singhal2022.tables import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
 
 EVENT, RETURN = "event1", "return"
 """Labels of the events in the scenario; the paper has the first alone."""

@@ -1,0 +1,250 @@
+"""Late and lossy links: time to restore f and to share power against delay, loss, and the number of links.
+
+With hold, a state is used until the next one comes. If each is lost with probability p, the mean age is T_c/(1 - p):
+the one period that every state takes, and T_c p/(1 - p) more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES, SweepData, times_of
+from gridpeers.papers.singhal2022.experiments.experiment_output import (
+    Curve,
+    ExperimentResult,
+    ExperimentTable,
+    Page,
+    Panel,
+    TableCell,
+    time_panels,
+)
+from gridpeers.random_graphs import Control, adjacency
+from gridpeers.theory import InverterGroup, predicted_times, var_growth
+
+DELAY, K_Q = "link[0].delay", "gains.k_q"
+WHOLE, ALONE = 0.25, 1e5
+"""k_q of the whole law, and of one that leaves V_set alone."""
+
+X = "delay of every agent-agent link (s)"
+
+
+def delay(sweep: SweepData) -> ExperimentResult:
+    """Return the times against delay, measured and predicted."""
+    cases, delays = list(sweep.base.cases)[:4], sweep.values(DELAY)
+    fine = np.unique(np.concatenate([delays, np.round(np.geomspace(0.02, 1.0, 12), 2)]))
+    theory = {(case, d): sweep.predicted(case, link_delay_s=d) for case in cases for d in fine.tolist()}
+
+    def curves(number: int, index: str) -> list[Curve]:
+        found = []
+        for style, case in enumerate(cases):
+            predicted = np.array([theory[case, d][number] for d in fine.tolist()])
+            found += [
+                Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: WHOLE}), style),
+                Curve(*sweep.curve(DELAY, index, {"case": case, K_Q: ALONE}), style, "hollow"),
+                Curve(fine, predicted, style, "predicted"),
+            ]
+        return found
+
+    page = Page(
+        title="Islanding over late links",
+        panels=time_panels(curves, x_label=X, log="xy", zero=0.02, x_ticks=delays, y_range=(0.3, 40.0)),
+        columns=2,
+        names={style: sweep.base.cases[case].title for style, case in enumerate(cases)},
+        looks={"measured": "measured", "hollow": "measured, V_set left alone", "predicted": "predicted"},
+        share_y=True,
+    )
+    rows: list[list[TableCell]] = []
+    for case in cases:
+        for d in delays:
+            row: list[TableCell] = [case, d]
+            for number, (index, _) in enumerate(INDEXES):
+                measured = [sweep.median(index, {"case": case, DELAY: d, K_Q: k}) for k in (ALONE, WHOLE)]
+                row += [theory[case, d][number], *measured]
+            rows.append(row)
+    columns = ["graph", "delay (s)"]
+    columns += [
+        f"{what}, {how} (s)" for what in ("f", "sharing") for how in ("predicted", "V_set left alone", "whole law")
+    ]
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+
+
+LEFT: tuple[tuple[str, str, Literal["", "y"], tuple[float, float]], ...] = (
+    ("V_error", "mean of abs(V - 1) (pu)", "", (0.0, 0.012)),
+    ("MQSI", "var sharing index, MQSI", "y", (0.003, 1.0)),
+)
+"""Steady values, labels of their axes, and scale and ends of these."""
+
+
+def communication(sweep: SweepData) -> ExperimentResult:
+    """Return the times and steady values against delay, for every case of the scenario."""
+    cases, delays = sweep.rows["case"].unique().tolist(), sweep.values(DELAY)
+    theory = {(case, d): sweep.predicted(case, link_delay_s=d) for case in cases for d in delays}
+
+    def curves(number: int, index: str) -> list[Curve]:
+        found = []
+        for style, case in enumerate(cases):
+            x, y = sweep.curve(DELAY, index, {"case": case})
+            found += [
+                Curve(x, y, style),
+                Curve(x, np.array([theory[case, d][number] for d in delays]), style, "predicted"),
+            ]
+        return found
+
+    panels = time_panels(curves, x_label=X, log="y", y_range=(0.3, 25.0))
+    for index, y_label, log, y_range in LEFT:
+        lines = [Curve(*sweep.curve(DELAY, index, {"case": case}), style) for style, case in enumerate(cases)]
+        title = f"{index} at the end of the run"
+        panels.append(Panel(title=title, x_label=X, y_label=y_label, curves=lines, log=log, y_range=y_range))
+    page = Page(
+        title="Islanding with the paper's reduced communication and link failure, over late links",
+        panels=panels,
+        columns=2,
+        names={style: f"{case}: {sweep.base.cases[case].title}" for style, case in enumerate(cases)},
+        height=2.6,
+    )
+    rows: list[list[TableCell]] = []
+    for case in cases:
+        for d in delays:
+            row: list[TableCell] = [case, d]
+            for number, (index, _) in enumerate(INDEXES):
+                row += [theory[case, d][number], sweep.median(index, {"case": case, DELAY: d})]
+            for name in ("f_error_Hz", "MPSI", "V_error", "MQSI", "V_swing_pu"):
+                row.append(round(sweep.median(name, {"case": case, DELAY: d}), 4))
+            rows.append([*row, round(var_growth(sweep.inverters[case], sweep.response, link_delay_s=d), 2)])
+    columns = (
+        *("case", "delay (s)", "f, predicted (s)", "f (s)", "sharing, predicted (s)", "sharing (s)"),
+        *("abs(f - 60) (Hz)", "MPSI", "V_error (pu)", "MQSI", "swing of V (pu)", "growth of vars, predicted (1/s)"),
+    )
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows, digits=2))
+
+
+DELAY, LOSS = "link[0].delay", "link[0].loss"
+
+
+def loss(sweep: SweepData) -> ExperimentResult:
+    """Return the times against loss, and against mean age, measured and predicted."""
+    cases, T_c = list(sweep.base.cases)[:4], sweep.base.time.T_c_s
+    lost, late = sweep.values(LOSS, {DELAY: 0.0}), sweep.values(DELAY, {LOSS: 0.0})[1:]
+    age_of_loss, ages = np.array([T_c / (1.0 - p) for p in lost]), np.array([T_c, *late])
+    fine = np.linspace(0.0, 0.96, 25)
+    by_loss = {case: np.array([sweep.predicted(case, loss=p) for p in fine.tolist()]) for case in cases}
+    by_age = {case: np.array([sweep.predicted(case, link_delay_s=d) for d in ages.tolist()]) for case in cases}
+
+    def against_loss(number: int, index: str) -> list[Curve]:
+        found = []
+        for style, case in enumerate(cases):
+            x, y = sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})
+            low, high = (sweep.curve(LOSS, index, {"case": case, DELAY: 0.0}, over)[1] for over in (np.min, np.max))
+            found += [
+                Curve(x, y, style, low=low, high=high),
+                Curve(fine, by_loss[case][:, number], style, "predicted"),
+            ]
+        return found
+
+    def against_age(number: int, index: str) -> list[Curve]:
+        found = []
+        for style, case in enumerate(cases):
+            x, y = sweep.curve(DELAY, index, {"case": case, LOSS: 0.0})
+            found += [
+                Curve(age_of_loss, sweep.curve(LOSS, index, {"case": case, DELAY: 0.0})[1], style, "points"),
+                Curve(np.maximum(x, T_c), y, style, "hollow"),
+                Curve(ages, by_age[case][:, number], style, "predicted"),
+            ]
+        return found
+
+    panels = time_panels(against_loss, x_label="probability p that a message is lost", log="y", y_range=(0.3, 25.0))
+    panels += time_panels(
+        against_age,
+        ", against mean age",
+        x_label="mean age of what is used: delay, or T_c/(1 - p) (s)",
+        log="xy",
+        x_ticks=[0.02, 0.04, 0.1, 0.2, 0.4],
+        y_range=(0.3, 25.0),
+    )
+    page = Page(
+        title="Islanding over lossy links, the last state held",
+        panels=panels,
+        columns=2,
+        names={style: sweep.base.cases[case].title for style, case in enumerate(cases)},
+        looks={"measured": "loss: median and range of 3 seeds", "hollow": "delay", "predicted": "predicted"},
+    )
+    rows: list[list[TableCell]] = []
+    for case in cases:
+        for p, age in zip(lost, age_of_loss.tolist(), strict=True):
+            row: list[TableCell] = [case, p, age]
+            same_age = next((d for d in sweep.values(DELAY) if abs(d - age) < 1e-9), 0.0 if p == 0.0 else None)
+            predicted = sweep.predicted(case, loss=p)
+            for number, (index, _) in enumerate(INDEXES):
+                late_cell = "" if same_age is None else sweep.median(index, {"case": case, DELAY: same_age, LOSS: 0.0})
+                row += [predicted[number], sweep.median(index, {"case": case, DELAY: 0.0, LOSS: p}), late_cell]
+            rows.append(row)
+    columns = ["graph", "loss", "mean age (s)"]
+    columns += [f"{w}, {how} (s)" for w in ("f", "sharing") for how in ("predicted", "measured", "delay of that age")]
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=rows))
+
+
+DELAY, GRAPH_LINKS = "link[0].delay", "graph.links"
+PREDICTED = ("predicted f", "predicted sharing")
+"""Columns of the predicted times (s)."""
+
+
+def topology(sweep: SweepData) -> ExperimentResult:
+    """Return the times against the number of links, with and without delay, measured and predicted."""
+    theory = [
+        times_of(predicted_times(on_graph(sweep, edges), link_delay_s=d, load=sweep.load))
+        for edges, d in zip(sweep.rows["graph.edges"], sweep.rows[DELAY], strict=True)
+    ]
+    runs = sweep.rows.assign(**dict(zip(PREDICTED, np.array(theory).T, strict=True)))
+    delays = sweep.values(DELAY)
+
+    def curves(number: int, index: str) -> list[Curve]:
+        found = []
+        for style, d in enumerate(delays):
+            x, y = sweep.curve(GRAPH_LINKS, index, {DELAY: d})
+            low, high = (sweep.curve(GRAPH_LINKS, index, {DELAY: d}, over)[1] for over in (np.min, np.max))
+            rows = runs[runs[DELAY] == d]
+            at = (rows[GRAPH_LINKS] + 0.25 * (-1.0) ** rows["graph.number"]).to_numpy(float)
+            medians = rows.groupby(GRAPH_LINKS)[PREDICTED[number]].median().to_numpy()
+            found += [
+                Curve(x, y, style, low=low, high=np.minimum(high, 1e3)),
+                Curve(at, sweep.measured(index, rows), style, "points"),
+                Curve(x, medians, style, "predicted"),
+            ]
+        return found
+
+    page = Page(
+        title="Random connected graphs",
+        panels=time_panels(
+            curves,
+            x_label="links of the communication graph",
+            log="y",
+            x_ticks=[8, 12, 16, 20, 24, 28, 32, 36],
+            y_range=(0.3, 15.0),
+        ),
+        columns=2,
+        names={style: f"links late by {d:g} s" if d else "links at once" for style, d in enumerate(delays)},
+        looks={"measured": "median and range", "points": "a graph", "predicted": "predicted, median"},
+        share_y=True,
+    )
+    table: list[list[TableCell]] = []
+    for (d, links), rows in runs.groupby([DELAY, GRAPH_LINKS]):
+        row: list[TableCell] = [d, links, len(rows)]
+        for number, (index, _) in enumerate(INDEXES):
+            times = sweep.measured(index, rows)
+            predicted = rows[PREDICTED[number]].median()
+            row += [float(x) for x in (predicted, np.median(times), times.min(), times.max())]
+        table.append(row)
+    columns = ["delay (s)", "links", "graphs"]
+    columns += [f"{w}, {h} (s)" for w in ("f", "sharing") for h in ("predicted", "median", "lowest", "highest")]
+    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table))
+
+
+def on_graph(sweep: SweepData, edges: str) -> InverterGroup:
+    """Return the inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
+    first, rest = zip(*(edge.split("-") for edge in edges.split()), strict=True)
+    control = Control(secondary="all", graph="links", links=tuple(zip(first, rest, strict=True)))
+    rows = {inverter.name: inverter for inverter in sweep.feeder.inverters}
+    return replace(next(iter(sweep.inverters.values())), A=np.array(adjacency(control, rows)))
