@@ -11,23 +11,9 @@ from gridpeers.papers.singhal2022.tables import TABLE, V_RELATIVE, Cell, TableNu
 
 
 class ExperimentClaims:
-    """Claims in the order of their definitions.
+    """Claims of one experiment, named as in the scenario's key `paper`, in the order of their definitions.
 
-    Parameters
-    ----------
-    experiment : str
-        Name of the experiment, as in the scenario's key `paper`.
-    **shared : Any
-        Fields of `gridpeers.Claim` that the decorated claims share.
-
-    Examples
-    --------
-    >>> claims = ExperimentClaims("islanding", source="section 4", events=("event1",))
-    >>> @claims.add("IV restores 60 Hz", cases=("IV",), measures=("f_error_Hz",))
-    ... def IV_restores(found):
-    ...     return found.results["IV"]["event1"].f_error_Hz < 0.01, "0.002 Hz"
-    >>> [(claim.name, claim.text, claim.source) for claim in claims.all]
-    [('IV_restores', 'IV restores 60 Hz', 'section 4')]
+    `shared` are fields of `gridpeers.Claim` that all the decorated claims have.
     """
 
     def __init__(self, experiment: str, **shared: Any) -> None:

@@ -77,8 +77,7 @@ def var_sharing(
 ) -> Figure:
     """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
 
-    The axis is one of logarithms, as MQSI is 100 times smaller in case IV than in case II; marks stand on it instead of
-    bars, which would have no foot there.
+    Marks and not bars: on an axis of logarithms, which MQSI needs, bars have no foot.
     """
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 3.6), layout="constrained")

@@ -87,17 +87,7 @@ class Page:
 
 
 def time_panels(curves: Callable[[int, str], Sequence[Curve]], suffix: str = "", **axes: Any) -> list[Panel]:
-    """Return a panel for each of the two times after islanding.
-
-    Parameters
-    ----------
-    curves : Callable[[int, str], Sequence[Curve]]
-        Makes the curves, given the number of the time (0 or 1) and its name.
-    suffix : str, optional
-        Follows the title of the time.
-    **axes : Any
-        Further fields of the panels.
-    """
+    """Return a panel for each of the two times after islanding; `curves` takes the number of the time and its name."""
     return [
         Panel(title=f"{title}{suffix}", y_label="time after islanding (s)", curves=curves(number, index), **axes)
         for number, (index, title) in enumerate(INDEXES)
@@ -149,23 +139,7 @@ class ExperimentTable:
         write_whole(folder / "table.md", self.markdown())
 
     def markdown(self) -> str:
-        """Return the table as Markdown.
-
-        Examples
-        --------
-        >>> rows = (("full", 0.64123), ("path", None))
-        >>> print(ExperimentTable(columns=("graph", "f (s)"), rows=rows).markdown(), end="")
-        | graph | f (s) |
-        |---|---|
-        | full | 0.641 |
-        | path | never |
-        >>> print(ExperimentTable(columns=("graph", "f (s)"), rows=rows[:1], apart=1).markdown(), end="")
-        **full**
-        <BLANKLINE>
-        | f (s) |
-        |---|
-        | 0.641 |
-        """
+        """Return the table as Markdown."""
         texts = [[self._text(cell) for cell in row] for row in self.rows]
         names = dict.fromkeys(tuple(row[: self.apart]) for row in texts)
         return "\n".join(

@@ -194,15 +194,7 @@ CHOICES = ("tables", "figures", *(part.name for part in PARTS))
 
 
 def chosen(only: str | None) -> tuple[Part, ...]:
-    """Return the parts that are to be run.
-
-    Examples
-    --------
-    >>> [part.name for part in chosen("tables")]
-    ['islanding', 'intermittency', 'reduced-communication', 'microgrid-switching']
-    >>> len(chosen(None)), [part.name for part in chosen("topology")]
-    (8, ['topology'])
-    """
+    """Return the parts that are to be run."""
     if only in (None, "figures"):
         return PARTS
     return tuple(part for part in PARTS if (part.name in WITH_TABLES if only == "tables" else part.name == only))

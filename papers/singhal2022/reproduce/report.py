@@ -21,13 +21,7 @@ from gridpeers.theory import ScenarioModel
 
 
 def settings(scenarios: dict[str, ScenarioModel]) -> list[tuple[str, str, str]]:
-    """Return each setting, its value with the unit, and its reason, for the scenarios of a report.
-
-    Parameters
-    ----------
-    scenarios : dict[str, ScenarioModel]
-        By name of the part.
-    """
+    """Return each setting, its value with the unit, and its reason, for the scenarios of a report by their part."""
     first = next(iter(scenarios.values()))
     gains, time, gfm, gfl = first.gains, first.time, first.plant.gfm, first.plant.gfl
     sets: dict[str, list[str]] = {}
@@ -187,33 +181,13 @@ _TEMPLATES.globals |= {
 
 
 def render(template: str, whole: Reproduction, settings: Sequence[tuple[str, str, str]]) -> str:
-    """Return the text of a report.
-
-    Parameters
-    ----------
-    template : {"report.html.jinja", "report.md.jinja"}
-        Its template in this folder.
-    whole : Reproduction
-        The results.
-    settings : Sequence[tuple[str, str, str]]
-        Name, value and reason of each setting that is not the paper's.
-    """
+    """Return the text of a report by its template in this folder; `settings` are those that are not the paper's."""
     data = {"whole": whole, "settings": settings, "machine": machine(), "versions": versions()}
     return _TEMPLATES.get_template(template).render(data)
 
 
 def write(whole: Reproduction, work: Work, folder: Path) -> None:
-    """Write all files of a reproduction.
-
-    Parameters
-    ----------
-    whole : Reproduction
-        The results.
-    work : Work
-        The runs, for the scenarios they had.
-    folder : Path
-        The report's folder.
-    """
+    """Write all files of a reproduction into the report's folder."""
     (folder / "figures").mkdir()
     results = []
     for result in whole.results:

@@ -47,14 +47,7 @@ TellProgress = Callable[[int, int], None]
 
 
 def graphs(inverters: int, seed: int) -> Iterator[Edges]:
-    """Return all graphs of the study, those that are not connected first.
-
-    Examples
-    --------
-    >>> drawn = list(graphs(9, seed=1))
-    >>> len(drawn), sorted({len(edges) for edges in drawn})
-    (81, [4, 5, 6, 7, 8, 9, 10, 12, 16, 24, 36])
-    """
+    """Return all graphs of the study, those that are not connected first."""
     for links in BELOW:
         for number in range(PER_COUNT_BELOW):
             rng = random.Random(f"{seed}/below/{links}/{number}")
@@ -67,19 +60,7 @@ def graphs(inverters: int, seed: int) -> Iterator[Edges]:
 
 
 def topology_study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str = "") -> GraphFindings:
-    """Run the islanding of case IV on every graph, always in one process each.
-
-    Parameters
-    ----------
-    seed : int
-        Of the graphs.
-    tell : TellProgress
-        Is called with the progress.
-    jobs : int or None
-        How many runs at a time; None is one per core, or one where joblib is not installed.
-    dask : str, optional
-        Address of a Dask scheduler to use instead.
-    """
+    """Run the islanding of case IV on every graph, in one process each; `jobs` and `dask` as of `gridpeers.sweep`."""
     scenario = gp.load("islanding")
     names = scenario.inverters
     drawn = list(graphs(len(names), seed))
@@ -133,20 +114,9 @@ BANKS: dict[str, dict[str, int]] = {
 def bank_study(
     base: gp.Scenario, folder: Path, tell: Callable[[int, int], None], jobs: int | None, dask: str = ""
 ) -> dict[str, EventValues]:
-    """Run all cases over all variants, and return their MQSI by variant, case and event.
+    """Run all cases of the islanding over all variants, and return their MQSI by variant, case and event.
 
-    Parameters
-    ----------
-    base : Scenario
-        The islanding.
-    folder : Path
-        Takes the variants' feeders.
-    tell : Callable[[int, int], None]
-        Is called with the number of runs that are done, and of all runs.
-    jobs : int or None
-        Runs at a time; None is one per core, or one where joblib is not installed.
-    dask : str, optional
-        Address of a Dask scheduler to use instead.
+    The folder takes the variants' feeders; `jobs` and `dask` as of `gridpeers.sweep`.
     """
     standard = feeder_folder(base.spec.plant.feeder)
     feeders = {

@@ -31,22 +31,10 @@ FORMATS: tuple[Format, ...] = ("png", "pdf", "svg")
 
 
 class Work:
-    """The runs of some parts.
+    """The runs of some parts, each in a folder of its own; the topologies are always run without processes.
 
-    Parameters
-    ----------
-    parts : tuple[Part, ...]
-        What to run.
-    driver : ReproduceDriver
-        How; the topologies are always run without processes.
-    folder : Path
-        Takes the runs' folders.
-    seed : int or None
-        In place of the scenarios' own.
-    jobs : int
-        Runs of the topologies at a time.
-    dask : str, optional
-        Address of a Dask scheduler for these instead.
+    `seed` is in place of the scenarios' own; `jobs` and `dask` are for the studies of many runs, as of
+    `gridpeers.sweep`.
     """
 
     def __init__(
