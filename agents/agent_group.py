@@ -41,12 +41,6 @@ class AgentGroup:
         self._listens = self._meet(configs)
         self._journals: dict[str, DecisionJournal] = {}
         """Journal of each agent, if they keep any."""
-        self._usual: set[str] = set()
-        """Agents that decide as usual: with the last states of all in-neighbours, each with the same weight."""
-        self._counts = [len(names) for names in self._listens.values()]
-        """Number of in-neighbours of each agent."""
-        self._all_told = False
-        """Whether all agents had a state for their neighbours at the last tick."""
         self._parts: Counter[str] = Counter()
         """Number of parts of each agent's journal that were taken."""
         self._changed: list[State] = []
@@ -76,8 +70,8 @@ class AgentGroup:
         """Return the decision of each agent that has a measurement of this tick."""
         agents, neighbours = self._agents, self._neighbours
         states = [agents[measured.to].tick(measured, neighbours[measured.to]) for measured in measurements]
-        if self._journals:
-            self._note_decisions(states)
+        if journals := self._journals:
+            self._changed += [s for s in states if journals[s.sender].tick(s.seq, 0, neighbours[s.sender])]
         told = {state.sender: state for state in states if not (state.idle or state.quiet)}
         self._board.update(told)
         if self._notes_arrivals:
@@ -85,10 +79,7 @@ class AgentGroup:
                 for other in self._listens[name]:
                     if other in told:
                         agent.hear(told[other])
-        if self._neighbours is not self._listens:
-            self._neighbours = self._listens
-            self._usual.clear()
-        self._all_told = len(told) == len(agents)
+        self._neighbours = self._listens
         return states
 
     def take_journals(self) -> tuple[Journal, ...]:
@@ -103,21 +94,3 @@ class AgentGroup:
                 journals.append(Journal(sender=name, epoch=state.epoch, seq=self._parts[name], t=state.t, data=data))
                 self._parts[name] += 1
         return tuple(journals)
-
-    def _note_decisions(self, states: Sequence[State]) -> None:
-        """Note how each agent decided, where that changed; mostly a look at all of them suffices."""
-        if (
-            self._all_told
-            and len(self._usual) == len(states)
-            and [len(agent.around) for agent in self._agents.values()] == self._counts
-        ):
-            return
-        for state in states:
-            name = state.sender
-            journal = self._journals[name]
-            if journal.tick(state.seq, 0, self._neighbours[name]):
-                self._changed.append(state)
-            if journal.is_usual:
-                self._usual.add(name)
-            else:
-                self._usual.discard(name)

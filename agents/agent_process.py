@@ -28,6 +28,17 @@ AgentProcess = AgentConfig | tuple[AgentConfig, ...]
 """Configuration of a process: one agent, or several."""
 
 
+AnyAgent = RealtimeAgent | LockstepAgent
+
+OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
+"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
+are copied, or files closed."""
+
+RUN_ENDS = 0.1
+"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
+does so first, and an agent that was still there has not left."""
+
+
 def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     """Take part in a run until it ends; return why an agent could not continue, empty if the run ended with a `Stop`.
 
@@ -97,17 +108,6 @@ def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
         except ValueError as error:
             raise ConfigurationError(f"{config.name}: {error}") from None
     return made
-
-
-AnyAgent = RealtimeAgent | LockstepAgent
-
-OPENED_AGAIN, OPENED_WITHIN = 1.0, 60.0
-"""Time (s) between two tries to open a session in place of a broken one, and time (s) for all of them: meanwhile keys
-are copied, or files closed."""
-
-RUN_ENDS = 0.1
-"""Time (s) for which an agent that was started with its run goes on once it is asked to end: if the run ends, its plant
-does so first, and an agent that was still there has not left."""
 
 
 class AgentSessions:

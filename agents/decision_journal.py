@@ -29,14 +29,6 @@ class DecisionJournal:
         """Its in-neighbours if it says nothing but that: all of the tick before, none weighed; else None."""
         self._weighs = not agent.weighs_alike
 
-    @property
-    def is_usual(self) -> bool:
-        """Whether the agent decided with the states of the tick before of all in-neighbours, and will be so again."""
-        measurement, unused, weights, _ = self._others or (0, [], [], None)
-        all_new = not any(age != 1 for age in self._states)
-        alike = self._agent.weighs_alike and not self._agent.watches_saturation
-        return all_new and alike and not (measurement or unused or weights)
-
     def tick(self, tick: int, measurement: int, neighbours: Sequence[str]) -> bool:
         """Note the decision of a tick of simulated time if it was made otherwise than the last; return whether it was.
 

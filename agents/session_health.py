@@ -83,24 +83,25 @@ class SessionHealth:
         `roster` has the agents that the plant hears, as the last measurement says, None if there is no recent one;
         `met` those whose nameplate is known, and `neighbours` those of them that the agent listens to.
         """
-        others = () if roster is None else _expected(roster, self._name, met, neighbours)
+        own = self._name
+        # Something must come of neighbours, and of those of which nothing is known.
+        others = [name for name in roster or () if name != own and (name not in met or name in neighbours)]
         silent = self._silent(roster, others, now)
         self._patience.whole |= roster is not None and not silent
-        half = 2 * len(silent) <= len(others)
-        lost = self._patience.lost({name: self._stagger(name) if half else 0.0 for name in silent}, now)
+        waits = {  # how much longer (s) each is waited for, so that one agent goes first
+            name: 0.0 if name in (PLANT, own) or 2 * len(silent) > len(others) else STAGGER * (1 + (name < own))
+            for name in silent
+        }
+        lost = self._patience.lost(waits, now)
         for name in silent:
             key, at = self._crossed.get(name, ("", -inf))
             if self._ran and now - at <= SILENT:
                 return f"messages of {name} come under the key of {key}"
         if lost in ("", PLANT):
             return lost and "nothing comes from the plant"
-        if lost == self._name:
+        if lost == own:
             return "the plant is heard, but does not hear this agent"
         return f"the plant hears {lost}, but nothing comes from it here"
-
-    def _stagger(self, missed: str) -> float:
-        """Return how much longer (s) to wait for a silent name, so that its agent opens the new session first."""
-        return 0.0 if missed in (PLANT, self._name) else STAGGER * (1 + (missed < self._name))
 
     def _silent(self, roster: Sequence[str] | None, others: Sequence[str], now: float) -> tuple[str, ...]:
         """Return the silent names: the plant, agents that it hears, or the agent itself, if it is unheard there."""
@@ -111,8 +112,3 @@ class SessionHealth:
         self._ran = True
         unheard = () if self._name in roster else (self._name,)
         return *unheard, *(name for name in others if now - self._came.get(name, -inf) > SILENT)
-
-
-def _expected(roster: Sequence[str], own: str, met: Collection[str], neighbours: Collection[str]) -> tuple[str, ...]:
-    """Return the agents of a roster of which something must come: neighbours, and those of which nothing is known."""
-    return tuple(name for name in roster if name != own and (name not in met or name in neighbours))

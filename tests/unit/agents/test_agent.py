@@ -95,6 +95,7 @@ def test_set_points_accumulate_in_the_island() -> None:
 
 @pytest.mark.parametrize(("secondary", "name", "moves"), [
     ("none", "inv1", False), ("GFM", "inv1", True), ("GFM", "inv2", False), ("all", "inv1", True),
+    (("inv1",), "inv1", True), (("inv2",), "inv1", False),
 ])  # fmt: skip
 def test_only_who_takes_part_moves(secondary: Any, name: str, moves: bool) -> None:
     """Cases I to IV: the others keep the set-points that the plant holds (inv1 is a GFM, inv2 a GFL)."""

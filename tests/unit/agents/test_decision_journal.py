@@ -19,8 +19,8 @@ NEIGHBOURS = ("inv2", "inv3", "inv4", "inv5")
 class Deciding:
     """An agent as its decision journal sees it."""
 
-    def __init__(self, *, weighs_alike: bool = True, watches_saturation: bool = False) -> None:
-        self.weighs_alike, self.watches_saturation = weighs_alike, watches_saturation
+    def __init__(self, *, weighs_alike: bool = True) -> None:
+        self.weighs_alike = weighs_alike
         self.heard: dict[str, Any] = {}
         self.around: list[Any] = []
         self.saturated = (0, 0)
@@ -53,7 +53,6 @@ def test_in_ticks_only_what_changes_is_noted() -> None:
         agent.hear(tick - 1, *NEIGHBOURS)
         agent.use(*NEIGHBOURS)
         assert agent.journal.tick(tick, 0, NEIGHBOURS) == (tick == 1)
-    assert agent.journal.is_usual
 
     (entry,) = agent.noted()
     assert (entry.tick, entry.measurement, entry.neighbours) == (1, 0, list(NEIGHBOURS))
@@ -83,7 +82,6 @@ def test_in_ticks_each_change_is_noted(what: str) -> None:
         agent.saturated,
         list(names),
     )
-    assert agent.journal.is_usual == (what in ("saturated", "fewer", "another"))
 
 
 def test_in_ticks_each_reason_is_its_own() -> None:
@@ -99,7 +97,6 @@ def test_in_ticks_each_reason_is_its_own() -> None:
     (entry,) = agent.noted()
     assert entry.states == [1, None, 4, 4]
     assert entry.unused == ["", "silent", "stale", "island"]
-    assert not agent.journal.is_usual
 
 
 def test_out_of_service_no_state_is_stale() -> None:
@@ -146,4 +143,3 @@ def test_weights_are_noted_of_all_neighbours(realtime: bool) -> None:
 
     (entry,) = agent.noted()
     assert entry.weights == [0.5, 0.0, 0.5, 0.0]
-    assert not agent.journal.is_usual
