@@ -33,32 +33,26 @@ class Member(Protocol):
     @property
     def kind(self) -> str:
         """Kind: "GFM" or "GFL"."""
-        ...
 
     @property
     def microgrid(self) -> str:
         """Name of the microgrid."""
-        ...
 
     @property
     def P_rated(self) -> float:
         """Rated power (W)."""
-        ...
 
     @property
     def V_nom(self) -> float:
         """Nominal terminal voltage (V, line-to-neutral)."""
-        ...
 
     @property
     def m_p(self) -> float:
         """P-f droop (pu per pu)."""
-        ...
 
     @property
     def m_q(self) -> float:
         """Q-V droop (pu per pu)."""
-        ...
 
 
 Members = Mapping[str, Member]

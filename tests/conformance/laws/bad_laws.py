@@ -80,8 +80,6 @@ class Failing(gp.Law):
             case "forks":
                 os.fork()
                 return gp.SetPoints(own.P_set, own.V_set)
-            case "fails late":
-                return gp.SetPoints(own.P_set, own.V_set) if own.t < 1.47 else gp.SetPoints([][0], 1.0)
             case "hangs":
                 while True:
                     pass
