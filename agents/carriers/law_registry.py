@@ -69,6 +69,7 @@ def close_laws(laws: Iterable[Law]) -> None:
     """End some laws; programs are all asked before the first is waited for."""
     ended = tuple(laws)
     for law in ended:
-        getattr(law, "end_input", lambda: None)()
+        if end_input := getattr(law, "end_input", None):  # only a program has one
+            end_input()
     for law in ended:
         law.close()
