@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gridpeers.measures import Floats, Settling
+from gridpeers.measures import Floats
 from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, cut_between, times_of, without
 from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
@@ -105,7 +105,9 @@ def _table(runs: CaseData, start: float, event: float, end: float) -> Experiment
             theory = round(1e3 * (float(f[-1]) - runs.feeder.f_nom), 1), round(float(MPSI[-1]), 3)
         largest = 1e3 * float(np.abs(runs.f(case)[t > end] - runs.feeder.f_nom).max())
         shared = runs.mean(runs.MPSI(case), case, end)
-        rows.append([rule.title, theory[0], apart, theory[1], round(shared, 3), *_back(after), round(largest, 1)])
+        rows.append(
+            [rule.title, theory[0], apart, theory[1], round(shared, 3), after.t_f_s, after.t_share_s, round(largest, 1)]
+        )
     columns = (
         "case",
         "f - 60 before it ends, predicted (mHz)",
@@ -117,10 +119,6 @@ def _table(runs: CaseData, start: float, event: float, end: float) -> Experiment
         "largest abs(f - 60) after (mHz)",
     )
     return ExperimentTable(columns=columns, rows=rows)
-
-
-def _back(after: Settling) -> tuple[TableCell, TableCell]:
-    return after.t_f_s, after.t_share_s
 
 
 def flapping(runs: CaseData) -> ExperimentResult:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -22,6 +22,9 @@ from gridpeers.cli.usage import (
     terminal,
 )
 from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, chosen
+
+if TYPE_CHECKING:
+    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
 
 
 def reproduce(
@@ -60,17 +63,6 @@ def reproduce(
         check_choice("--only: ", "part", only, CHOICES)
     packages = RUN | ({"joblib": "--dask", "distributed": "--dask"} if dask else {})
     require(packages | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
-    _reproduce("inprocess" if driver == "inprocess" else "processes", only, seed, jobs, dask, out)
-
-
-def _reproduce(
-    driver: Literal["processes", "inprocess"],
-    only: str | None,
-    seed: int | None,
-    jobs: int | None,
-    dask: str,
-    out: Path | None,
-) -> None:
     from datetime import datetime
 
     from gridpeers.cli.interruption import exit_code, interruptible
@@ -78,7 +70,7 @@ def _reproduce(
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
     from gridpeers.papers.singhal2022.reproduce.report import write
     from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
-    from gridpeers.papers.singhal2022.reproduce.work import Work
+    from gridpeers.papers.singhal2022.reproduce.work import ReproduceDriver, Work
 
     now = datetime.now().astimezone()
     try:
@@ -87,7 +79,8 @@ def _reproduce(
         fail([str(error)], BAD_INPUT)
 
     console = terminal()
-    work = Work(chosen(only), driver, folder / "runs", seed, jobs, dask)
+    by: ReproduceDriver = "inprocess" if driver == "inprocess" else "processes"
+    work = Work(chosen(only), by, folder / "runs", seed, jobs, dask)
     results = []
     try:
         with interruptible():
@@ -121,12 +114,10 @@ def _reproduce(
     raise typer.Exit(CLAIM_FAILED if whole.failed else PASSED)
 
 
-def _summary(whole: object) -> list[str]:
+def _summary(whole: Reproduction) -> list[str]:
     """Return the end in lines: every claim that does not hold, and the counts."""
     from gridpeers.papers.singhal2022.paper_benchmarks import headline
-    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
 
-    assert isinstance(whole, Reproduction)
     lines = []
     for result in whole.results:
         for verdict in result.verdicts:
