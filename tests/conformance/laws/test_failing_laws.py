@@ -20,24 +20,11 @@ BAD = "tests.conformance.laws.bad_laws"
 
 @pytest.mark.parametrize(("how", "said"), [
     ("raises", r"step at t = 1.2 s raised ZeroDivisionError: division by zero"),
-    ("nan", r"step at t = 1.2 s returned P_set = nan; it must be a finite number \(pu\)"),
     ("nothing", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
     ("replaces the output", r"step at t = 1.2 s returned None; return SetPoints\(P_set=..., V_set=...\)"),
-    ("text", r"step at t = 1.2 s returned P_set = '0.5'; it must be a number"),
-    ("a list", r"step at t = 1.2 s returned V_set = \[1.0\]; it must be a number"),
-    ("too great a number", r"step at t = 1.2 s returned P_set = 10{96}...; it must be a number"),
     ("leaves", r"step at t = 1.2 s raised SystemExit: 3"),
-    ("panics", r"step at t = 1.2 s raised ForeignError: PanicException: no index"),
-    ("raises what cannot be told", r"step at t = 1.2 s raised UntoldError: its text cannot be had"),
-    ("returns what cannot be shown", r"step at t = 1.2 s returned a Unshown that cannot be shown; return SetPoints.*"),
-    ("is a generator", r"step at t = 1.2 s returned <generator object Failing.*>>; return .*"),
-    ("sends an array", r"step at t = 1.2 s returned SetPoints.*, which raised ValueError: The truth value of an.*"),
-    ("shares nothing", r"step at t = 1.2 s shares None; share at most 16 numbers by name"),
-    ("shares an array", r"step at t = 1.2 s shares array\(\[1., 2.\]\); share at most 16 numbers by name"),
     ("hangs in spite of all", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
     ("hangs", r"step at t = 1.2 s took longer than time_limit_s = 0.3 s"),
-    ("shares too much", r"step at t = 1.2 s shares .*; share at most 16 numbers by name"),
-    ("shares a sentence", r"step at t = 1.2 s shares 'a b'; a name has up to 32 letters, digits and _"),
     ("forks", r"step at t = 1.2 s forked a process; start a program instead \(subprocess\)"),
 ])  # fmt: skip
 def test_a_class_that_fails_is_named_and_the_run_goes_on(how: str, said: str) -> None:

@@ -1,0 +1,71 @@
+"""Whatever a step raises or returns, one line tells it with the time, and what would be right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gridpeers.agents.carriers.time_limit import TimeLimited
+from gridpeers.agents.laws.call import LawError, decide
+from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints
+
+OWN = Own("inv1", True, 1.2, 0.5, 0.0, 1.0, -0.001, 0.0, 0.5, 1.0, 0.01, 0.05, 6e5, 277.0, 60.0)
+
+
+class UntoldError(Exception):
+    """An error whose text fails."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no text")
+
+
+class PanicException(BaseException):
+    """What a library written in Rust raises when it panics."""
+
+
+class Unshown:
+    """An object that cannot be shown."""
+
+    def __repr__(self) -> str:
+        raise RuntimeError("no text")
+
+
+def shares(shared: Any) -> SetPoints:
+    """A decision with these values for the neighbours."""
+    return SetPoints(0.5, 1.0, shared)
+
+
+def raises(error: BaseException) -> Any:
+    """Raise it."""
+    raise error
+
+
+@pytest.mark.parametrize(("answer", "said"), [
+    (lambda: SetPoints(float("nan"), 1.0), r"returned P_set = nan; it must be a finite number \(pu\)"),
+    (lambda: SetPoints("0.5", 1.0), r"returned P_set = '0.5'; it must be a number"),  # type: ignore[arg-type]
+    (lambda: SetPoints(0.5, [1.0]), r"returned V_set = \[1.0\]; it must be a number"),  # type: ignore[arg-type]
+    (lambda: SetPoints(10**400, 1.0), r"returned P_set = 10{96}...; it must be a number"),
+    (lambda: raises(PanicException("no index")), r"raised ForeignError: PanicException: no index"),
+    (lambda: raises(UntoldError()), r"raised UntoldError: its text cannot be had"),
+    (Unshown, r"returned a Unshown that cannot be shown; return SetPoints"),
+    (lambda: (SetPoints(0.5, 1.0) for _ in "1"), r"returned <generator object .*>>; return "),
+    (lambda: SetPoints(0.5, 1.0, {}, np.array([1.0, 2.0])),  # type: ignore[arg-type]
+     r"returned SetPoints.*, which raised ValueError: The truth value of an"),
+    (lambda: shares(None), r"shares None; share at most 16 numbers by name"),
+    (lambda: shares(np.array([1.0, 2.0])), r"shares array\(\[1., 2.\]\); share at most 16 numbers by name"),
+    (lambda: shares({f"x{i}": 0.0 for i in range(17)}), r"shares .*; share at most 16 numbers by name"),
+    (lambda: shares({"a b": 1.0}), r"shares 'a b'; a name has up to 32 letters, digits and _"),
+])  # fmt: skip
+def test_a_step_that_is_no_decision_is_told_in_one_line(answer: Callable[[], Any], said: str) -> None:
+    """What a class can do wrong by problem; `tests/conformance/laws` has what becomes of the run."""
+
+    class Answers(Law):
+        def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
+            return answer()  # type: ignore[no-any-return]
+
+    with pytest.raises(LawError, match=f"^step at t = 1.2 s {said}") as told:
+        decide(TimeLimited(Answers(), 10.0), OWN, (), 0.02)
+    assert "\n" not in str(told.value)
