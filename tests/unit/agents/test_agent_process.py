@@ -12,7 +12,7 @@ from typing import Any, cast
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.agents import agent_sessions
+from gridpeers.agents import agent_process
 from gridpeers.agents.agent_process import _opened, run_agents, take_part
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.agents.session_health import SessionHealth
@@ -134,7 +134,7 @@ def test_an_agent_that_is_asked_to_end_between_two_sessions_leaves_over_a_new_on
     """Without one the plant took it for dead, and its inverter stayed on; no session stays open behind it."""
     problems = iter(["the test breaks it"])
     monkeypatch.setattr(SessionHealth, "problem", lambda *given, **named: next(problems, ""))
-    monkeypatch.setattr(agent_sessions, "Session", Measuring)
+    monkeypatch.setattr(agent_process, "Session", Measuring)
     Measuring.opened, Measuring.asked, Measuring.numbers = [], asked, count()
 
     with pytest.raises(StoppedError, match="SIGTERM"):
@@ -149,7 +149,7 @@ def test_a_second_request_to_end_between_two_sessions_is_not_put_off(monkeypatch
     """Whoever asks again does not want to wait for the plant."""
     problems = iter(["the test breaks it"])
     monkeypatch.setattr(SessionHealth, "problem", lambda *given, **named: next(problems, ""))
-    monkeypatch.setattr(agent_sessions, "Session", Measuring)
+    monkeypatch.setattr(agent_process, "Session", Measuring)
     monkeypatch.setattr(Measuring, "_ask", _ask_in_each_but_the_first)
     Measuring.opened, Measuring.numbers = [], count()
 
@@ -176,9 +176,9 @@ def test_a_session_in_place_of_a_broken_one_is_tried_again(
             raise SessionError(f"{name}: no key")
         return session
 
-    monkeypatch.setattr(agent_sessions, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(agent_sessions, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
-    monkeypatch.setattr(agent_sessions, "Session", refusing)
+    monkeypatch.setattr(agent_process, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(agent_process, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
+    monkeypatch.setattr(agent_process, "Session", refusing)
 
     assert _opened(agent_config("inv1"), None, again=True) is session
     assert [record.getMessage() for record in caplog.records] == ["inv1: no key; tries again for up to 60 s"]
@@ -195,9 +195,9 @@ def test_a_session_that_cannot_be_opened_again_ends_the_agent(monkeypatch: pytes
     def refusing(name: str, **words: Any) -> str:
         raise SessionError(f"{name}: no key")
 
-    monkeypatch.setattr(agent_sessions, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(agent_sessions, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
-    monkeypatch.setattr(agent_sessions, "Session", refusing)
+    monkeypatch.setattr(agent_process, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(agent_process, "sleep", lambda s: clock.__setitem__(0, clock[0] + s))
+    monkeypatch.setattr(agent_process, "Session", refusing)
 
     with pytest.raises(SessionError, match="inv1: no key"):
         _opened(agent_config("inv1"), None, again=True)
