@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
 from gridpeers.wire.backlog import Loss
-from gridpeers.wire.driver.foreign import keep_thread_state
 from gridpeers.wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.driver.large_blocks import give_back_freed
@@ -380,12 +379,7 @@ class Session:
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
         """Run a callback in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
-
-        def from_zenoh(item: Any) -> None:
-            keep_thread_state()
-            callback(item)
-
-        return self._zenoh.handlers.Callback(from_zenoh, indirect=False)
+        return self._zenoh.handlers.Callback(callback, indirect=False)
 
 
 def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
