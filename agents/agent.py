@@ -225,7 +225,7 @@ class Agent:
         return neighbours
 
     def hear(self, state: State) -> None:
-        """Note the latest state of an agent with a nameplate; `gridpeers.wire.admission` has checked the sender."""
+        """Note the latest state of an agent with a nameplate; `gridpeers.wire.membership` has checked the sender."""
         if state.quiet:
             return  # its law sends nothing: its last state stays valid
         self.heard[state.sender] = state

@@ -11,8 +11,7 @@ from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Nameplate
 from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.schema.plausible import Plausible, Range, Unit
-from gridpeers.wire.schema.relations import Below
-from gridpeers.wire.schema.table_schema import NO_KEY, Example, Label
+from gridpeers.wire.schema.table_schema import NO_KEY, Below, Example, Label
 from gridpeers.wire.trust.credentials import Credentials
 
 MAX_AGE = 0.25
@@ -184,7 +183,7 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     star: bool = False
     """Whether the plant relays all messages, in simulated time: the agents have one link each."""
     epoch: int = 1
-    """Epoch of this process; see `gridpeers.wire.admission`."""
+    """Epoch of this process; see `gridpeers.wire.membership`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the plant, or real time."""
     speed: float = 1.0

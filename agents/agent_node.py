@@ -12,11 +12,10 @@ from math import inf
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import AgentConfig, check_nameplate
 from gridpeers.agents.laws.law import Law
-from gridpeers.wire.actions import Listen
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import Links, arrived, is_usable
 from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
-from gridpeers.wire.node import Route
+from gridpeers.wire.node import Listen, Route
 from gridpeers.wire.plant_follower import PlantFollower
 
 
@@ -88,7 +87,7 @@ class AgentNode(PlantFollower):
     law : Law or None
         Law that decides the set-points; None is the paper's.
     rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
     """
 
     def __init__(

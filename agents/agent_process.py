@@ -17,8 +17,8 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.lockstep_agent import LockstepAgent
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError, drive, serve
+from gridpeers.wire.driver.machine import schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
-from gridpeers.wire.driver.scheduling import schedule_as_batch
 from gridpeers.wire.driver.session import Session, SessionError
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.node_group import NodeGroup

@@ -19,12 +19,10 @@ from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.wire.plugins.anybody import ANYTHING, line_of, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, line_of, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made
 from gridpeers.wire.plugins.registry import PluginError, Registry
-from gridpeers.wire.printable import printable
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import printable, suggestion
 
 
 class Member(Protocol):

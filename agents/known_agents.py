@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from gridpeers.agents.agent_config import Control
 from gridpeers.agents.graphs import RosterGraph, rule_of, without_missing
-from gridpeers.wire.admission import Admission
-from gridpeers.wire.membership import Membership
+from gridpeers.wire.membership import Admission, Membership
 from gridpeers.wire.messages import Nameplate, Prepare
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 
 class LinkCommandReceiver:

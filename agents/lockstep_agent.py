@@ -22,8 +22,7 @@ from gridpeers.wire.links import REPORT_TICKS, Links
 from gridpeers.wire.membership import ASKED_AT_ONCE
 from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Nameplate, Prepare, Ready, State, Stop, Waiting
 from gridpeers.wire.node import Route
-from gridpeers.wire.timing.clock import time_of
-from gridpeers.wire.timing.tick_barrier import Awaited, TickBarrier
+from gridpeers.wire.timing import Awaited, TickBarrier, time_of
 
 CLOSING = 2.0
 """Longest wait (s) for the neighbours' last states, and for the acknowledgement of the report on emulated links."""

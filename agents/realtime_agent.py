@@ -31,11 +31,11 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.agents.link_command_receiver import LinkCommandReceiver
 from gridpeers.agents.session_health import SessionHealth
 from gridpeers.agents.tick_timer import TickTimer
-from gridpeers.wire.admission import FASTER
 from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.links import REPORT_TICKS, Links
+from gridpeers.wire.membership import FASTER
 from gridpeers.wire.messages import (
     PLANT,
     AgentStatus,
@@ -49,9 +49,9 @@ from gridpeers.wire.messages import (
     Waiting,
 )
 from gridpeers.wire.node import CLOCK_ALONE, Route
-from gridpeers.wire.printable import printable
-from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.timing import Timer
 from gridpeers.wire.traffic import TimedTraffic
+from gridpeers.wire.wording import printable
 
 Phase = Literal["seeking", "waiting", "running"]
 

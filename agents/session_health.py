@@ -1,7 +1,7 @@
 """Detect a broken Zenoh session: agents that should be heard but are not, or an agent that nobody hears. Pure.
 
 Each measurement lists the agents that the plant hears. If a neighbour on that list is silent here, or the agent itself
-is not on it, the session fails (`gridpeers.wire.timing.session_deadline`).
+is not on it, the session fails (`gridpeers.wire.timing`).
 
 Both ends of a link see that it fails, and one new session mends it: that of the agent for which most others are silent.
 So an agent that misses no more than half of the others waits `STAGGER` longer, and again if the name of the one it
@@ -16,7 +16,7 @@ from collections.abc import Collection, Sequence
 from math import inf
 
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.timing.session_deadline import SessionDeadline
+from gridpeers.wire.timing import SessionDeadline
 
 SILENT = 1.0
 """Time (s) without a message after which the plant, or a neighbour that it hears, is silent."""

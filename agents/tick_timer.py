@@ -8,7 +8,7 @@ middle half of the period between two measurements, as an inverter's controller 
 
 from __future__ import annotations
 
-from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.timing import Timer
 
 EARLIEST, LATEST = 0.25, 0.75
 """Bounds of the middle half."""

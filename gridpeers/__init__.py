@@ -143,7 +143,7 @@ if not TYPE_CHECKING:
 
             return version("gridpeers")
         if name not in _HOME:
-            from gridpeers.wire.schema.suggestion import suggestion
+            from gridpeers.wire.wording import suggestion
 
             raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
         module, _, attributes = _HOME[name].partition(":")

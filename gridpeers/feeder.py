@@ -166,7 +166,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from gridpeers.plant.tables.parameter_sets import as_set
         from gridpeers.plant.tables.shunts import problems_of
-        from gridpeers.wire.schema.suggestion import suggestion
+        from gridpeers.wire.wording import suggestion
 
         bus = str(bus)  # many buses have a number as their name
         found = {one.name: one for one in self.buses}.get(bus)

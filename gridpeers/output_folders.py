@@ -22,8 +22,8 @@ from gridpeers.scenarios.results.run_files import (
     write_whole,
 )
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.driver.output import OutputLostError
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.driver.ending import OutputLostError
+from gridpeers.wire.wording import suggestion
 
 __all__ = [
     "RUNS",

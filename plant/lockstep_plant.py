@@ -30,7 +30,6 @@ from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode
 from gridpeers.plant.telemetry_reporter import measurement_of
 from gridpeers.plant.unacknowledged_telemetry import UnacknowledgedTelemetry
-from gridpeers.wire.actions import Publish
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
 from gridpeers.wire.messages import (
@@ -47,8 +46,8 @@ from gridpeers.wire.messages import (
     State,
     Waiting,
 )
-from gridpeers.wire.node import ANYBODY, Route
-from gridpeers.wire.timing.tick_barrier import Awaited, TickBarrier
+from gridpeers.wire.node import ANYBODY, Publish, Route
+from gridpeers.wire.timing import Awaited, TickBarrier
 from gridpeers.wire.traffic import TickTraffic
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]

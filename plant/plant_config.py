@@ -202,7 +202,7 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     recorders: tuple[str, ...] = ()
     """Recorders of the telemetry that the plant waits for before tick 0."""
     epoch: int = 1
-    """Epoch of this process; see `gridpeers.wire.admission`."""
+    """Epoch of this process; see `gridpeers.wire.membership`."""
     clock: Literal["simulated", "wall"] = "simulated"
     """Lock-step with the agents, or real time."""
     speed: float = 1.0

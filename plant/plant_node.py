@@ -21,8 +21,8 @@ from gridpeers.wire.keys import check_name
 from gridpeers.wire.links import Links, arrived
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
 from gridpeers.wire.node import Node
-from gridpeers.wire.printable import printable
-from gridpeers.wire.timing.clock import ticks_until, time_of
+from gridpeers.wire.timing import ticks_until, time_of
+from gridpeers.wire.wording import printable
 
 CLOSING = 2.0
 """Longest wait (s) for the other nodes to close."""
@@ -49,7 +49,7 @@ class PlantNode(Node):
     links : Links or None
         Emulated links to the plant; None for none.
     rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
     """
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:

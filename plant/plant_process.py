@@ -17,9 +17,8 @@ from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.plant.start_words import COMPILING, LISTENING, READY
 from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
-from gridpeers.wire.driver.open_files import OpenFilesError, check_open_files
+from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
-from gridpeers.wire.driver.scheduling import schedule_as_batch
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.packages import not_importable

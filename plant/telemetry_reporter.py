@@ -10,7 +10,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.plant_interface import PlantLike, ReadingLike
 from gridpeers.wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 _NUMBER_BYTES = 9
 """Bytes of one float in msgpack."""

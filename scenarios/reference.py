@@ -44,8 +44,8 @@ from gridpeers.wire import bounds, keys, messages
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import KINDS
 from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
 from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
-from gridpeers.wire.schema.type_words import in_words, kinds_of, shown
 
 
 class FieldDoc(NamedTuple):

@@ -26,8 +26,8 @@ from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import version_of, versions
-from gridpeers.wire.driver.open_files import too_few_files
-from gridpeers.wire.driver.output import OutputLostError
+from gridpeers.wire.driver.ending import OutputLostError
+from gridpeers.wire.driver.machine import too_few_files
 from gridpeers.wire.messages import Pacing
 from gridpeers.wire.packages import not_importable
 

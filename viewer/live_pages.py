@@ -18,7 +18,7 @@ from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_js
 from gridpeers.viewer.run_follower import RunFollower
 from gridpeers.viewer.run_view import Cursor
 from gridpeers.viewer.scenario_form import scenario_form
-from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.codec import decode_foreign
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket

@@ -14,7 +14,7 @@ from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
 from gridpeers.scenarios.live.run_address import Access
 from gridpeers.viewer.page_beside import HERE, PORT, require_page
-from gridpeers.wire.driver.output import watch_readers
+from gridpeers.wire.driver.ending import watch_readers
 
 if TYPE_CHECKING:
     from gridpeers.viewer.page_server import Pages

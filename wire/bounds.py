@@ -13,17 +13,14 @@ from typing import Annotated, Any
 
 import msgspec
 
+from gridpeers.wire.wording import UNPRINTABLE
+
 LONGEST_MESSAGE = 256_000
 """Longest message in bytes: room for a row of telemetry on `MOST_INVERTERS` inverters with long names. All other
 messages are a hundredth of it."""
 
 NAME = r"[A-Za-z0-9_.-]{1,64}"
 """Allowed form of a name. Zenoh forbids / * $ ? # in a chunk of a key; a leading @ would hide it from wildcards."""
-
-UNPRINTABLE = (
-    "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
-)
-"""Characters that are invisible, or change the look of others: controls, line ends, writing directions, tags."""
 
 _PRINTABLE = rf"^[^{UNPRINTABLE}]*\Z"
 

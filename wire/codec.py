@@ -11,15 +11,16 @@ from __future__ import annotations
 import re
 import traceback
 from collections import Counter
+from collections.abc import Callable
 from math import isfinite
-from typing import Any
+from typing import Any, TypeVar
 from zlib import crc32
 
 import msgspec
 
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.messages import AnyMessage, Message
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 CRC = 4
 """Bytes of the checksum at the end: CRC-32 as in zlib and Ethernet, least significant byte first."""
@@ -187,3 +188,38 @@ class RejectedMessages:
         """Take out the log lines since the last call."""
         lines, self._lines = tuple(self._lines), []
         return lines
+
+
+Text = TypeVar("Text", bytes, str)
+T = TypeVar("T")
+
+
+def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
+    r"""Return the value that bytes or a text encode.
+
+    Parameters
+    ----------
+    decode : Callable[[bytes], T]
+        `decode` of a decoder of msgspec.
+    data : bytes or str
+        The bytes, or the text.
+
+    Raises
+    ------
+    msgspec.DecodeError
+        If they encode no such value; in one printable line. msgspec itself has other errors for a text that is no UTF-8
+        and for brackets a thousand deep, and repeats the name of a field that it does not know as it came.
+
+    Examples
+    --------
+    >>> numbers = msgspec.json.Decoder(list[float])
+    >>> decode_foreign(numbers.decode, b"[1.5]")
+    [1.5]
+    >>> decode_foreign(msgspec.json.Decoder().decode, b"[" * 2000)
+    Traceback (most recent call last):
+    msgspec.DecodeError: maximum recursion depth exceeded while deserializing an object
+    """
+    try:
+        return decode(data)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise msgspec.DecodeError(printable(str(error), 200)) from None

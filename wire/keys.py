@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, get_args
 
 import msgspec
 
 from gridpeers.wire.bounds import MOST_COUNT, is_name
-from gridpeers.wire.trust.member import ROLES, Role
+
+Role = Literal["plant", "agent", "operator", "viewer"]
+"""The part that a process may take in a run. A command line, a page and a recorder are operators or viewers."""
+
+ROLES: tuple[Role, ...] = get_args(Role)
 
 READING = ("status", "links", "telemetry")
 """Verbs of commands that change nothing: they have a key of their own, on which viewers may publish."""
@@ -30,7 +34,7 @@ ANY_TOKEN = "gridpeers/*/alive/**"
 
 
 class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
-    """One kind of key, for the protocol's documentation and for access rules (`gridpeers.wire.trust.access_rules`)."""
+    """One kind of key, for the protocol's documentation and for access rules (`gridpeers.wire.trust.credentials`)."""
 
     expression: str
     """The key, with its parts in angle brackets."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence, Set
 from typing import Any, NamedTuple, Protocol
 
-from gridpeers.wire.admission import Admission
 from gridpeers.wire.codec import RejectedError, RejectedMessages, decode
+from gridpeers.wire.membership import Admission
 from gridpeers.wire.messages import AnyMessage, Measurement, State
 
 REPORT_TICKS = 100

@@ -4,7 +4,7 @@ The type of a field contains its bounds (`gridpeers.wire.bounds`), and fields of
 (`__post_init__`). So a decoded message is safe to compute with, to print and to put into a key.
 
 Every message has its sender (`sender`), the sender's epoch (`epoch`, which identifies one process; see
-`gridpeers.wire.admission`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick
+`gridpeers.wire.membership`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick
 k and
 `t` is k T_c.
 """

@@ -13,7 +13,7 @@ owns it in one thread and does
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
 Every message takes one way. `received` decodes it, which checks its bounds; it checks sender and epoch
-(`gridpeers.wire.admission`), and the type; then the handler of the message's route gets it. A wrong message, or an
+(`gridpeers.wire.membership`), and the type; then the handler of the message's route gets it. A wrong message, or an
 error while it is handled, costs that message alone.
 """
 
@@ -24,17 +24,51 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple
 
-from gridpeers.wire.actions import Action, Fetch, Log, Publish
-from gridpeers.wire.admission import Admission
-from gridpeers.wire.backlog import Loss, is_marked
+from gridpeers.wire.backlog import TOKENS, Loss, is_marked
 from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.links import Links
-from gridpeers.wire.membership import Membership
+from gridpeers.wire.membership import Admission, Membership
 from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
-from gridpeers.wire.token_queue import TOKENS
 from gridpeers.wire.traffic import Traffic
+
+
+class Publish(NamedTuple):
+    """Publish bytes on a key."""
+
+    key: str
+    payload: bytes
+
+
+class Fetch(NamedTuple):
+    """Query a key; the answer arrives as a message on that key. A missing answer is no error."""
+
+    key: str
+    reply_key: str = ""
+    """Key under which the answer arrives instead, to tell the answers of several queries apart."""
+
+
+class Listen(NamedTuple):
+    """Subscribe to a key, before any later request."""
+
+    key: str
+
+
+class WithdrawToken(NamedTuple):
+    """Withdraw a liveliness token, whose node has finished."""
+
+    key: str
+
+
+class Log(NamedTuple):
+    """Write a line to the log."""
+
+    text: str
+
+
+Action = Publish | Fetch | Listen | WithdrawToken
+
 
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
@@ -152,7 +186,7 @@ class Node:
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, so that its end must be known; see `gridpeers.wire.token_queue`.
+        """Whether the holder of a token is noted, so that its end must be known; see `gridpeers.wire.backlog`.
 
         Any thread may ask.
         """

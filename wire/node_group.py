@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
-from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.backlog import Loss
 from gridpeers.wire.codec import RejectedMessages
+from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish, WithdrawToken
 
 
 class GroupedNode(Protocol):

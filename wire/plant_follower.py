@@ -24,7 +24,7 @@ class PlantFollower(Node):
     run : str
         Name of the run.
     rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.admission`.
+        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
     """
 
     def __init__(self, name: str, run: str, rate: float = inf) -> None:

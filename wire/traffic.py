@@ -10,6 +10,9 @@ from msgspec.structs import astuple
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import (
     AT_ONCE,
+    CONDITION,
+    EACH_TICK,
+    IN_TELEMETRY,
     Exchange,
     JournalBuffer,
     MessageReference,
@@ -19,11 +22,11 @@ from gridpeers.wire.journal import (
     SentMessage,
     Token,
     WakeUp,
+    kind_of,
 )
-from gridpeers.wire.journal_keys import CONDITION, EACH_TICK, IN_TELEMETRY, kind_of
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Measurement, State
-from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.timing import RateLimit
 
 SHOWN_PAYLOAD = 4_000
 """Most bytes that are noted of a message that was rejected."""

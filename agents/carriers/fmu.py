@@ -28,9 +28,8 @@ from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.carriers.program import ProgramLaw, ProgramReady
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, limits_in
-from gridpeers.wire.printable import printable
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_reading import read_parameters
+from gridpeers.wire.wording import printable, suggestion
 
 OWN = tuple(f"own_{name}" for name in Own._fields if name != "name")
 """Inputs of the own inverter."""

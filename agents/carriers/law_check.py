@@ -11,11 +11,11 @@ from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.carriers.law_registry import CARRIERS, KEYS, LAWS
 from gridpeers.agents.carriers.time_limit import make_limited
 from gridpeers.agents.laws.law import Law, limits_in
-from gridpeers.wire.plugins.path_text import is_no_path
 from gridpeers.wire.plugins.plugin import scalar_objection
 from gridpeers.wire.plugins.registry import PluginError
 from gridpeers.wire.schema.table_reading import read_parameters, read_table
 from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.wording import is_no_path
 
 _BINARY = (b"\x7fELF", b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe", b"\xca\xfe\xba\xbe", b"MZ")
 """First bytes of programs for Linux, of macOS and of Windows; the last may be run by an emulator."""
@@ -113,7 +113,9 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
 
 
 def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
-    from gridpeers.agents.carriers.fmu import fmu_problems, load_problem
+    from gridpeers.agents.carriers.fmu_interface import fmu_problems
+
+    from gridpeers.agents.carriers.fmu import load_problem
 
     path = Path(choice.folder) / choice.fmu
     found = [Problem(*problem) for problem in fmu_problems(path, parameters)]

@@ -22,8 +22,8 @@ from gridpeers.agents.agent_config import LawChoice
 from gridpeers.agents.carriers.time_limit import FIRST
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints, limits_in
-from gridpeers.wire.foreign_bytes import decode_foreign
-from gridpeers.wire.printable import printable
+from gridpeers.wire.codec import decode_foreign
+from gridpeers.wire.wording import printable
 
 LEAVING = 1.0
 """Time (s) that a program has to end once its input has."""

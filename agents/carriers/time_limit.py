@@ -13,8 +13,7 @@ from typing import Any
 
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 
 _forks = threading.local()
 """Forks of this process by each of its threads: `number`."""

@@ -15,8 +15,8 @@ from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, NamedTuple
 
 from gridpeers.wire.schema.plausible import Range, Unit
-from gridpeers.wire.schema.relations import Below
 from gridpeers.wire.schema.table_reading import parameter_values
+from gridpeers.wire.schema.table_schema import Below
 
 NOTHING_SHARED: Mapping[str, float] = MappingProxyType({})
 """Default of `shared`: no further values."""

@@ -24,7 +24,7 @@ from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.results.record import PARTIAL, Recorder
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.wire.actions import Publish
+from gridpeers.wire.node import Publish
 
 CASE = "IV"
 

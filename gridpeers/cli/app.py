@@ -13,9 +13,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
-from gridpeers.wire.driver.leftover import leave
-from gridpeers.wire.driver.open_files import raise_limit, too_few_files
-from gridpeers.wire.driver.output import speaking
+from gridpeers.wire.driver.ending import leave, speaking
+from gridpeers.wire.driver.machine import raise_limit, too_few_files
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 from gridpeers.cli.usage import INTERRUPTED, TERMINATED, fail
 from gridpeers.scenarios.results.run_files import TerminatedError
-from gridpeers.wire.driver.stop_signal import StopSignal, ctrl_c_or
+from gridpeers.wire.driver.ending import StopSignal, ctrl_c_or
 
 
 @contextmanager

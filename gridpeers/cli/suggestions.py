@@ -12,7 +12,7 @@ from typer.core import TyperGroup
 
 from gridpeers.cli.usage import BAD_INPUT, fail
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 _UsageError: type[BaseException] = BadParameter.__mro__[1]
 """Base of all problems on a command line; releases of typer keep it in different modules."""

@@ -70,7 +70,7 @@ def refuse(error: ScenarioError | FeederError) -> NoReturn:
 
 def check_choice(option: str, kind: str, value: str, known: Collection[str]) -> None:
     """End with the nearest word if a value is none of those that an option takes."""
-    from gridpeers.wire.schema.suggestion import suggestion
+    from gridpeers.wire.wording import suggestion
 
     if value not in known:
         fail([f'{option}no {kind} "{value}"; {suggestion(value, tuple(known), f"{kind}s")}'], BAD_INPUT)
@@ -134,7 +134,7 @@ def require_loadable(module: str, user: str) -> None:
 
 def fail(lines: list[str], code: int) -> NoReturn:
     """End the command with lines on standard error; characters that cannot be printed are escaped."""
-    from gridpeers.wire.printable import printable
+    from gridpeers.wire.wording import printable
 
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)

@@ -12,7 +12,7 @@ from gridpeers.scenarios.results.metrics_file import Clock
 from gridpeers.scenarios.run_request import SPEEDS, Driver
 from gridpeers.scenarios.schema import ScenarioError
 from gridpeers.scenarios.schema import scenario_model as model
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 
 def with_cases(spec: model.ScenarioModel, names: Iterable[str] | None, *, option: str = "") -> model.ScenarioModel:

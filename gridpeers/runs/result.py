@@ -32,7 +32,7 @@ from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

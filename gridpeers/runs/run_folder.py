@@ -13,8 +13,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from gridpeers.scenarios.results.run_files import FolderError, empty_folder, refusal, shown, write_whole
-from gridpeers.wire.plugins.path_text import is_no_path
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import is_no_path, printable
 
 T = TypeVar("T")
 

@@ -22,7 +22,7 @@ from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.loading import read_tables, read_toml
 from gridpeers.scenarios.schema.plugin_keys import check_portable
 from gridpeers.scenarios.schema.scenario_errors import Problems
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 if TYPE_CHECKING:
     from gridpeers.scenario import Scenario

@@ -17,8 +17,8 @@ from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.paths import flatten
-from gridpeers.wire.counted import counted
 from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.wording import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -23,7 +23,7 @@ from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.sweep_table import results_frame, unit_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
 from gridpeers.values import plain
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 Values = Mapping[str, Iterable[Any]]
 """Values by the dotted path of a key."""

@@ -10,10 +10,9 @@ from gridpeers.netem.ledger import Outcome, copies_of
 from gridpeers.scenarios.record.message_index import MessageOnWire
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
-from gridpeers.wire.counted import counted
-from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount
-from gridpeers.wire.journal_keys import kind_of, name_of
+from gridpeers.wire.journal import MessageReference, ReceivedMessage, RejectedCount, kind_of, name_of
 from gridpeers.wire.messages import OFF, PlantEvent, State
+from gridpeers.wire.wording import counted
 
 WORDS = {
     "cut": "cut off by a cut link",

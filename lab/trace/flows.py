@@ -9,8 +9,7 @@ from typing import NamedTuple
 from gridpeers.netem.ledger import Outcome, copies_of
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import sound
-from gridpeers.wire.journal import SentMessage
-from gridpeers.wire.journal_keys import EACH_TICK, kind_of
+from gridpeers.wire.journal import EACH_TICK, SentMessage, kind_of
 from gridpeers.wire.messages import PLANT, Measurement, State
 
 

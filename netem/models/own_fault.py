@@ -13,12 +13,11 @@ from typing import Any, NamedTuple
 import msgspec
 
 from gridpeers.netem.draws import Stream
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, class_objection, made
 from gridpeers.wire.plugins.registry import Registry
-from gridpeers.wire.printable import printable
 from gridpeers.wire.schema.table_reading import parameter_values
+from gridpeers.wire.wording import printable
 
 LONGEST = 3600.0
 """Longest delay (s) that a fault may add."""

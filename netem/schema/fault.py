@@ -17,13 +17,21 @@ from gridpeers.netem.models.loss import AnyLoss, Bernoulli, GilbertElliott
 from gridpeers.netem.models.medium import Corrupt, Cut, Duplicate, Flap, Rate, Slots
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.pattern import parse
-from gridpeers.wire.plugins.path_text import is_no_path
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection
 from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.relations import After, problems_of
-from gridpeers.wire.schema.suggestion import suggestion
-from gridpeers.wire.schema.table_schema import Example, Label, OtherKeys, Problem, Shorthand, below, fields_of
-from gridpeers.wire.schema.type_words import shown
+from gridpeers.wire.schema.table_reading import shown
+from gridpeers.wire.schema.table_schema import (
+    After,
+    Example,
+    Label,
+    OtherKeys,
+    Problem,
+    Shorthand,
+    below,
+    fields_of,
+    problems_of,
+)
+from gridpeers.wire.wording import is_no_path, suggestion
 
 
 class Profile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -12,9 +12,8 @@ import msgspec
 from gridpeers.netem.models.medium import Cut
 from gridpeers.netem.schema.fault import EndTime, RunTime, Span
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.schema.relations import problems_of
-from gridpeers.wire.schema.suggestion import suggestion
-from gridpeers.wire.schema.table_schema import Example, Problem
+from gridpeers.wire.schema.table_schema import Example, Problem, problems_of
+from gridpeers.wire.wording import suggestion
 
 _REST = "the rest"
 

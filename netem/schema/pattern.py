@@ -8,7 +8,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 ANY = "*"
 """All agents; the plant only where it is named."""

@@ -9,9 +9,9 @@ import msgspec
 
 from gridpeers.netem.models.delay import DELAY, LONGEST_DELAY, Trace
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_schema import Problem
 from gridpeers.wire.text_file import TextFileError, read_table_text
+from gridpeers.wire.wording import suggestion
 
 COLUMN = "delay_s"
 """Column that is read; others are free."""

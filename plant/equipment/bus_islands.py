@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 
 from gridpeers.plant.equipment.equipment import Feeder
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 SwitchOperations = tuple[Iterable[str], Iterable[str]]
 """Switches that open, and switches that close, by any of their names."""

@@ -9,7 +9,7 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.relations import Below
+from gridpeers.wire.schema.table_schema import Below
 
 TimeConstant = Annotated[float, Unit("s"), Plausible("a time constant", 1e-5, 10.0, above_zero=True)]
 Gain = Annotated[float, Plausible("a gain", 0.0, 1e6)]

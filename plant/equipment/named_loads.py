@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment.equipment import Feeder
 from gridpeers.wire.schema.plausible import Plausible
-from gridpeers.wire.schema.suggestion import first_of, suggestion
+from gridpeers.wire.wording import first_of, suggestion
 
 FACTOR = Plausible("a factor on a load", 0.0, 10.0)
 """Factors on the power that a load has in the feeder's tables."""

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from gridpeers.plant.equipment.equipment import PHASES, Bus, Feeder, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 EARTH = "earth"
 """In place of a neutral: the inverter returns through earth, though its bus has a neutral."""

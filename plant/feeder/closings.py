@@ -8,7 +8,7 @@ from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.feeder.synchronism import Difference, Synchronism
 from gridpeers.plant.feeder.trips import Closing
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 
 class _Pending(NamedTuple):

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.network import Network
-from gridpeers.wire.counted import counted
 from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.wording import counted
 
 GRID = "grid"
 """Name of the island that the substation feeds."""

@@ -9,7 +9,7 @@ from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import LoadEvent
 from gridpeers.wire.messages import LoadSetting, PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 
 class LoadBoard:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.kernel.limited_load import COLUMNS, limited_admittance
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 PAUSE = 0.5
 """Time (s) without a crossing after which a load's next crossing is reported: once per spell of an oscillation."""

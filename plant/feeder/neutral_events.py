@@ -9,8 +9,8 @@ from scipy.sparse.csgraph import connected_components
 from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.network import Network
-from gridpeers.wire.counted import counted
 from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.wording import counted
 
 TOUCHABLE = 50.0
 """Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""

@@ -30,7 +30,7 @@ from gridpeers.plant.feeder.trips import trip_event
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 
 class Reading(NamedTuple):

@@ -10,7 +10,7 @@ from gridpeers.plant.equipment import Switch
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import SwitchEvent
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 _PAST = {"open": "opened", "close": "closed"}
 

@@ -21,7 +21,7 @@ from gridpeers.plant.gridlabd.model.glm import write_glm
 from gridpeers.plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.wire.messages import LoadSetting, PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 FEEDERS = Path(__file__).parents[1] / "data"
 

@@ -16,7 +16,7 @@ from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 Write = tuple[str, str, Any]
 """A value for GridLAB-D: object, property, value."""

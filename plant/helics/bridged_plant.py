@@ -13,7 +13,7 @@ from gridpeers.plant.helics.topics import SENSORS, Value, number
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant, ReadingLike
 from gridpeers.wire.messages import LoadSetting, PlantEvent
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 _COLUMNS = len(SENSORS) + len(topics.HELD)
 

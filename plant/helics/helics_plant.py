@@ -15,10 +15,10 @@ from gridpeers.plant.helics.federate import HelicsError, HelicsFederate
 from gridpeers.plant.helics.topics import ACT, Value, number
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.wire.bounds import NAME
-from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LoadSetting, PlantEvent
-from gridpeers.wire.schema.suggestion import first_of
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
+from gridpeers.wire.wording import first_of
 
 SHOWN = 4
 """Topics that an error names."""

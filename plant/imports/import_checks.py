@@ -17,7 +17,7 @@ from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus
 from gridpeers.plant.equipment.imported_equipment import BEHIND, LoadPart
 from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""

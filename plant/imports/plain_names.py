@@ -8,7 +8,7 @@ import msgspec
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.imported_equipment import BEHIND, bus_behind
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 SHOWN = 8
 """How many buses the note names."""

@@ -23,7 +23,7 @@ from gridpeers.plant.equipment.neutrals import neutrals_of
 from gridpeers.plant.network.loads import LoadBranches, law_row
 from gridpeers.plant.network.merging import Merge, merge_nodes
 from gridpeers.plant.network.primitives import line_admittance, transformer_admittance
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
 """Nominal angles of the phases (rad)."""

@@ -18,12 +18,11 @@ from gridpeers.plant.realtime.kept_telemetry import KEPT_BYTES, KEPT_BYTES_RECOR
 from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
 from gridpeers.plant.realtime.recorder_feed import RecorderFeed
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
-from gridpeers.wire.admission import FASTER
 from gridpeers.wire.links import Links, is_usable
+from gridpeers.wire.membership import FASTER
 from gridpeers.wire.messages import AgentStatus, Journal, Leave, LinkAcknowledgement, LinkReport, Nameplate, State
 from gridpeers.wire.node import Route
-from gridpeers.wire.rate_limit import RateLimit
-from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.timing import RateLimit, Timer
 from gridpeers.wire.traffic import TimedTraffic
 
 Phase = Literal["gathering", "running", "closing", "over"]

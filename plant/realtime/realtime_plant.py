@@ -25,8 +25,7 @@ from gridpeers.wire.keys import READING
 from gridpeers.wire.links import REPORT_TICKS, Links
 from gridpeers.wire.messages import PLANT, Command, PlantEvent, Waiting
 from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
-from gridpeers.wire.rate_limit import RateLimit
-from gridpeers.wire.timing.timer import Timer
+from gridpeers.wire.timing import RateLimit, Timer
 
 TELEMETRY = 0.2
 """Time (s, wall) between two telemetry messages."""

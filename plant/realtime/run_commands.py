@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import msgspec
 
 from gridpeers.wire.messages import PLANT, Answer, Command
-from gridpeers.wire.printable import printable
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
+from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
     from gridpeers.plant.realtime.realtime_plant import RealtimePlant

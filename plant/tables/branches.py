@@ -24,7 +24,7 @@ from gridpeers.plant.tables.feeder_columns import (
     TransformerColumns,
     power_of,
 )
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 
 def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:

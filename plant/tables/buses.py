@@ -11,7 +11,7 @@ from gridpeers.plant.equipment import PHASES, Bus, Feeder
 from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus
 from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
 from gridpeers.plant.tables.feeder_columns import BusColumns, ImportedBusColumns
-from gridpeers.wire.schema.suggestion import first_of, suggestion
+from gridpeers.wire.wording import first_of, suggestion
 
 _SHOWN = 24
 """So many buses that are cut off are named."""

@@ -12,10 +12,10 @@ import msgspec
 
 from gridpeers.plant.equipment import NODES, PHASES
 from gridpeers.wire.schema.plausible import Plausible
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_reading import shown
 from gridpeers.wire.schema.table_schema import Field, Label, fields_of, named
-from gridpeers.wire.schema.type_words import shown
 from gridpeers.wire.text_file import TextFileError, read_table_text
+from gridpeers.wire.wording import suggestion
 
 C = TypeVar("C", bound=msgspec.Struct)
 

@@ -9,10 +9,9 @@ from typing import Any
 from gridpeers.plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign, with_published
 from gridpeers.plant.tables.csv_table import CsvTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
-from gridpeers.wire.schema.relations import contradictions
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_reading import read_table
-from gridpeers.wire.schema.table_schema import fields_of
+from gridpeers.wire.schema.table_schema import contradictions, fields_of
+from gridpeers.wire.wording import suggestion
 
 FILE = "inverter_parameters.csv"
 """Name of the file; a feeder without it has no such sets."""

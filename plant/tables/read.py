@@ -21,7 +21,7 @@ from gridpeers.plant.tables.imported import read_elements, read_load_parts
 from gridpeers.plant.tables.manifest import MANIFEST, read_f_nom
 from gridpeers.plant.tables.parameter_sets import read_parameter_sets
 from gridpeers.plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""

@@ -29,7 +29,7 @@ from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.messages import OFF, PLANT
 from gridpeers.wire.schema.plausible import Plausible
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 TAKEN = {
     PLANT: "the plant sends under it",

@@ -26,7 +26,7 @@ from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
 from gridpeers.scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
 from gridpeers.scenarios.run_request import Driver
 from gridpeers.scenarios.sweep.workers import on_workers
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 REPEATED = 20
 """Every run of which the number is a multiple of this one is done twice, by whatever worker is free."""

@@ -27,7 +27,7 @@ from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.sweep.sweep_case import plant_at_start
 from gridpeers.wire.messages import PlantEvent
-from gridpeers.wire.printable import utf8
+from gridpeers.wire.wording import utf8
 
 ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = (
     "ends",

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import msgspec
 
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 Table = Literal["event", "link", "partition", "node"]
 """Lists of entries in a scenario file."""

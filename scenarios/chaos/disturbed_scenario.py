@@ -27,7 +27,7 @@ from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.schema.supply import check_loads
-from gridpeers.wire.timing.clock import rounded_up
+from gridpeers.wire.timing import rounded_up
 
 _LISTS = ("open", "close", "leave", "join")
 """Keys of an event that are lists of names."""

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gridpeers.plant.transient_folder import no_room as temporary_folder_is_full
 from gridpeers.scenarios.results.run_files import no_room
-from gridpeers.wire.driver.open_files import too_few_files
+from gridpeers.wire.driver.machine import too_few_files
 
 _FAILING = (errno.EIO, errno.ESTALE)
 """Errors of a disk that fails."""

@@ -8,7 +8,7 @@ from gridpeers.scenarios.chaos.chaos_run import ChaosRow
 from gridpeers.scenarios.chaos.disturbance import counted_kinds
 from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.chaos.schedule_report import schedule_lines
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 _CHECK = re.compile(r"\w{1,200}")
 """Form of a check's name: that of a class or of a key, and a file of `failures` is named by it."""

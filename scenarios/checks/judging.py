@@ -24,11 +24,10 @@ from gridpeers.scenarios.checks.check_verdict import (
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.schema.plugin_keys import checks_of, checks_off
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, made
 from gridpeers.wire.plugins.registry import PluginError
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 PATIENCE = 10.0
 """Time (s) after which a check that still judges is named: those of an hour of nine agents in wall-clock time take

@@ -29,9 +29,9 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.run_request import Outcome
-from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
+from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish
 
 
 def messages_decide(plant: PlantConfig, agents: Sequence[AgentConfig]) -> bool:

@@ -14,10 +14,9 @@ from gridpeers.netem.models.medium import Cut, Rate
 from gridpeers.netem.schema.fault import LONGEST_RUN, PROFILES, Fault
 from gridpeers.netem.schema.pattern import Link, objections
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.printable import printable
 from gridpeers.wire.schema.plausible import Plausible
-from gridpeers.wire.schema.suggestion import first_of
 from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.wording import first_of, printable
 
 
 def words(kind: str, model: Any) -> str:

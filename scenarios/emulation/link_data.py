@@ -10,7 +10,7 @@ import msgspec
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.wire.bounds import Name, Text
-from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LinkReport
 
 

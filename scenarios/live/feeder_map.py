@@ -7,7 +7,7 @@ import msgspec
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.results.plots.places import has_coordinates, places
-from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.codec import decode_foreign
 
 
 class MapSwitch(msgspec.Struct, frozen=True):

@@ -24,7 +24,7 @@ from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_writing import toml_lines
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.messages import LinkRequest
-from gridpeers.wire.timing.clock import rounded_up
+from gridpeers.wire.timing import rounded_up
 
 LINKS_ALONE = (
     "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."

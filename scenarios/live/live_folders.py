@@ -26,7 +26,7 @@ from gridpeers.scenarios.results.run_files import (
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.timing.clock import rounded_up
+from gridpeers.wire.timing import rounded_up
 
 
 def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:

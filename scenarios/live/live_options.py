@@ -32,8 +32,8 @@ from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_model import NEEDS_KEYS
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.journal import RecordLevel
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.wording import suggestion
 
 LOOKING = 1.5
 """Time (s) to find a plant that is there: a link, and a token on it, take some 50 ms."""

@@ -33,10 +33,10 @@ from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.driver.stop_signal import StopSignal, stop_at_signals
+from gridpeers.wire.driver.ending import StopSignal, stop_at_signals
 from gridpeers.wire.messages import PLANT, Pacing, PlantEvent
-from gridpeers.wire.printable import printable
-from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.timing import RateLimit
+from gridpeers.wire.wording import printable
 
 LOGGED = ("roster", "warning")
 """Kinds of events that a plant in this process also writes to its log."""

@@ -15,10 +15,9 @@ from gridpeers.scenarios.live.link_log import LinkLog
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
-from gridpeers.wire.driver.free_lists import FreeLists
-from gridpeers.wire.driver.large_blocks import keep_out_of_the_heap
+from gridpeers.wire.driver.machine import FreeLists, keep_out_of_the_heap
 from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
-from gridpeers.wire.rate_limit import RateLimit
+from gridpeers.wire.timing import RateLimit
 from gridpeers.wire.trust.credentials import Credentials
 
 _STOP, _CRASH = "stop", "crash"

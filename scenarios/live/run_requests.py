@@ -18,11 +18,10 @@ from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.bounds import MOST_COUNT
-from gridpeers.wire.codec import encode
+from gridpeers.wire.codec import decode_foreign, encode
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.foreign_bytes import decode_foreign
 from gridpeers.wire.messages import Answer, Command, LinkAcknowledgement, LoadSetting
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 T = TypeVar("T")
 

@@ -29,7 +29,7 @@ class RunTokens:
         return runs | {self._run} if self.epochs else runs
 
     def is_noted(self, key: str) -> bool:
-        """Whether a token is noted, so that its end must be known: `gridpeers.wire.token_queue`. From any thread."""
+        """Whether a token is noted, so that its end must be known: `gridpeers.wire.backlog`. From any thread."""
         return key in self._noted
 
     def appeared(self, key: str) -> None:

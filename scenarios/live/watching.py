@@ -23,7 +23,7 @@ from gridpeers.scenarios.live.run_requests import plant_status, read_config
 from gridpeers.scenarios.short_texts import aligned, short
 from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
-from gridpeers.wire.timing.session_deadline import SessionDeadline
+from gridpeers.wire.timing import SessionDeadline
 
 EVENTS = 6
 """Number of the latest events in a view."""

@@ -17,7 +17,7 @@ from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision, Exchange
 from gridpeers.wire.messages import PLANT, Journal
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 
 class DecisionEntries:

@@ -21,7 +21,7 @@ from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.recorded_decision import Action, NeighbourInput, RecordedDecision
 from gridpeers.wire.journal import Decision, MessageReference, ReceivedMessage
 from gridpeers.wire.messages import OFF, PLANT, Measurement, Nameplate, State
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 _REACH = 2.0
 """How far (s) a state may be from where its number says: in wall-clock time agents tick by their own clocks."""

@@ -14,8 +14,16 @@ from gridpeers.scenarios.record.journal_reader import entries_of, message_of, va
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
 from gridpeers.scenarios.record.record_info import Topic
 from gridpeers.wire.codec import encode, sound
-from gridpeers.wire.journal import Entry, Exchange, MessageReference, ReceivedMessage, SentMessage
-from gridpeers.wire.journal_keys import kind_of, name_of, sender_of
+from gridpeers.wire.journal import (
+    Entry,
+    Exchange,
+    MessageReference,
+    ReceivedMessage,
+    SentMessage,
+    kind_of,
+    name_of,
+    sender_of,
+)
 from gridpeers.wire.links import REPORT_TICKS
 from gridpeers.wire.messages import AnyMessage, Journal, Measurement, State
 

@@ -24,8 +24,8 @@ from mcap.records import Channel, Chunk, Header, Message, Metadata
 from mcap.stream_reader import breakup_chunk
 
 from gridpeers.scenarios.record.record_info import FILE, FORMAT, METADATA, PROFILE, RecordInfo, Topic
-from gridpeers.wire.foreign_bytes import decode_foreign
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.codec import decode_foreign
+from gridpeers.wire.wording import suggestion
 
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")

@@ -26,7 +26,7 @@ from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.short_texts import short
 from gridpeers.wire.journal import Entry
 from gridpeers.wire.messages import AnyMessage, LinkReport, LinkRequest, PlantEvent, Telemetry
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 __all__ = ["RecordFileError", "RunRecord"]
 

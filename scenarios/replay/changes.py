@@ -30,7 +30,7 @@ from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.sweep.paths import PathError, Tree, put, steps
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 OF_CASE = ("secondary", "graph", "links", "without")
 """Keys of a case that agents have."""

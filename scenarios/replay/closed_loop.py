@@ -26,8 +26,19 @@ from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
 from gridpeers.scenarios.replay.sent_statuses import SentStatuses
 from gridpeers.wire.codec import decode
-from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, SentMessage, WakeUp
-from gridpeers.wire.journal_keys import EACH_TICK, TO_LINKS, kind_of, name_of, sender_of, stream_of
+from gridpeers.wire.journal import (
+    EACH_TICK,
+    TO_LINKS,
+    MessageReference,
+    ProcessEvent,
+    ReceivedMessage,
+    SentMessage,
+    WakeUp,
+    kind_of,
+    name_of,
+    sender_of,
+    stream_of,
+)
 from gridpeers.wire.messages import PLANT, AnyMessage, LinkReport, Measurement, State, Telemetry
 
 MOST_SENT = 100_000

@@ -9,8 +9,7 @@ from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep
 from gridpeers.scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
-from gridpeers.wire.journal import MessageReference, ReceivedMessage
-from gridpeers.wire.journal_keys import stream_of
+from gridpeers.wire.journal import MessageReference, ReceivedMessage, stream_of
 
 
 class LoopProcess:

@@ -12,6 +12,7 @@ from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import (
+    EACH_TICK,
     Entry,
     MessageReference,
     ProcessEvent,
@@ -20,8 +21,8 @@ from gridpeers.wire.journal import (
     SentMessage,
     Token,
     WakeUp,
+    kind_of,
 )
-from gridpeers.wire.journal_keys import EACH_TICK, kind_of
 from gridpeers.wire.messages import PLANT, AnyMessage, Journal
 
 CALLS = ("start", "session", "leave")

@@ -23,6 +23,7 @@ from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.wire.backlog import Loss
 from gridpeers.wire.codec import KINDS, encode, sound
 from gridpeers.wire.journal import (
+    EACH_TICK,
     MessageReference,
     ProcessEvent,
     ReceivedMessage,
@@ -30,8 +31,8 @@ from gridpeers.wire.journal import (
     SentMessage,
     Token,
     WakeUp,
+    kind_of,
 )
-from gridpeers.wire.journal_keys import EACH_TICK, kind_of
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Measurement, State
 

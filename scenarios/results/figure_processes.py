@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from gridpeers.scenarios.drivers.forking import ForkedProcess, ForkServerError
 from gridpeers.scenarios.drivers.warm_servers import figure_server
-from gridpeers.wire.driver.cores import usable_cores
+from gridpeers.wire.driver.machine import usable_cores
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.plots.drawing import Drawing

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
 
-from gridpeers.wire.driver.output import OutputLostError
+from gridpeers.wire.driver.ending import OutputLostError
 
 RUNS = Path("runs")
 """Parent of the run folders that the user does not name, seen from the working directory."""

@@ -12,7 +12,7 @@ from typing import BinaryIO, Protocol, TypeVar
 import msgspec
 
 from gridpeers.scenarios.results.run_files import FolderError, shown
-from gridpeers.wire.foreign_bytes import decode_foreign
+from gridpeers.wire.codec import decode_foreign
 
 JOURNAL = "runs.jsonl"
 """Name of its file."""

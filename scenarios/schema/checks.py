@@ -16,9 +16,9 @@ from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
 from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
 from gridpeers.wire.plugins.plugin import plugin_of
-from gridpeers.wire.schema.relations import contradictions
-from gridpeers.wire.schema.suggestion import suggestion
-from gridpeers.wire.schema.type_words import keys_of
+from gridpeers.wire.schema.table_reading import keys_of
+from gridpeers.wire.schema.table_schema import contradictions
+from gridpeers.wire.wording import suggestion
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 """Names become folders and, two of them joined, a part of a key, which `gridpeers.wire.keys` bounds at 64 letters."""

@@ -40,8 +40,8 @@ from gridpeers.scenarios.schema.plugin_keys import (
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.supply import check_loads, check_supply
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.text_file import TextFileError, text_of
+from gridpeers.wire.wording import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
 """Reads a feeder, given its name or path and its load set."""

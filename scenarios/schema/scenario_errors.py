@@ -8,11 +8,9 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from gridpeers.wire.printable import printable
-from gridpeers.wire.schema.relations import MultipleOf
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_reading import read_table
-from gridpeers.wire.schema.table_schema import Problem
+from gridpeers.wire.schema.table_schema import MultipleOf, Problem
+from gridpeers.wire.wording import printable, suggestion
 
 T = TypeVar("T", bound=msgspec.Struct)
 

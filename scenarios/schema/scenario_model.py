@@ -20,8 +20,7 @@ from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncC
 from gridpeers.plant.simulator import Simulator
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.relations import Divides, MultipleOf
-from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Example, Label
+from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Divides, Example, Label, MultipleOf
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""

@@ -14,10 +14,9 @@ import numpy as np
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.sweep.paths import flatten
 from gridpeers.scenarios.sweep.sweep_model import GraphAxis, RandomAxis, ValueRange
-from gridpeers.wire.schema.relations import problems_of
-from gridpeers.wire.schema.suggestion import suggestion
 from gridpeers.wire.schema.table_reading import read_table
-from gridpeers.wire.schema.table_schema import fields_of
+from gridpeers.wire.schema.table_schema import fields_of, problems_of
+from gridpeers.wire.wording import suggestion
 
 Edges = tuple[tuple[int, int], ...]
 """Pairs i < j, sorted."""

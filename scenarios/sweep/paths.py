@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 _STEP = r"[A-Za-z0-9_-]+(?:\[\d+\])*"
 _PATH = re.compile(rf"{_STEP}(?:\.{_STEP})*")

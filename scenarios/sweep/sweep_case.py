@@ -31,7 +31,7 @@ from gridpeers.scenarios.results.recorded_events import ended_by_a_law, first_of
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in, configs
 from gridpeers.scenarios.schema.plugin_keys import judges_laws
-from gridpeers.wire.printable import utf8
+from gridpeers.wire.wording import utf8
 
 KEPT_PLANTS = 4
 """Plants at t = 0 that a worker keeps. One is about 1 MB; a sweep that leaves the plant as it is needs but one."""

@@ -35,8 +35,8 @@ from gridpeers.scenarios.sweep.axes import (
 )
 from gridpeers.scenarios.sweep.paths import PathError, Tree, flatten, put, steps
 from gridpeers.scenarios.sweep.sweep_model import Sweep
-from gridpeers.wire.schema.relations import problems_of
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.schema.table_schema import problems_of
+from gridpeers.wire.wording import suggestion
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from gridpeers.scenarios.sweep.sweep_case import SweepRow
 from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_COUNT
 from gridpeers.wire.messages import LinkReport
 from gridpeers.wire.trust.certificate_files import KeysError
-from gridpeers.wire.trust.member_list import read_list
+from gridpeers.wire.trust.key_folder import read_list
 from gridpeers.wire.trust.site_authority import issue, make_site
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed

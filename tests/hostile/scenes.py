@@ -11,10 +11,10 @@ from gridpeers.agents.lockstep_agent import LockstepAgent
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
-from gridpeers.wire.actions import Fetch, Listen, Log, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import AgentStatus, Measurement, Message, Nameplate, Prepare, Ready, State
+from gridpeers.wire.node import Fetch, Listen, Log, Publish
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

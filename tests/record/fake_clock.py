@@ -28,12 +28,12 @@ from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.results.record import Recorder
-from gridpeers.wire.actions import Fetch, Listen, Log, Publish
 from gridpeers.wire.backlog import Loss
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
+from gridpeers.wire.node import Fetch, Listen, Log, Publish
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

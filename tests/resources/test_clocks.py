@@ -83,7 +83,7 @@ def asked_for(source: str) -> set[str]:
         ("import datetime as d\nd.date.today()", "datetime.date.today"),
         ("from datetime import datetime as D\nD.now()", "datetime.datetime.now"),
         ("import time\nfrom time import monotonic\ntime.monotonic(); monotonic()", ""),
-        ("from gridpeers.wire.timing.clock import time_of\nself.time(); self.now(); now = 1; now", ""),
+        ("from gridpeers.wire.timing import time_of\nself.time(); self.now(); now = 1; now", ""),
     ],
 )
 def test_a_clock_of_the_day_is_found_under_any_name(source: str, clock: str) -> None:

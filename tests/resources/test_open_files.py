@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.driver.open_files import (
+from gridpeers.wire.driver.machine import (
     BESIDE_LINKS,
     MOST_FILES,
     OpenFilesError,

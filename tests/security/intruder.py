@@ -15,10 +15,10 @@ from msgspec import structs
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.session import Session
+from gridpeers.wire.keys import ROLES
 from gridpeers.wire.messages import Message
 from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.trust.key_folder import open_credentials
-from gridpeers.wire.trust.member import ROLES
 
 PATIENCE = 60.0
 """Longest wait (s) for anything."""

@@ -16,9 +16,9 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.lockstep_agent import LockstepAgent
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.wire.actions import Fetch, Publish
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PlantEvent, Telemetry
+from gridpeers.wire.node import Fetch, Publish
 from tests.toy.toy_plant import ToyPlant
 
 EndSet = LockstepPlant | LockstepAgent

@@ -18,9 +18,9 @@ from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_js
 from gridpeers.viewer.recorded.record_view import RecordView
 from gridpeers.viewer.recorded.recorded_run import RecordedRun
 from gridpeers.wire.bounds import Text
+from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.foreign_bytes import decode_foreign
-from gridpeers.wire.plugins.anybody import ANYTHING, named
+from gridpeers.wire.plugins.foreign_code import ANYTHING, named
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket

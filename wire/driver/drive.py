@@ -7,11 +7,40 @@ from collections.abc import Sequence
 from time import monotonic
 from typing import Protocol
 
-from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.backlog import Loss
-from gridpeers.wire.driver.free_lists import FreeLists
-from gridpeers.wire.driver.log_limit import limit_log
+from gridpeers.wire.driver.machine import FreeLists
 from gridpeers.wire.driver.session import Session
+from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.timing import RateLimit
+
+
+class LogLimit(logging.Filter):
+    """Omit repeated lines from a log, and count them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._limit = RateLimit()
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Return whether to write a line; add the number of omitted lines before it to its text."""
+        line = self._limit.admit(record.getMessage(), monotonic())
+        if line is not None:
+            record.msg, record.args = line, ()
+        return line is not None
+
+    def left_out(self) -> list[str]:
+        """Take out one line per kind on its omitted lines."""
+        return self._limit.left_out()
+
+
+def limit_log(log: logging.Logger) -> LogLimit:
+    """Let a log omit repeated lines; a second call changes nothing."""
+    for filter_ in log.filters:
+        if isinstance(filter_, LogLimit):
+            return filter_
+    limit = LogLimit()
+    log.addFilter(limit)
+    return limit
 
 
 class RejectLines(Protocol):

@@ -10,9 +10,8 @@ from contextlib import suppress
 from math import inf
 from time import monotonic
 
-from gridpeers.wire.backlog import ROOM, SMALL, Backlog, Loss
+from gridpeers.wire.backlog import ROOM, SMALL, Backlog, Kind, Loss, Stamped, TokenEvent, TokenQueue
 from gridpeers.wire.bounds import LONGEST_MESSAGE
-from gridpeers.wire.token_queue import Kind, Stamped, TokenEvent, TokenQueue
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
@@ -41,7 +40,7 @@ class Inbox:
         Whether a message on a key is of a known sender; called from Zenoh's threads, and only when many wait.
     is_noted : Callable[[str], bool]
         Whether the owner has noted the holder of a token, so that it must learn of its end
-        (`gridpeers.wire.token_queue`); called from Zenoh's threads. By default it has noted everybody, and no token is
+        (`gridpeers.wire.backlog`); called from Zenoh's threads. By default it has noted everybody, and no token is
         lost.
 
     Examples

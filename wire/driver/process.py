@@ -19,13 +19,11 @@ from typing import Any, TypeVar, get_args
 
 import msgspec
 
+from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
-from gridpeers.wire.driver.leftover import leave
-from gridpeers.wire.driver.open_files import raise_limit
-from gridpeers.wire.driver.output import watch_readers
+from gridpeers.wire.driver.ending import leave, stop_at_signals, watch_readers
+from gridpeers.wire.driver.machine import raise_limit
 from gridpeers.wire.driver.session import SessionError
-from gridpeers.wire.driver.stop_signal import stop_at_signals
-from gridpeers.wire.foreign_bytes import decode_foreign
 from gridpeers.wire.links import Links
 
 OK, BAD_CONFIG, BROKE = 0, 2, 3

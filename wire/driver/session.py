@@ -15,13 +15,11 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
-from gridpeers.wire.backlog import Loss
+from gridpeers.wire.backlog import Loss, Stamped
 from gridpeers.wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
 from gridpeers.wire.driver.inbox import Inbox
-from gridpeers.wire.driver.large_blocks import give_back_freed
-from gridpeers.wire.driver.left_links import end_left_links
-from gridpeers.wire.driver.lingering import do_not_linger
-from gridpeers.wire.driver.open_files import limit
+from gridpeers.wire.driver.left_links import do_not_linger, end_left_links
+from gridpeers.wire.driver.machine import give_back_freed, limit
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
     PROFILES,
@@ -33,9 +31,7 @@ from gridpeers.wire.driver.zenoh_settings import (
 )
 from gridpeers.wire.keys import LATEST_ONLY, is_token
 from gridpeers.wire.packages import not_importable
-from gridpeers.wire.token_queue import Stamped
-from gridpeers.wire.trust.credentials import Credentials
-from gridpeers.wire.trust.link_certificates import LinkCertificates
+from gridpeers.wire.trust.credentials import Credentials, LinkCertificates
 
 if TYPE_CHECKING:
     import zenoh

@@ -5,8 +5,8 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 
-from gridpeers.wire.plugins.path_text import is_no_path
 from gridpeers.wire.plugins.registry import NOTEBOOK, is_of_another
+from gridpeers.wire.wording import is_no_path
 
 
 def folder_of(reference: str, folder: str) -> str:

@@ -9,13 +9,11 @@ from typing import Any
 
 import msgspec
 
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.registry import PluginError, Registry
-from gridpeers.wire.printable import printable
-from gridpeers.wire.schema.table_reading import parameter_values, read_parameters
+from gridpeers.wire.schema.table_reading import in_words, parameter_values, read_parameters, shown
 from gridpeers.wire.schema.table_schema import Problem, fields_of
-from gridpeers.wire.schema.type_words import in_words, shown
+from gridpeers.wire.wording import printable
 
 KEYS = ("use", "folder")
 """Keys of a plug-in's table that are no parameters of it."""

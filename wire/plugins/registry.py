@@ -17,7 +17,7 @@ from types import ModuleType
 from typing import Any, Generic, TypeVar
 
 from gridpeers.wire.plugins.foreign_code import foreign_code
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import printable, suggestion
 
 T = TypeVar("T")
 
@@ -189,10 +189,6 @@ class Registry(Generic[T]):
         except PluginError:
             raise
         except (Exception, SystemExit) as error:  # whatever a user's module does while it is imported
-            from gridpeers.wire.printable import (
-                printable,  # it brings msgspec, and the command line's help waits for this module
-            )
-
             text = printable(f"{type(error).__name__}: {error}", 300)
             raise PluginError(f"{reference}: importing {name} failed: {text}") from error
 

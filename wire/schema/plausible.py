@@ -14,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 
 @dataclass(frozen=True)

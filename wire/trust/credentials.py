@@ -1,18 +1,207 @@
-"""What a process needs to prove who it is, and to know whom it may believe. Pure.
+"""Who a process is, whom it believes, and what each may say to whom: members, access rules, credentials. Pure.
 
-The private key stays in its file; only paths travel to the processes of a run.
+A certificate's common name is ``role:name``, e.g. ``agent:inv4``, because Zenoh's access control knows a process by its
+common name alone. A name whose certificate was revoked gets its next one in the next *generation*, ``agent:inv4:2``:
+else the revoked certificate would count again.
+
+Everything is denied that no rule allows. Each other member is a subject of its own, by the common names under which it
+is accepted, and has one policy; its rules name disjoint keys. So no two rules can apply to one message, and their order
+decides nothing. A rule holds for one link: what the member at its other end may send here (ingress), and what is sent
+to it (egress). Both ends check, so that neither depends on the other's honesty. In a star the plant relays: on its
+links, messages of all writers pass.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Iterable, Iterator
+from typing import Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
+from gridpeers.wire.keys import ANY_TOKEN, KeySpec, Role, describe
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.printable import printable
-from gridpeers.wire.trust.access_rules import access_control
-from gridpeers.wire.trust.member import Member, with_inverters
+from gridpeers.wire.wording import printable
+
+DATE_AND_TIME = "%Y-%m-%d %H:%M UTC"
+"""Form of the time at which a certificate ends: it may live for hours."""
+
+LONGEST_COMMON_NAME = 64
+"""Characters of a common name (X.520, ub-common-name)."""
+
+
+class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One name of the site."""
+
+    name: str
+    """Name; of an agent that of its inverter."""
+    role: Role
+    """What it may do."""
+    generation: int = 1
+    """Number of the certificate: how many of this name have been revoked before, and one."""
+    revoked: bool = False
+    """Whether the certificate of this generation was revoked."""
+    expires: str = ""
+    """When the certificate ends, to the minute, e.g. "2027-11-23 12:00 UTC"; empty if none was issued. Lists of old
+    sites have the day alone."""
+
+    @property
+    def common_name(self) -> str:
+        """Common name of its certificate.
+
+        Examples
+        --------
+        >>> Member(name="inv4", role="agent").common_name, Member(name="inv4", role="agent", generation=2).common_name
+        ('agent:inv4', 'agent:inv4:2')
+        """
+        return self._in_generation(self.generation)
+
+    @property
+    def accepted(self) -> tuple[str, ...]:
+        """Common names under which others accept it, without the revoked one.
+
+        The next generation is among them: it exists only once the site has issued it, and so a name that gets a new
+        certificate can take part in a run that has begun before.
+
+        Examples
+        --------
+        >>> Member(name="inv4", role="agent", revoked=True).accepted
+        ('agent:inv4:2',)
+        """
+        following = self._in_generation(self.generation + 1)
+        return (following,) if self.revoked else (self.common_name, following)
+
+    def _in_generation(self, number: int) -> str:
+        return f"{self.role}:{self.name}" if number == 1 else f"{self.role}:{self.name}:{number}"
+
+
+def with_inverters(members: Iterable[Member], inverters: Iterable[str]) -> tuple[Member, ...]:
+    """Return the members, and an agent for each inverter that is not among them.
+
+    The site may issue its certificate during the run: until then nobody can be it.
+
+    Examples
+    --------
+    >>> [member.common_name for member in with_inverters((Member(name="inv1", role="agent"),), ("inv1", "inv10"))]
+    ['agent:inv1', 'agent:inv10']
+    """
+    known = tuple(members)
+    names = {member.name for member in known}
+    return (*known, *(Member(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names))
+
+
+Flow = Literal["ingress", "egress"]
+
+_FORWARD = {"publication": ("put",), "queryable": ("declare_queryable", "reply"), "token": ("liveliness_token",)}
+"""Zenoh's messages from a writer of a kind of key to a reader."""
+
+_BACK = {"publication": ("declare_subscriber",), "queryable": ("query",)}
+"""Zenoh's messages from a reader to a writer; those of tokens are on a pattern over all of them."""
+
+_WATCH = ("declare_liveliness_subscriber", "liveliness_query")
+
+
+class Rule(NamedTuple):
+    """Allowed messages on one link."""
+
+    flow: Flow
+    messages: tuple[str, ...]
+    key: str
+    """Key expression of Zenoh."""
+
+
+def access_control(own: Member, members: Iterable[Member], *, star: bool = False) -> dict[str, Any]:
+    """Return Zenoh's ``access_control`` for a process.
+
+    Parameters
+    ----------
+    own : Member
+        The process.
+    members : Iterable[Member]
+        Everybody with a certificate of the site, in any order. A name that stands in it twice counts once, revoked if
+        one entry says so.
+    star : bool, optional
+        Whether the plant relays the messages of all others.
+
+    Examples
+    --------
+    >>> plant, inv1 = Member(name="plant", role="plant"), Member(name="inv1", role="agent")
+    >>> rules = access_control(plant, [inv1])
+    >>> rules["default_permission"], rules["subjects"]
+    ('deny', [{'id': 'agent:inv1', 'cert_common_names': ['agent:inv1', 'agent:inv1:2']}])
+    """
+    rules: list[dict[str, Any]] = []
+    subjects: list[dict[str, Any]] = []
+    policies: list[dict[str, Any]] = []
+    for member in _each_once(members):
+        subject = f"{member.role}:{member.name}"
+        ids = []
+        for number, rule in enumerate(rules_between(own, member, star=star)):
+            ids.append(f"{subject} {number}")
+            rules.append(
+                {
+                    "id": ids[-1],
+                    "permission": "allow",
+                    "flows": [rule.flow],
+                    "messages": list(rule.messages),
+                    "key_exprs": [rule.key],
+                }
+            )
+        subjects.append({"id": subject, "cert_common_names": list(member.accepted)})
+        policies.append({"id": subject, "rules": ids, "subjects": [subject]})
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": subjects,
+        "policies": policies,
+    }
+
+
+def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
+    """Return what a process allows on a link whose other end has the certificate of a member.
+
+    Examples
+    --------
+    >>> inv1, inv2 = Member(name="inv1", role="agent"), Member(name="inv2", role="agent")
+    >>> [rule.key for rule in rules_between(inv1, inv2) if rule.flow == "ingress" and "put" in rule.messages]
+    ['gridpeers/*/state/inv2']
+    """
+    return tuple(_rules(own, other, star=star))
+
+
+def _rules(own: Member, other: Member, *, star: bool) -> Iterator[Rule]:
+    for spec in describe():
+        ways: tuple[tuple[Flow, Member, Member], ...] = (("ingress", other, own), ("egress", own, other))
+        for flow, sender, receiver in ways:
+            if key := _key(spec, sender, receiver, star=star):
+                yield Rule(flow, _FORWARD[spec.kind], key)
+            if (key := _key(spec, receiver, sender, star=star)) and (back := _BACK.get(spec.kind)):
+                yield Rule(flow, back, key)
+    yield Rule("ingress", _WATCH, ANY_TOKEN)
+    yield Rule("egress", _WATCH, ANY_TOKEN)
+
+
+def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
+    """Return the key on which messages of this kind go from one member to another; empty if none do."""
+    relayed = star and writer.role == "plant"  # what it relays it may read itself, so the way to it needs no more
+    if not ((relayed or writer.role in spec.writers) and reader.role in spec.readers):
+        return ""
+    inverter = "*"
+    if "agent" in spec.writers and not relayed:
+        inverter = writer.name
+    elif spec.to_one_agent and reader.role == "agent":
+        inverter = reader.name
+    return spec.pattern(inverter)
+
+
+def _each_once(members: Iterable[Member]) -> list[Member]:
+    """Return the members in the order of role and name; of two entries of a name the later generation counts."""
+    kept: dict[tuple[str, str], Member] = {}
+    for member in members:
+        place = member.role, member.name
+        if place not in kept or (kept[place].generation, kept[place].revoked) < (member.generation, member.revoked):
+            kept[place] = member
+    return [kept[place] for place in sorted(kept)]
 
 
 class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -69,3 +258,56 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
             "connect_certificate": self.certificate,
         }
         return {"protocols": ["tls"], "tls": tls}, access_control(self.own, self.members, star=star)
+
+
+class Link(Protocol):
+    """A link of a session, as Zenoh describes it."""
+
+    @property
+    def auth_identifier(self) -> str | None:
+        """Common name of the certificate of its other end; None without one."""
+
+    @property
+    def dst(self) -> object:
+        """Address of its other end."""
+
+
+class LinkCertificates:
+    """Note the certificates of a session's links.
+
+    Parameters
+    ----------
+    credentials : Credentials
+        Members of the site.
+    relayed : bool
+        Whether all links lead through a relay. Only the plant's certificate can be seen then.
+    """
+
+    def __init__(self, credentials: Credentials, *, relayed: bool) -> None:
+        self._credentials, self._relayed = credentials, relayed
+        self._names: set[str] = set()
+        """Common names of the certificates of all links so far."""
+        self._lines: list[str] = []
+
+    def note(self, links: Iterable[Link]) -> None:
+        """Note the certificates of the present links."""
+        for link in links:
+            name = link.auth_identifier or ""
+            if name not in self._names:
+                self._names.add(name)
+                if why := self._credentials.stranger(name):
+                    self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
+
+    def take_lines(self) -> tuple[str, ...]:
+        """Take out lines on links whose other end has a certificate and no access."""
+        lines, self._lines = tuple(self._lines), []
+        return lines
+
+    def vouches(self, name: str) -> bool:
+        """Return whether a link that was noted has had the certificate of a sender, the plant or an agent.
+
+        Behind a relay everybody but the plant counts as vouched for: the relay lets each use its own keys alone.
+        """
+        if self._relayed and name != PLANT:
+            return True
+        return not self._names.isdisjoint(self._credentials.common_names(name))

@@ -16,10 +16,11 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from gridpeers.wire.bounds import is_name
-from gridpeers.wire.printable import printable
+from gridpeers.wire.keys import Role
 from gridpeers.wire.trust.certificate_files import CA, CA_KEY, KeysError, require_private
-from gridpeers.wire.trust.member import DATE_AND_TIME, LONGEST_COMMON_NAME, Member, Role
-from gridpeers.wire.trust.member_list import LIST, MemberList, SignedList, read_list
+from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, Member
+from gridpeers.wire.trust.key_folder import LIST, MemberList, SignedList, read_list
+from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
     from cryptography import x509

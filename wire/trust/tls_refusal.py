@@ -9,8 +9,8 @@ from __future__ import annotations
 import socket
 import ssl
 
-from gridpeers.wire.printable import printable
 from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.wording import printable
 
 _VERIFY_NOT_YET, _VERIFY_EXPIRED = 9, 10
 """OpenSSL's codes X509_V_ERR_CERT_NOT_YET_VALID and X509_V_ERR_CERT_HAS_EXPIRED."""

@@ -210,7 +210,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
 
 def _work(campaign: Campaign) -> str:
     """Return what the runs with disturbances need before the first of them ends, in words."""
-    from gridpeers.wire.counted import counted
+    from gridpeers.wire.wording import counted
 
     runs = f"{counted(campaign.runs, 'run')} with disturbances"
     if campaign.driver == "processes":
@@ -238,7 +238,7 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
     from gridpeers.wire.driver.command_line import command_line
-    from gridpeers.wire.driver.open_files import too_few_files
+    from gridpeers.wire.driver.machine import too_few_files
 
     try:
         with interruptible():

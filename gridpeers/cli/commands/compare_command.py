@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 _Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
 

@@ -11,7 +11,7 @@ import typer
 from gridpeers.cli.commands.feeder_glm_command import glm
 from gridpeers.cli.commands.grow_command import grow
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 if TYPE_CHECKING:
     from gridpeers.feeder import Feeder

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, refuse
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 SCENARIO = """\
 # {copies} copies of {feeder}, made by `gridpeers feeder grow`: all lose the substation at once and stay joined.
@@ -68,7 +68,7 @@ def grow(
     from gridpeers.output_folders import FolderError, shown, whole_folder
     from gridpeers.plant.equipment.joined_copies import copy_name, joined_copies
     from gridpeers.plant.tables import FeederError
-    from gridpeers.wire.schema.suggestion import suggestion
+    from gridpeers.wire.wording import suggestion
 
     try:
         tables = Feeder.read(feeder)

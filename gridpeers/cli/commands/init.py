@@ -184,7 +184,7 @@ def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Pro
 
 def _remedy(feeder: Tables, proposal: Proposal) -> str:
     """Return what may help where no settings do: with much fixed generation, to do without it."""
-    from gridpeers.wire.schema.suggestion import first_of
+    from gridpeers.wire.wording import first_of
 
     if proposal.generation < MUCH * proposal.load:
         return "more --inverters give more leaders, or try another --switch"
@@ -245,8 +245,8 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema import load_scenario
     from gridpeers.scenarios.schema.check_notes import start_problem
-    from gridpeers.wire.counted import counted
     from gridpeers.wire.driver.command_line import command_line
+    from gridpeers.wire.wording import counted
 
     try:
         feeder, proposal = _with_proposal(str(script), switches, leave_out, count)

@@ -12,7 +12,7 @@ import typer
 
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BAD_INPUT, fail, require
-from gridpeers.wire.trust.member import Role
+from gridpeers.wire.keys import Role
 
 app = typer.Typer(
     cls=Commands,
@@ -67,7 +67,7 @@ def issue(
     """
     with _errors(days):
         from gridpeers.wire.trust.certificate_files import KeysError
-        from gridpeers.wire.trust.member_list import read_list
+        from gridpeers.wire.trust.key_folder import read_list
         from gridpeers.wire.trust.site_authority import issue, objections
 
         names = list(dict.fromkeys(names))
@@ -104,9 +104,8 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from gridpeers.wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys
-        from gridpeers.wire.trust.certificate_validity import validity
-        from gridpeers.wire.trust.member_list import LIST, read_list
+        from gridpeers.wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys, validity
+        from gridpeers.wire.trust.key_folder import LIST, read_list
 
         known, now = read_list(keys), datetime.now(UTC)
         mistaken = mistaken_keys(keys, known.members)

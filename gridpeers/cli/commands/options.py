@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, require
-from gridpeers.wire.trust.member import Role
+from gridpeers.wire.keys import Role
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.run_address import Access, RunAddress

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, get_args
 import typer
 
 from gridpeers.cli.usage import BAD_INPUT, fail, load, require
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
 """Values of the argument of `doc`."""

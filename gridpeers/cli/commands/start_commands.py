@@ -24,7 +24,7 @@ from gridpeers.cli.commands.options import (
 from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from gridpeers.scenarios.live.run_address import Access
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.driver.output import watch_readers
+from gridpeers.wire.driver.ending import watch_readers
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.live_processes import ProcessOutcome

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from threading import Thread
 from typing import TypeVar
 
-from gridpeers.wire.driver.cores import usable_cores
+from gridpeers.wire.driver.machine import usable_cores
 
 T = TypeVar("T")
 R = TypeVar("R")

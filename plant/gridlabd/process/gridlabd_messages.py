@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
 """A message of the loader: file, line, text."""

@@ -16,7 +16,7 @@ from gridpeers.plant.request_process import program
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.plant.transient_folder import TransientFolder, no_room
 from gridpeers.wire.packages import damaged
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 POWER_FLOW = "gridpeers.plant.imports.gridlabd.gridlabd_power_flow"
 

@@ -45,7 +45,7 @@ from gridpeers.plant.imports.import_checks import (
 from gridpeers.plant.imports.import_comparison import MATCH, difference
 from gridpeers.plant.imports.plain_names import with_plain_names
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 FAR = 1.3
 """Ratio of a voltage to the nominal one that is no voltage drop: line-to-line voltages are 1.7 times as high."""

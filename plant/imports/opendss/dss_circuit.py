@@ -15,7 +15,7 @@ from gridpeers.plant.imports.opendss.dss_generation import GENERATION, read_gene
 from gridpeers.plant.imports.opendss.dss_loads import read_loads
 from gridpeers.plant.imports.opendss.dss_script import METERS
 from gridpeers.plant.imports.opendss.dss_values import unusual_voltages
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 CONTROLS = frozenset({"regcontrol", "capcontrol"})
 """Controls that have acted when the feeder is read; afterwards what they control stays."""

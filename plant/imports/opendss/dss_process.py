@@ -19,7 +19,7 @@ from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, p
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.plant.transient_folder import TransientFolder, no_room
 from gridpeers.wire.packages import damaged
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
 

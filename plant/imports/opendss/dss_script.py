@@ -9,8 +9,8 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from gridpeers.wire.printable import printable
 from gridpeers.wire.text_file import script_of
+from gridpeers.wire.wording import printable
 
 Execute = Callable[[str, str], str]
 """Runs one command in the engine, from this file and line; returns its message if it fails, else an empty text."""

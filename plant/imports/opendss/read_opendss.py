@@ -17,7 +17,7 @@ from gridpeers.plant.imports.import_checks import SHOWN_NAMES, number_of, refuse
 from gridpeers.plant.imports.opendss.dss_circuit import ImportRequest
 from gridpeers.plant.imports.opendss.dss_process import reading
 from gridpeers.plant.imports.plain_names import with_plain_names
-from gridpeers.wire.schema.suggestion import first_of
+from gridpeers.wire.wording import first_of
 
 UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
 """Remedy where nothing determines a voltage to ground."""

@@ -27,7 +27,7 @@ from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.timing.session_deadline import PATIENCE
+from gridpeers.wire.timing import PATIENCE
 
 DELAY_TICKS, DELAY = 300, 5.0
 """How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100

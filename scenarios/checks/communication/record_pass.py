@@ -33,10 +33,11 @@ from gridpeers.wire.journal import (
     ReceivedMessage,
     RejectedCount,
     SentMessage,
+    kind_of,
+    name_of,
 )
-from gridpeers.wire.journal_keys import kind_of, name_of
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
-from gridpeers.wire.timing.clock import time_of
+from gridpeers.wire.timing import time_of
 
 
 def opened(path: Path) -> RecordFile:

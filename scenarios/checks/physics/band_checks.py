@@ -18,7 +18,7 @@ from gridpeers.scenarios.checks.check_verdict import (
 from gridpeers.scenarios.checks.checked_case import CheckedCase, IslandWindow
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.relations import Below
+from gridpeers.wire.schema.table_schema import Below
 
 _SETTLING = Plausible("a settling time", 0.0, 3600.0)
 

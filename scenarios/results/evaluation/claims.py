@@ -21,11 +21,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from gridpeers.scenarios.results.evaluation.metric import Measure, Quantity
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_of
 from gridpeers.wire.plugins.registry import PluginError, Registry
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.findings import Findings

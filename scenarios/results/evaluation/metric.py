@@ -17,11 +17,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from gridpeers.wire.plugins.anybody import ANYTHING, named
-from gridpeers.wire.plugins.foreign_code import foreign_code
+from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, made
 from gridpeers.wire.plugins.registry import PluginError, Registry
-from gridpeers.wire.printable import printable
+from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.evaluation.window_metrics import WindowData

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.equipment import Feeder, Switch
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.scenarios.results.plots.places import Label, Places, has_coordinates, label_sides, places
-from gridpeers.wire.counted import counted
+from gridpeers.wire.wording import counted
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 """Of the microgrids, in the order of the inverters, then of other zones (Okabe and Ito's palette)."""

@@ -13,7 +13,7 @@ from gridpeers.scenarios.results.plots.case_figures import MEASURES, overview, s
 from gridpeers.scenarios.results.plots.drawing import Drawing
 from gridpeers.scenarios.results.plots.inverter_figures import available_power, microgrids, plug_and_play, powers
 from gridpeers.scenarios.results.plots.style import PAGE, save
-from gridpeers.wire.schema.suggestion import suggestion
+from gridpeers.wire.wording import suggestion
 
 
 def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:

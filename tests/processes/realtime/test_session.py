@@ -9,7 +9,7 @@ from time import monotonic
 import pytest
 
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.wire.driver.lingering import tcp_sockets
+from gridpeers.wire.driver.left_links import tcp_sockets
 from gridpeers.wire.driver.session import Session, SessionError
 
 
@@ -80,7 +80,7 @@ def test_in_wall_clock_time_a_frozen_receiver_holds_a_blocking_message_a_fifth_o
     """A message that may not be dropped waits so long for a full link; then the link is closed.
 
     Zenoh makes it anew within 10 s, or much later on a busy machine: a node therefore renews a session that brings
-    nothing (`gridpeers.wire.timing.session_deadline`), which this bare one does not.
+    nothing (`gridpeers.wire.timing`), which this bare one does not.
     """
     endpoint = free_endpoint()
     sender = Session("a", listen=(endpoint,), clock="wall", rendezvous=True)

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.agent_config import Control, GraphRule
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.wire.actions import Fetch, Listen, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Measurement, Message, Nameplate, Prepare, Ready, State
+from gridpeers.wire.node import Fetch, Listen, Publish
 from tests.toy.toy_configs import agent_config
 
 KEYS = Keys("toy")

@@ -9,10 +9,10 @@ from msgspec.structs import replace
 from gridpeers.agents.agent import Agent
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.wire.actions import Fetch, Listen, Log, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import AgentStatus, Measurement, Message, State
+from gridpeers.wire.node import Fetch, Listen, Log, Publish
 from tests.toy.toy_configs import agent_config
 
 KEYS = Keys("toy")

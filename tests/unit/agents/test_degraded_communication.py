@@ -16,9 +16,9 @@ from gridpeers.agents.degraded_communication import IslandDetector, SaturationDe
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.wire.actions import Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.messages import Measurement, State
+from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import agent_config
 
 T, M_P, M_Q, ALPHA = 0.02, 0.01, 0.05, 1.0

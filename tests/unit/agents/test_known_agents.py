@@ -12,10 +12,10 @@ from gridpeers.agents.agent_config import Control
 from gridpeers.agents.graphs import RosterGraph
 from gridpeers.agents.known_agents import KnownAgents
 from gridpeers.agents.lockstep_agent import LockstepAgent
-from gridpeers.wire.actions import Fetch
 from gridpeers.wire.codec import encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Prepare
+from gridpeers.wire.node import Fetch
 from tests.toy.toy_configs import agent_config
 
 NAMES = ("inv1", "inv2", "inv3", "inv4")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gridpeers.agents.session_health import STAGGER, SessionHealth
-from gridpeers.wire.timing.session_deadline import PATIENCE
+from gridpeers.wire.timing import PATIENCE
 
 NAMES = tuple(f"inv{i}" for i in range(1, 10))
 

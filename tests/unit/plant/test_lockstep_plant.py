@@ -11,7 +11,6 @@ from gridpeers.agents.agent import Agent
 from gridpeers.plant import unacknowledged_telemetry
 from gridpeers.plant.lockstep_plant import AGAIN, LockstepPlant
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.wire.actions import Fetch, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import (
@@ -27,6 +26,7 @@ from gridpeers.wire.messages import (
     Telemetry,
     Waiting,
 )
+from gridpeers.wire.node import Fetch, Publish
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gridpeers.wire.actions import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.codec import RejectedMessages
+from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.node_group import NodeGroup
 
 

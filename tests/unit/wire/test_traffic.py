@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.backlog import Loss
+from gridpeers.wire.backlog import TOKENS, Loss
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
@@ -28,7 +28,6 @@ from gridpeers.wire.journal import (
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Leave, Measurement, State
 from gridpeers.wire.node import Node
-from gridpeers.wire.token_queue import TOKENS
 from gridpeers.wire.traffic import (
     REJECTED,
     REJECTED_INTERVAL,

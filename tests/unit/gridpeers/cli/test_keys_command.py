@@ -132,8 +132,8 @@ def test_show_warns_of_a_key_that_is_not_that_of_the_certificate_beside_it(elsew
 
 def test_a_list_with_the_day_alone_is_read_as_the_whole_day() -> None:
     """Lists of sites that were made before have no time: such a certificate counts until the day is over."""
-    from gridpeers.wire.trust.certificate_validity import validity
-    from gridpeers.wire.trust.member import Member
+    from gridpeers.wire.trust.certificate_files import validity
+    from gridpeers.wire.trust.credentials import Member
 
     member, day = Member(name="inv1", role="agent", expires="2027-11-23"), datetime(2027, 11, 23, 18, tzinfo=UTC)
 

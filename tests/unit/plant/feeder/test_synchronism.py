@@ -11,9 +11,9 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent, SyncCheck
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
-from gridpeers.wire.actions import Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.messages import Answer, Command
+from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import toy_configs
 
 T_C = 0.02

@@ -8,10 +8,10 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
-from gridpeers.wire.actions import Fetch, Publish
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, Command, Leave, Message, PlantEvent, State, Telemetry
+from gridpeers.wire.node import Fetch, Publish
 from tests.toy.toy_configs import agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 

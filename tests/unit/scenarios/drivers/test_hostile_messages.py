@@ -11,9 +11,8 @@ from typing import Any
 
 import pytest
 
-from gridpeers.wire.actions import Fetch, Listen, Log
 from gridpeers.wire.codec import KINDS
-from gridpeers.wire.node import Node
+from gridpeers.wire.node import Fetch, Listen, Log, Node
 from tests.hostile.cases import hostile
 from tests.hostile.scenes import (
     EPOCH,

@@ -14,9 +14,9 @@ from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.run_request import Outcome
-from gridpeers.wire.actions import Publish
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import Stop
+from gridpeers.wire.node import Publish
 from tests.toy.toy_configs import Schedule, toy_configs
 from tests.toy.toy_links import Links
 from tests.toy.toy_plant import M_P, ToyPlant

@@ -20,7 +20,7 @@ from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario
 from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN
-from gridpeers.wire.timing.clock import rounded_up
+from gridpeers.wire.timing import rounded_up
 
 
 def islanding(**case: Any) -> ScenarioModel:

@@ -21,9 +21,9 @@ from gridpeers.scenarios.live.live_recorder import LiveRecorder
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.driver.stop_signal import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
+from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
 from gridpeers.wire.plugins.plugin import Plugin
-from gridpeers.wire.rate_limit import BURST, RateLimit
+from gridpeers.wire.timing import BURST, RateLimit
 from tests.toy.toy_configs import agent_config, toy_configs
 
 

@@ -12,8 +12,7 @@ from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.trust.credentials import Credentials
-from gridpeers.wire.trust.member import Member
+from gridpeers.wire.trust.credentials import Credentials, Member
 
 
 class Clock:

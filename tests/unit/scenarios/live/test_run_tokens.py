@@ -14,12 +14,12 @@ from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import RunMonitor
 from gridpeers.scenarios.live.run_tokens import RunTokens
 from gridpeers.scenarios.live.watching import RunSubscriber
+from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
 from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.plant_follower import MOST_PLANTS
-from gridpeers.wire.token_queue import AT_ONCE, MOST_WAITING
 from tests.toy.toy_configs import agent_config
 
 LAB, MINE = Keys("lab"), Keys("mine")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.results.run_files import TerminatedError, broken_if_ended
-from gridpeers.wire.driver.output import ReaderGoneError
+from gridpeers.wire.driver.ending import ReaderGoneError
 
 
 @pytest.mark.parametrize(

@@ -1,9 +1,197 @@
-"""What a process shows and whom it believes: settings of its links, names that a sender may have, strangers."""
+"""What a process shows, whom it believes, what each member may say, and what is told of strangers."""
 
 from __future__ import annotations
 
-from gridpeers.wire.trust.credentials import Credentials
-from gridpeers.wire.trust.member import Member
+import json
+import random
+from itertools import combinations, product
+from typing import NamedTuple
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from gridpeers.wire.keys import Keys, Role, describe
+from gridpeers.wire.trust.credentials import (
+    Credentials,
+    LinkCertificates,
+    Member,
+    Rule,
+    access_control,
+    rules_between,
+    with_inverters,
+)
+
+PLANT, OPERATOR, VIEWER = (Member(name=role, role=role) for role in ("plant", "operator", "viewer"))
+INV1, INV2, INV3 = (Member(name=f"inv{k}", role="agent") for k in (1, 2, 3))
+ALL = (PLANT, OPERATOR, VIEWER, INV1, INV2, INV3)
+MESSAGES = (
+    "put", "delete", "declare_subscriber", "declare_queryable", "query", "reply", "liveliness_token",
+    "declare_liveliness_subscriber", "liveliness_query",
+)  # fmt: skip
+DEMO = Keys("demo")
+CONCRETE = tuple(
+    spec.expression.replace("<run>", "demo").replace("<inverter>", name).replace("<instance>", "a1")
+    .replace("<epoch>", "7").replace("<recorder>", "history").replace("<id>", "z1")
+    for spec in describe()
+    for name in ("inv1", "inv2", "inv9")
+)  # fmt: skip
+zenoh = pytest.importorskip("zenoh")
+
+
+def allowed(rules: tuple[Rule, ...], flow: str, message: str, key: str) -> int:
+    """How many rules let a message pass, as Zenoh matches keys."""
+    expression = zenoh.KeyExpr(key)
+    return sum(
+        rule.flow == flow and message in rule.messages and zenoh.KeyExpr(rule.key).includes(expression)
+        for rule in rules
+    )
+
+
+def puts(sender: Member, receiver: Member, *, star: bool = False) -> set[str]:
+    """Kinds of keys, by their part after the run, on which a receiver takes what a sender publishes."""
+    rules = rules_between(receiver, sender, star=star)
+    return {"/".join(key.split("/")[2:]) for key in CONCRETE if allowed(rules, "ingress", "put", key)}
+
+
+@pytest.mark.parametrize("star", [False, True])
+@pytest.mark.parametrize(("own", "other"), [(a, b) for a, b in product(ALL, ALL) if a != b])
+def test_no_two_rules_can_apply_to_one_message(own: Member, other: Member, star: bool) -> None:
+    """The keys of any two rules for one flow and one message have nothing in common."""
+    rules = rules_between(own, other, star=star)
+
+    for a, b in combinations(rules, 2):
+        if a.flow == b.flow and {*a.messages} & {*b.messages}:
+            assert not zenoh.KeyExpr(a.key).intersects(zenoh.KeyExpr(b.key)), (a, b)
+
+
+@pytest.mark.parametrize("star", [False, True])
+@pytest.mark.parametrize(("own", "other"), [(a, b) for a, b in product(ALL, ALL) if a != b])
+def test_both_ends_of_a_link_allow_the_same(own: Member, other: Member, star: bool) -> None:
+    """What one end lets out the other lets in, and the other way round."""
+    here, there = rules_between(own, other, star=star), rules_between(other, own, star=star)
+
+    assert {(rule.messages, rule.key) for rule in here if rule.flow == "egress"} == {
+        (rule.messages, rule.key) for rule in there if rule.flow == "ingress"
+    }
+
+
+@given(st.permutations(ALL), st.sampled_from(ALL), st.booleans())
+def test_the_order_of_members_decides_nothing(members: list[Member], own: Member, star: bool) -> None:
+    """Any order gives the same bytes."""
+    assert json.dumps(access_control(own, members, star=star)) == json.dumps(access_control(own, ALL, star=star))
+
+
+@given(st.randoms(use_true_random=False))
+def test_the_order_of_rules_decides_nothing(rng: random.Random) -> None:
+    """In any order each message is allowed by one rule or by none."""
+    rules = list(rules_between(PLANT, INV1))
+    rng.shuffle(rules)
+
+    for flow, message, key in product(("ingress", "egress"), MESSAGES, CONCRETE):
+        assert allowed(tuple(rules), flow, message, key) <= 1
+
+
+def test_each_role_publishes_only_what_is_its_own() -> None:
+    """An agent its own keys, the plant measurements and what it says of the run, an operator commands."""
+    assert puts(INV1, PLANT) == {
+        "ready/inv1", "state/inv1", "set_points/inv1", "report/inv1", "journal/inv1", "link_acknowledgement/inv1",
+        "leave/inv1", "status/inv1", "request",
+    }  # fmt: skip
+    assert puts(INV1, INV2) == {"state/inv1"}
+    assert puts(PLANT, INV1) == {
+        "control", "stop_request/inv1/a1", "measurement/inv1", "link_request/inv1", "answer/z1",
+    }  # fmt: skip
+    assert puts(PLANT, VIEWER) == puts(PLANT, OPERATOR) == {"telemetry", "answer/z1"}
+    assert puts(OPERATOR, PLANT) == {"command", "request"}
+    assert puts(VIEWER, PLANT) == {"request"}
+    assert [puts(person, agent) for person in (OPERATOR, VIEWER) for agent in (INV1, INV2)] == [set()] * 4
+    assert puts(INV1, OPERATOR) == puts(INV1, VIEWER) == {"status/inv1"}
+    assert puts(OPERATOR, VIEWER) == puts(VIEWER, OPERATOR) == set()
+
+
+def test_a_relay_passes_on_to_each_what_it_may_hear_and_takes_from_each_its_own() -> None:
+    """In a star an agent hears its neighbours over the plant's link; the plant still takes only an agent's own keys."""
+    assert {"state/inv2", "state/inv9", "measurement/inv1"} <= puts(PLANT, INV1, star=True)
+    assert "measurement/inv2" not in puts(PLANT, INV1, star=True)
+    assert not {"state/inv2", "measurement/inv1", "control"} & puts(INV1, PLANT, star=True)
+    assert "command" not in puts(VIEWER, PLANT, star=True)
+
+
+def test_a_relay_may_read_whatever_others_write() -> None:
+    """So in a star the way to the plant needs no rule of its own, and a second plant gets nothing by being one."""
+    assert all("plant" in spec.readers for spec in describe() if spec.writers != ("plant",))
+    second = Member(name="plant2", role="plant")
+
+    to_agents = {"control", "stop_request/inv1/a1", "measurement/inv1", "link_request/inv1"}
+    assert to_agents <= puts(PLANT, INV1, star=True)
+    assert not to_agents & puts(PLANT, second, star=True)
+
+
+@pytest.mark.parametrize("role", ["plant", "agent", "operator", "viewer"])
+def test_nobody_holds_a_token_or_answers_a_query_for_another(role: Role) -> None:
+    """Of tokens an agent holds its own; a nameplate is the agent's, a configuration the plant's, to whom it is for."""
+    member = Member(name="inv1" if role == "agent" else role, role=role)
+    rules = rules_between(INV2, member)
+    held = {key for key in CONCRETE if allowed(rules, "ingress", "liveliness_token", key)}
+    answered = {key for key in CONCRETE if allowed(rules, "ingress", "reply", key)}
+
+    recorder, own = DEMO.alive_recorder("history"), DEMO.alive_agent("inv1", "a1")
+    assert held == {
+        "plant": {DEMO.alive_plant(7), recorder}, "agent": {own}, "operator": {recorder}, "viewer": set(),
+    }[role]  # fmt: skip
+    assert answered == {
+        "plant": {DEMO.config("inv2")},
+        "agent": {DEMO.nameplate("inv1", "a1")},
+    }.get(role, set())
+
+
+@pytest.mark.parametrize("star", [False, True])
+def test_an_agent_asks_for_no_configuration_but_its_own(star: bool) -> None:
+    """Operators and viewers ask for all; of nameplates an agent asks for those of the others."""
+
+    def asked(member: Member, of: Member) -> set[str]:
+        rules = rules_between(of, member, star=star)
+        return {"/".join(key.split("/")[2:]) for key in CONCRETE if allowed(rules, "ingress", "query", key)}
+
+    configurations = {f"config/{name}" for name in ("inv1", "inv2", "inv9")}
+    assert configurations & asked(INV1, PLANT) == {"config/inv1"}
+    assert configurations <= asked(OPERATOR, PLANT)
+    assert configurations <= asked(VIEWER, PLANT)
+    assert asked(INV1, INV2) == {"nameplate/inv2/a1"}
+    assert not allowed(rules_between(PLANT, INV1, star=star), "ingress", "query", DEMO.config("*"))
+
+
+def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
+    """Its common name is no subject any more; the one of the next generation is, before and after it is issued."""
+    revoked = Member(name="inv1", role="agent", revoked=True)
+    again = Member(name="inv1", role="agent", generation=2)
+
+    def names(*members: Member) -> list[list[str]]:
+        return [subject["cert_common_names"] for subject in access_control(PLANT, members)["subjects"]]
+
+    assert names(INV1) == [["agent:inv1", "agent:inv1:2"]]
+    assert names(revoked) == names(revoked, INV1) == names(INV1, revoked) == [["agent:inv1:2"]]
+    assert names(again) == [["agent:inv1:2", "agent:inv1:3"]]
+
+
+def test_an_agent_whose_certificate_comes_later_has_its_rules_now() -> None:
+    """Inverters of the feeder are subjects though nobody has their certificates; a name with another role keeps it."""
+    members = with_inverters((PLANT, Member(name="inv2", role="viewer")), ("inv1", "inv2"))
+
+    subjects = [subject["id"] for subject in access_control(INV3, members)["subjects"]]
+
+    assert subjects == ["agent:inv1", "plant:plant", "viewer:inv2"]
+
+
+def test_zenoh_reads_the_rules() -> None:
+    """Its configuration takes them as they are."""
+    rules = access_control(PLANT, ALL)
+
+    config = zenoh.Config.from_json5(json.dumps({"access_control": rules}))
+
+    assert len(json.loads(config.get_json("access_control/rules"))) == len(rules["rules"])
+
 
 INV1 = Member(name="inv1", role="agent")
 REVOKED = Member(name="eve", role="operator", revoked=True)
@@ -42,3 +230,46 @@ def test_why_the_holder_of_a_certificate_has_no_access_is_told() -> None:
     )
     assert SHOWN.stranger("").startswith("its other end is nobody, who is no member")
     assert SHOWN.stranger("a\nb").startswith(r"its other end is a\x0ab, who")
+
+
+class _Link(NamedTuple):
+    auth_identifier: str | None
+    dst: str = "tls/127.0.0.1:1"
+
+
+def test_a_link_vouches_for_the_name_of_its_certificate_also_once_it_is_gone() -> None:
+    """Nobody else is vouched for, and a link without a certificate vouches for nobody."""
+    certificates = LinkCertificates(SHOWN, relayed=False)
+
+    certificates.note([_Link(None)])
+    assert not certificates.vouches("inv1")
+    certificates.note([_Link("agent:inv1:2")])
+    assert certificates.vouches("inv1")
+    certificates.note([])
+    assert certificates.vouches("inv1")
+    assert not certificates.vouches("inv2")
+    assert not certificates.vouches("plant")
+
+
+def test_behind_a_relay_only_the_plant_needs_a_certificate_of_its_own_link() -> None:
+    """No link shows an agent's certificate there; the relay keeps each to its own keys."""
+    certificates = LinkCertificates(SHOWN, relayed=True)
+
+    assert certificates.vouches("inv1")
+    assert not certificates.vouches("plant")
+    certificates.note([_Link("plant:plant")])
+    assert certificates.vouches("plant")
+
+
+def test_a_link_of_a_stranger_is_told_once() -> None:
+    """The line names address and reason; a member's link has none, and links that stay are not told again."""
+    links = [_Link("agent:inv1"), _Link("operator:eve", "tls/192.0.2.1:5")]
+    certificates = LinkCertificates(SHOWN, relayed=False)
+
+    certificates.note(links)
+    certificates.note(links)
+
+    assert certificates.take_lines() == (
+        "a link to tls/192.0.2.1:5: its other end is operator:eve, whose certificate was revoked; nothing passes on it",
+    )
+    assert certificates.take_lines() == ()

@@ -16,8 +16,7 @@ import pytest
 pytest.importorskip("cryptography", reason="certificates need the extra keys")
 
 from gridpeers.wire.trust.certificate_files import KeysError, exposed_keys
-from gridpeers.wire.trust.key_folder import open_credentials
-from gridpeers.wire.trust.member_list import read_list
+from gridpeers.wire.trust.key_folder import open_credentials, read_list
 from gridpeers.wire.trust.site_authority import issue, make_site, revoke
 
 NOW = datetime(2026, 11, 23, 12, tzinfo=UTC)

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.trust.credentials import Credentials
-from gridpeers.wire.trust.member import Member
+from gridpeers.wire.trust.credentials import Credentials, Member
 from gridpeers.wire.trust.tls_refusal import tls_refusal
 
 pytest.importorskip("cryptography", reason="certificates need the extra keys")

@@ -1,4 +1,4 @@
-"""Links that a closed session of Zenoh leaves are ended."""
+"""Zenoh's sockets close at once, and links that a closed session leaves are ended."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from threading import Timer
 
 import pytest
 
-from gridpeers.wire.driver.left_links import QUIET, end_left_links
-from gridpeers.wire.driver.lingering import do_not_linger
+from gridpeers.wire.driver.left_links import QUIET, do_not_linger, end_left_links
 
 ZENOH = struct.pack("ii", 1, 10)
 
@@ -58,3 +57,23 @@ def test_a_connection_that_is_not_zenohs_stays(pair: tuple[socket.socket, socket
     link.sendall(b"x")
 
     assert other.recv(1) == b"x"
+
+
+def lingers(connection: socket.socket) -> bool:
+    """Whether closing it may block."""
+    return struct.unpack("ii", connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, 8))[0] != 0
+
+
+def test_links_close_at_once_and_stay_open_until_then() -> None:
+    """SO_LINGER goes from a connection that has it; what is sent over it still arrives."""
+    with socket.create_server(("127.0.0.1", 0)) as server, socket.create_connection(server.getsockname()) as link:
+        accepted, _ = server.accept()
+        with accepted:
+            link.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 10))
+            assert lingers(link)
+
+            do_not_linger()
+            assert not lingers(link)
+
+            link.sendall(b"state")
+            assert accepted.recv(5) == b"state"

@@ -1,31 +1,83 @@
-"""Handle lost output: its reader has gone, as by `| head -3`, or its disk is full.
+"""How a process ends: by a signal, by the loss of its output, or at once.
 
-SIGPIPE ends a C program there. Python ignores it, and so must we: a Zenoh session or a child that disappears in the
-middle of a write would end the process too. So the write itself detects it, below all buffers, for print, logging and
-rich alike. There are two reactions:
+Output is lost when its reader has gone, as by `| head -3`, or its disk is full. Python ignores SIGPIPE, and so must we:
+a Zenoh session or a child that disappears in the middle of a write would end the process too. So the write itself
+detects the loss, below all buffers, for print, logging and rich alike. There are two reactions:
 
 - A command that exists for its output quits (`speaking`). If no reader is left, it ends silently with the exit
   status that a shell gives for SIGPIPE; if the output cannot be written, it ends with one line on standard error.
-- A plant, an agent or a group of them continues, and its output is dropped. Its output is a log, and others depend on
-  it. To leave as on SIGTERM would take an inverter off the network, or end the run for all, because a person
-  quit a pager. For that there are `gridpeers stop`, `gridpeers down` and signals.
-
-Laws, metrics and checks of a user run in the process that writes: they cannot close its output, and what they put in
-its place is gone when they return (`gridpeers.wire.plugins.foreign_code`).
+- A plant, an agent or a group of them continues, and its output, a log, is dropped: others depend on it.
 """
 
 from __future__ import annotations
 
+import atexit
+import gc
 import io
+import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from math import inf
+from time import monotonic
+from types import FrameType
 from typing import TYPE_CHECKING, BinaryIO
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
+
+SAME_REQUEST_TIME = 1.0
+"""Time (s) in which further signals are the same request: `timeout` signals a command and then its group, and whoever
+ends all processes of a run signals those that their parent ends too. An end must not be interrupted by that."""
+
+Error = Callable[[str], BaseException]
+"""Makes the error that a signal raises, from its name."""
+
+
+class StopSignal:
+    """Handler of signals, for `signal.signal`.
+
+    Parameters
+    ----------
+    error : Error
+        Makes the error that it raises in the main thread.
+    clock : Callable[[], float], optional
+        Time (s).
+    """
+
+    def __init__(self, error: Error, clock: Callable[[], float] = monotonic) -> None:
+        self._error, self._clock = error, clock
+        self._at = -inf
+        self.requests = 0
+        """Number of requests so far."""
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        """Raise the error, unless it was raised less than `SAME_REQUEST_TIME` ago."""
+        now = self._clock()
+        if now - self._at >= SAME_REQUEST_TIME:
+            self._at = now
+            self.requests += 1
+            raise self._error(signal.Signals(number).name)
+
+
+def ctrl_c_or(error: Error) -> Error:
+    """Return what makes KeyboardInterrupt of SIGINT, and another error of any other signal."""
+    return lambda name: KeyboardInterrupt(name) if name == signal.SIGINT.name else error(name)
+
+
+def stop_at_signals(error: Error) -> StopSignal:
+    """Have SIGINT raise KeyboardInterrupt in the main thread and SIGTERM another error; return their handler.
+
+    A SIGINT that is ignored stays so: a shell ignores that of a program in the background.
+    """
+    stop = StopSignal(ctrl_c_or(error))
+    signal.signal(signal.SIGTERM, stop)
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, stop)
+    return stop
+
 
 READER_GONE = 128 + getattr(signal, "SIGPIPE", 13)
 """Exit status of a command whose reader has gone, as a shell counts signals."""
@@ -169,3 +221,30 @@ def flush_output() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOBase) and not stream.closed:
             stream.flush()
+
+
+GRACE = 1.0
+"""Time (s) for such threads to end by themselves."""
+
+
+def leave(status: int, tell: Callable[[str], None]) -> None:
+    """Return if no thread keeps the process alive, for Python to end; else end the process.
+
+    Parameters
+    ----------
+    status : int
+        Exit status of the process.
+    tell : Callable[[str], None]
+        Logs a sentence on the threads that still run.
+    """
+    gc.freeze()  # Python would seek garbage twice at its end: 0.2 s of a command, and 20 ms of each agent
+    deadline = monotonic() + GRACE
+    own = (threading.main_thread(), threading.current_thread())
+    left = [thread for thread in threading.enumerate() if not thread.daemon and thread not in own]
+    for thread in left:
+        thread.join(max(0.0, deadline - monotonic()))
+    if still := [thread.name for thread in left if thread.is_alive()]:
+        tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
+        atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once they had ended
+        flush_output()
+        os._exit(status)

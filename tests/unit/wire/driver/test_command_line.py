@@ -17,7 +17,7 @@ TOLD += "from pathlib import Path\nprint(command_line('run', 'a b'))\n"
 TOLD += (
     "print(command_line('run', within=Path('study')))\nprint(command_line(program='pytest', within=Path('study')))\n"
 )
-ROOT = str(Path(__file__).parents[3])
+ROOT = str(Path(__file__).parents[4])
 
 
 @pytest.fixture

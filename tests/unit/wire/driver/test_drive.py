@@ -10,10 +10,10 @@ import pytest
 
 import gridpeers.scenarios.drivers.telemetry_client as telemetry_client
 from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
+from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
 from gridpeers.wire.driver.drive import Core, drive
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.driver.session import Session
-from gridpeers.wire.token_queue import AT_ONCE, MOST_WAITING
 
 EXCESS = 5
 """Strangers' tokens for which there is no room."""

@@ -1,8 +1,65 @@
-"""Names in a message: the first of many; of an unknown one, what was probably meant, and what there is."""
+"""Words and texts for people: numbers of things, "did you mean", one printable line. Pure."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
+
+UNPRINTABLE = (
+    "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
+)
+"""Characters that are invisible, or change the look of others: controls, line ends, writing directions, tags."""
+
+_UNPRINTABLE = re.compile(f"[{UNPRINTABLE}\ud800-\udfff]")
+
+
+def printable(text: str, limit: int = 4000) -> str:
+    r"""Return a text with its unprintable characters spelt out, cut to a length.
+
+    Pass every text from an error or a file through this before you send it: receivers reject a text with a control
+    character.
+
+    Examples
+    --------
+    >>> print(printable("no solution:\n\x1b[31mred", 60))
+    no solution:\x0a\x1b[31mred
+    >>> printable("abcdef", 5)
+    'ab...'
+    """
+    text = _UNPRINTABLE.sub(lambda match: f"\\x{ord(match[0]):02x}", text)
+    return text if len(text) <= limit else text[: limit - 3] + "..."
+
+
+def utf8(text: str) -> str:
+    r"""Return a text for a file: what Python keeps of bytes that are no UTF-8, as in names of files, is spelt out.
+
+    Examples
+    --------
+    >>> utf8(b"no such file: caf\xe9".decode("utf-8", "surrogateescape"))
+    'no such file: caf\\udce9'
+    """
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def counted(number: int, one: str, several: str = "") -> str:
+    """Return a number of things with its noun.
+
+    Parameters
+    ----------
+    number : int
+        How many.
+    one : str
+        The noun for one of them.
+    several : str, optional
+        The noun for more, or none; by default with an s.
+
+    Examples
+    --------
+    >>> counted(1, "switch", "switches"), counted(2, "switch", "switches"), counted(0, "inverter")
+    ('1 switch', '2 switches', '0 inverters')
+    """
+    return f"{number} {one if number == 1 else several or f'{one}s'}"
+
 
 LONGEST_LIST = 30
 """Names that are listed at the most: all commands, or keys of a table of a scenario, but not all buses of a feeder."""
@@ -69,3 +126,18 @@ def _nearest(wrong: str, names: list[str]) -> str:
     longer = [name for name in by_lower if len(wrong) >= SHORTEST_START and name.startswith(wrong)]
     near = sorted(longer, key=len)[:1] or difflib.get_close_matches(wrong, by_lower, n=1)
     return by_lower[near[0]] if near else ""
+
+
+def is_no_path(text: str) -> bool:
+    r"""Whether a text names no file on any system: too long, or with what no name has.
+
+    Examples
+    --------
+    >>> is_no_path("a\0b"), is_no_path("x" * 300), is_no_path("laws/größe.py"), is_no_path("\ud800")
+    (True, True, False, True)
+    """
+    try:
+        raw = text.encode()
+    except UnicodeEncodeError:  # half a character
+        return True
+    return b"\0" in raw or len(raw) > 4000 or any(len(part) > 255 for part in raw.split(b"/"))

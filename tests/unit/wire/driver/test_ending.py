@@ -1,0 +1,110 @@
+"""A process ends once however often it is asked, writes its output to the end, and waits for no thread."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from gridpeers.wire.driver.drive import StoppedError
+from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal, stop_at_signals
+
+
+def test_what_follows_at_once_is_the_same_request() -> None:
+    """`timeout` signals a command and its group: the end of a run is not interrupted by that; a later signal counts."""
+    times = [10.0, 10.0, 10.0 + 0.9 * SAME_REQUEST_TIME, 10.0 + SAME_REQUEST_TIME]
+    stop = StopSignal(StoppedError, lambda: times.pop(0))
+
+    with pytest.raises(StoppedError, match="SIGTERM"):
+        stop(signal.SIGTERM, None)
+    stop(signal.SIGTERM, None)
+    stop(signal.SIGTERM, None)
+    with pytest.raises(StoppedError, match="SIGTERM"):
+        stop(signal.SIGTERM, None)
+
+
+@pytest.mark.parametrize("ignored", [False, True])
+def test_ctrl_c_and_sigterm_share_a_handler(ignored: bool) -> None:
+    """SIGINT is KeyboardInterrupt with its name, and one that a shell has ignored stays so."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN if ignored else signal.default_int_handler)
+        stop = stop_at_signals(StoppedError)
+
+        assert signal.getsignal(signal.SIGTERM) is stop
+        assert signal.getsignal(signal.SIGINT) is (signal.SIG_IGN if ignored else stop)
+        with pytest.raises(KeyboardInterrupt, match="SIGINT"):
+            stop(signal.SIGINT, None)
+        stop(signal.SIGTERM, None)
+        assert stop.requests == 1
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+SCRIPT = """
+import sys
+from gridpeers.wire.driver.ending import speaking
+with speaking("gridpeers"):
+    print("before")
+    try:
+        {foreign}
+    except OSError as error:
+        print(error)
+    print("after")
+"""
+
+
+@pytest.mark.parametrize("unbuffered", [[], ["-u"]], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize("foreign", [
+    "sys.stdout.close(); sys.stderr.close()",
+    "sys.stdout.buffer.close()",
+    "getattr(sys.stdout.buffer, 'raw', sys.stdout.buffer).close()",
+])  # fmt: skip
+def test_code_of_a_user_cannot_close_the_output(foreign: str, unbuffered: list[str]) -> None:
+    """What is printed afterwards is there, and the command ends as it would have."""
+    script = SCRIPT.format(foreign=foreign)
+    done = subprocess.run([sys.executable, *unbuffered, "-c", script], capture_output=True, text=True, timeout=30.0)
+
+    assert (done.returncode, done.stdout, done.stderr) == (0, "before\nafter\n", "")
+
+
+def test_output_cannot_be_taken_apart() -> None:
+    """It raises an error that says what to use, and the output goes on."""
+    script = SCRIPT.format(foreign="sys.stdout.detach()")
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30.0)
+
+    said = "standard output and error stay as they are; write to their .buffer"
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"before\n{said}\nafter\n", "")
+
+
+def test_output_that_somebody_has_replaced_ends_without_a_traceback() -> None:
+    """A stream of their own that is closed, or none, has nothing to be written at the end."""
+    foreign = "import io; sys.stdout.flush(); sys.stdout = io.TextIOWrapper(io.BytesIO())"
+    script = SCRIPT.format(foreign=foreign).replace('print("after")', "sys.stdout.close(); sys.stderr = None")
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30.0)
+
+    assert (done.returncode, done.stdout, done.stderr) == (0, "before\n", "")
+
+
+THREAD_SCRIPT = """
+import threading
+from gridpeers.wire.driver.ending import leave
+threading.Thread(target=threading.Event().wait, name="forgotten", daemon={daemon}).start()
+leave(3, print)
+print("returned")
+"""
+
+
+@pytest.mark.parametrize(("daemon", "status", "said"), [
+    (False, 3, "ended although threads still ran that were started in it: forgotten; make them daemons"),
+    (True, 0, "returned"),
+])  # fmt: skip
+def test_a_thread_that_never_ends_is_named_and_left(daemon: bool, status: int, said: str) -> None:
+    """The exit status is that of the process; one that Python does not wait for is no concern."""
+    script = THREAD_SCRIPT.format(daemon=daemon)
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=30.0)
+
+    assert (done.returncode, done.stdout.strip()) == (status, said)

@@ -1,0 +1,124 @@
+"""What a tick waits for, the sentence when it waits too long, and lines of a log that come again and again."""
+
+from __future__ import annotations
+
+import logging
+import re
+
+import pytest
+
+from gridpeers.wire.driver.drive import limit_log
+from gridpeers.wire.messages import PlantEvent, Telemetry
+from gridpeers.wire.timing import STOOD_STILL, Awaited, RateLimit, TickBarrier
+from tests.unit.plant.realtime.realtime_lab import running
+
+
+def barrier() -> TickBarrier:
+    """One that waits for two states since t = 5 s, at most 10 s."""
+    made = TickBarrier("plant", 10.0)
+    made.wait_for({"inv1": "State(4)", "inv2": "State(4)"}, now=5.0)
+    return made
+
+
+def test_it_opens_with_the_last_that_comes() -> None:
+    """The number of messages counts down, to one at the least: somebody else may speak."""
+    made = barrier()
+    counted = []
+    for name in ("inv2", "inv1"):
+        assert not made.is_open
+        counted.append(made.messages_needed)
+        made.came(name)
+
+    assert [*counted, made.messages_needed] == [2, 1, 1]
+    assert made.is_open
+
+
+def test_what_is_missing_is_named_in_the_order_of_the_wait() -> None:
+    """Each with what it should send."""
+    made = barrier()
+    assert made.missing_messages() == (Awaited("State(4)", "inv1"), Awaited("State(4)", "inv2"))
+    made.came("inv1")
+
+    assert made.missing_messages() == (Awaited("State(4)", "inv2"),)
+
+
+def test_the_deadline_counts_from_the_last_progress() -> None:
+    """A rest has none."""
+    made = barrier()
+    until = [made.deadline]
+    made.renew(7.0)
+    until.append(made.deadline)
+    made.rest()
+
+    assert [*until, made.deadline] == [15.0, 17.0, None]
+
+
+def test_the_complaint_names_what_and_whom_and_the_last_sign_of_life() -> None:
+    """Also of who has never been heard."""
+    made = barrier()
+    made.last_heard["inv1"] = 3, 2.0
+
+    assert made.complaint(made.missing_messages(), 15.0) == (
+        "plant: no State(4) from inv1 within 10 s; last heard of inv1: tick 3, 13.0 s ago. "
+        "no State(4) from inv2 within 10 s; nothing was ever heard from inv2"
+    )
+
+
+def test_who_looks_long_after_the_deadline_has_stood_still_itself() -> None:
+    """A deadline has passed at its time or a little later; much later it counts anew, once for each standstill."""
+    made = barrier()
+    made.renew(0.0)
+    due = made.deadline or 0.0
+
+    assert [made.is_over(due - 0.1), made.is_over(due), made.is_over(due + STOOD_STILL)] == [False, True, True]
+    assert not made.is_over(due + 600.0)
+    assert made.deadline == 2.0 * due + 600.0
+    assert made.is_over(made.deadline)
+    made.rest()
+    assert not made.is_over(1e9)
+
+
+def counted(lines: list[str]) -> int:
+    """Lines that were said and those that they tell of."""
+    left = sum(int(found[1]) for line in lines if (found := re.search(r"(\d+) more of this kind", line)))
+    return left + sum(not line[0].isdigit() for line in lines)
+
+
+def test_a_flood_is_thinned_out_and_every_line_is_counted() -> None:
+    """Kinds do not get in each other's way, however many there are."""
+    limit = RateLimit(burst=3, interval=10.0)
+    said = [line for i in range(1000) if (line := limit.admit(f"late by {i}.5 ms", now=0.1 * i))]
+    other = limit.admit("inv1 joined", now=100.0)
+    many = [line for i in range(5000) if (line := limit.admit("x" * (i + 1), now=100.0))]
+
+    assert 3 + 9 <= len(said) <= 3 + 10
+    assert counted([*said, *limit.left_out()]) >= 1000
+    assert other == "inv1 joined"
+    assert len(many) < 250
+
+
+def test_a_plant_that_is_ever_late_does_not_drown_its_own_log_and_record() -> None:
+    """2,626 lines of one run once: now a few, and at the end how many there were."""
+    lab = running(end=None)
+    lab.step(2000, delay=0.5)
+    lab.side.close("enough", lab.now)
+    events: list[PlantEvent] = [event for message in lab.take(Telemetry) for event in message.events]
+    late = [event.text for event in events if event.text.startswith("fell ")]
+    lab.do()
+
+    assert 5 <= len(late) <= 5 + 2000 * 0.52 / 10.0 + 2
+    assert sum("more of this kind" in line for line in late) >= 2
+
+
+def test_a_log_leaves_out_what_repeats_itself(caplog: pytest.LogCaptureFixture) -> None:
+    """Whoever writes to it; a second limit on the same log changes nothing."""
+    log = logging.getLogger("test_rate_limit")
+    limit = limit_log(log)
+    assert limit_log(log) is limit
+    with caplog.at_level(logging.INFO, "test_rate_limit"):
+        for i in range(100):
+            log.info("woken %.2f s late", 0.1 * i)
+    lines = [record.getMessage() for record in caplog.records]
+
+    assert len(lines) == 20
+    assert counted([*lines, *limit.left_out()]) == 100

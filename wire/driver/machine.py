@@ -1,0 +1,145 @@
+"""What the machine gives a process: cores, open files, memory."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import errno
+import gc
+import os
+from contextlib import suppress
+
+
+def usable_cores() -> int:
+    """Return their number: a container or a job of a cluster may have fewer than the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def schedule_as_batch() -> None:
+    """Have this thread, and those that it starts from now on, not interrupt others as they wake.
+
+    In simulated time nothing is due at an instant, but every message wakes several threads. Where these take a core
+    from a thread that computes, all wait for it: about a tenth of a tick with three agents a process on two cores,
+    nothing that could be measured with one. Nothing is done where the system knows no such policy, nor where the user
+    has chosen one (`chrt`).
+    """
+    if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
+        os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
+
+
+try:
+    import resource
+except ImportError:  # a system without limits
+    resource = None  # type: ignore[assignment]
+
+BESIDE_LINKS = 12
+"""Files that a process has open beside its links: standard streams, Zenoh's own, its listener."""
+
+MOST_FILES = 65_536
+"""Limit that suffices for any run; a much greater one makes other programs slow to start."""
+
+
+class OpenFilesError(RuntimeError):
+    """Too few files may be open; the message says how many, how many are needed, and what to do."""
+
+
+def limit() -> int:
+    """Return the number of files that this process may have open; `MOST_FILES` where there is no limit."""
+    if resource is None:
+        return MOST_FILES
+    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+    return MOST_FILES if soft == resource.RLIM_INFINITY else soft
+
+
+def raise_limit() -> None:
+    """Raise the limit of this process, and of those that it starts, as far as the system lets everybody do it."""
+    if resource is None:
+        return
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
+    if soft != resource.RLIM_INFINITY and soft < wanted:
+        with suppress(OSError, ValueError):  # some systems allow less than they say; then the limit stays
+            resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
+
+
+def check_open_files(who: str, links: int) -> None:
+    """Raise OpenFilesError if a process cannot have so many links: Zenoh would refuse some of them without a word."""
+    needed = links + BESIDE_LINKS
+    if limit() < needed:
+        raise OpenFilesError(
+            f"{who}: may have {limit()} files open at once, and needs {needed}: {links} links and {BESIDE_LINKS} more; "
+            f"raise the limit, e.g. with ulimit -n {max(1024, 2 * needed)}"
+        )
+
+
+def too_few_files(error: BaseException) -> str:
+    """Return what to do about an error, if it is that too many files are open; else an empty text."""
+    if not isinstance(error, OSError) or error.errno not in (errno.EMFILE, errno.ENFILE):
+        return ""
+    return (
+        f"too many files are open: this process may have {limit()}; raise the limit, e.g. with ulimit -n 1024, or let "
+        "agents share processes (--processes)"
+    )
+
+
+_M_MMAP_THRESHOLD = -3
+"""Option of mallopt(3)."""
+
+LARGE = 128 * 1024
+"""Bytes from which on a block comes from the system, and goes back to it at once."""
+
+
+def keep_out_of_the_heap() -> None:
+    """Have every block from `LARGE` on come from the system, for good; nothing where the C library is not glibc.
+
+    That is glibc's rule at first, but it takes the size of each such block that is freed as its new bound, up to
+    32 MB. Large messages then come and go in the heap, between small ones that stay: a recorder grew by a tenth in an
+    hour with nothing more in use.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
+        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)
+
+
+def give_back_freed() -> None:
+    """Give the heap's freed memory back to the system; nothing where the C library is not glibc.
+
+    It takes 1 ms in an agent, and more where more is free: 28 ms for 75 MB.
+    """
+    with contextlib.suppress(OSError, AttributeError, TypeError):
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+PERIOD = 60.0
+"""Time between two collections (s)."""
+
+
+class FreeLists:
+    """Empty the lists now and then.
+
+    Python keeps up to 2000 freed tuples of each length up to 20 for new ones, 5 MB in all. Messages of many lengths
+    fill these lists within half an hour. Only a full collection empties them, and one hardly ever comes in a process
+    that makes no garbage.
+
+    Parameters
+    ----------
+    now : float
+        Time of the process (s).
+    """
+
+    def __init__(self, now: float) -> None:
+        self._due = now + PERIOD
+        self._settled = False
+
+    def tend(self, now: float) -> bool:
+        """Collect if it is time (s); return whether it was.
+
+        The first time takes some ms, and what there is then stays: later collections pass it over and take some 0.1 ms.
+        """
+        if now < self._due:
+            return False
+        gc.collect()
+        if not self._settled:
+            gc.freeze()
+            self._settled = True
+        self._due = now + PERIOD
+        return True

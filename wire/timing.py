@@ -1,0 +1,322 @@
+"""Ticks, schedules and deadlines of a node, and how often a line of its log comes. Pure: time is an argument (s)."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from typing import NamedTuple
+
+
+def time_of(tick: int, T_c: float) -> float:
+    """Return the run time (s) of a tick.
+
+    It is a product and not a running sum, so every process computes the same bits for the same tick; it is rounded to
+    the nanosecond, like the plant's rows.
+
+    Examples
+    --------
+    >>> time_of(3, 0.02)
+    0.06
+    """
+    return round(tick * T_c, 9)
+
+
+def ticks_until(end: float, T_c: float) -> int:
+    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c.
+
+    Examples
+    --------
+    >>> ticks_until(7.0, 0.02)
+    350
+    """
+    if T_c <= 0.0:
+        raise ValueError(f"T_c: the control period must be positive, got {T_c:g} s")
+    ticks = round(end / T_c)
+    if ticks < 1 or abs(ticks * T_c - end) > 1e-9 * max(1.0, end):
+        raise ValueError(f"end: must be a positive multiple of the control period {T_c:g} s, got {end:g} s")
+    return ticks
+
+
+def rounded_up(t: float, T_c: float) -> float:
+    """Return the first end (s) of a run at or after t (s): a whole number of control periods T_c (s), one at least.
+
+    Examples
+    --------
+    >>> rounded_up(2.01, 0.02), rounded_up(2.02, 0.02), rounded_up(0.0, 0.02)
+    (2.02, 2.02, 0.02)
+    """
+    return time_of(max(1, math.ceil(t / T_c - 1e-6)), T_c)
+
+
+class Timer:
+    """Due times of a periodic task.
+
+    Parameters
+    ----------
+    period : float
+        Distance of the due times (s of wall time).
+    now : float
+        The first due time (s).
+
+    Examples
+    --------
+    When it wakes too late, it skips the past due times and keeps its schedule:
+
+    >>> timer = Timer(0.5, now=10.0)
+    >>> timer.take(10.0), timer.due
+    (0, 10.5)
+    >>> timer.take(11.75), timer.due
+    (2, 12.0)
+    """
+
+    def __init__(self, period: float, now: float) -> None:
+        self.period = period
+        self._start = now
+        self._n = 0
+
+    @property
+    def due(self) -> float:
+        """Next due time (s)."""
+        return self._start + self._n * self.period
+
+    def take(self, now: float) -> int:
+        """Note that the task is done now (s); return the number of skipped due times."""
+        past = max(0, int((now - self.due) / self.period))
+        self._n += past + 1
+        return past
+
+    def shift(self, by: float) -> None:
+        """Move all further due times by so much (s)."""
+        self._start += by
+
+
+STOOD_STILL = 1.0
+"""Time (s) after a deadline. A process that is woken later was stopped itself, while its clock went on."""
+
+
+class Awaited(NamedTuple):
+    """One message that a node waits for."""
+
+    message: str
+    """E.g. "State(41)"."""
+    sender: str
+    """Name of its sender."""
+
+
+class TickBarrier:
+    """The awaited messages, their deadline, and the last sign of life of every sender.
+
+    Parameters
+    ----------
+    name : str
+        Name of the waiting node.
+    timeout : float
+        Longest wait without progress (s on the driver's clock).
+
+    Examples
+    --------
+    >>> barrier = TickBarrier("plant", 10.0)
+    >>> barrier.wait_for({"inv2": "State(41)", "inv3": "State(41)"}, now=2.0)
+    >>> barrier.came("inv2"); barrier.last_heard["inv3"] = 40, 2.0
+    >>> barrier.is_open, barrier.deadline
+    (False, 12.0)
+    >>> barrier.complaint(barrier.missing_messages(), now=12.0)
+    'plant: no State(41) from inv3 within 10 s; last heard of inv3: tick 40, 10.0 s ago'
+    """
+
+    def __init__(self, name: str, timeout: float) -> None:
+        self._name, self._timeout = name, timeout
+        self._awaited: dict[str, str] = {}
+        """Missing message of each sender."""
+        self.siblings: frozenset[str] = frozenset()
+        """Senders in the same process, whose messages do not come from outside."""
+        self._from_outside = 0
+        """Number of missing messages of the others."""
+        self.last_heard: dict[str, tuple[int, float]] = {}
+        """Number and time (s) of each sender's last message, its last sign of life; the node notes them."""
+        self.deadline: float | None = None
+        """End of the present wait (s); None if it has none."""
+
+    @property
+    def is_open(self) -> bool:
+        """Whether no message is missing."""
+        return not self._awaited
+
+    @property
+    def messages_needed(self) -> int:
+        """Number of missing messages from outside; at least one."""
+        return max(1, self._from_outside)
+
+    def wait_for(self, awaited: dict[str, str], now: float) -> None:
+        """Start a new wait for a message of each of these senders; the dict goes to the barrier."""
+        self._awaited = awaited
+        self._from_outside = len(self._awaited.keys() - self.siblings) if self.siblings else len(self._awaited)
+        self.renew(now)
+
+    def awaits(self, name: str) -> bool:
+        """Whether a message of this sender is missing."""
+        return name in self._awaited
+
+    def came(self, name: str) -> None:
+        """Note that a sender has sent its message, or never will."""
+        if self._awaited.pop(name, None) is not None and name not in self.siblings:
+            self._from_outside -= 1
+
+    def missing_messages(self) -> tuple[Awaited, ...]:
+        """Return the missing messages with their senders."""
+        return tuple(Awaited(message, sender) for sender, message in self._awaited.items())
+
+    def renew(self, now: float) -> None:
+        """Note progress: the deadline restarts from now."""
+        self.deadline = now + self._timeout
+
+    def is_over(self, now: float) -> bool:
+        """Whether the deadline has passed.
+
+        A process that is woken much later than it asked for was stopped itself, as by Ctrl-Z or a closed lid. Messages
+        may be waiting for it, so the deadline starts again.
+        """
+        if self.deadline is None or now < self.deadline:
+            return False
+        if now > self.deadline + STOOD_STILL:
+            self.renew(now)
+            return False
+        return True
+
+    def rest(self) -> None:
+        """Wait without a deadline."""
+        self.deadline = None
+
+    def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
+        """Return the error of a passed deadline: each missing sender with its last tick and last sign of life."""
+        parts = []
+        for message, sender in missing:
+            if sender in self.last_heard:
+                tick, at = self.last_heard[sender]
+                sign = f"last heard of {sender}: tick {tick}, {now - at:.1f} s ago"
+            else:
+                sign = f"nothing was ever heard from {sender}"
+            parts.append(f"no {message} from {sender} within {self._timeout:g} s; {sign}")
+        return f"{self._name}: " + ". ".join(parts)
+
+
+PATIENCE = 3.5
+"""Silence (s) after which a new session opens. It is longer than Zenoh's lease, after which the others have
+forgotten the old session. It doubles, up to `LONGEST`, after a session that never worked."""
+
+LONGEST = 60.0
+"""Longest patience (s): a path that stays cut must not keep a process busy with sessions."""
+
+
+class SessionDeadline:
+    """Measure how long each sender has been silent in this session.
+
+    Parameters
+    ----------
+    patience : float, optional
+        Longest silence (s).
+
+    Examples
+    --------
+    >>> patience = SessionDeadline(3.5)
+    >>> both, one = {"inv2": 0.0, "inv3": 0.0}, {"inv3": 0.0}
+    >>> [patience.lost(names, now) for names, now in [(both, 0.0), (one, 3.0), (one, 3.5)]]
+    ['', '', 'inv3']
+    """
+
+    def __init__(self, patience: float = PATIENCE) -> None:
+        self.whole = False
+        """Whether no sender was silent at some time of this session."""
+        self._patience = patience
+        self._since: dict[str, float] = {}
+
+    def next(self) -> SessionDeadline:
+        """Return the patience of the next session: twice as long if this session never worked.
+
+        Examples
+        --------
+        >>> patience, silent = SessionDeadline(3.5).next(), {"inv3": 0.0}
+        >>> patience.lost(silent, 0.0), patience.lost(silent, 6.9), patience.lost(silent, 7.0)
+        ('', '', 'inv3')
+        """
+        return SessionDeadline(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
+
+    def lost(self, silent: Mapping[str, float], now: float) -> str:
+        """Note the senders that are wrongly silent now; return the first that has been so too long, else "".
+
+        Parameters
+        ----------
+        silent : Mapping[str, float]
+            Each silent sender, with the time (s) by which it may be silent longer than the patience.
+        now : float
+            s of wall time.
+        """
+        self._since = {name: self._since.get(name, now) for name in silent}
+        return next(
+            (name for name, since in self._since.items() if now - since >= self._patience + silent[name]),
+            "",
+        )
+
+
+BURST = 20
+"""Lines of one kind that may come at once, such as those of all joining agents."""
+
+INTERVAL = 10.0
+"""Time (s) after which one more line may come."""
+
+_KINDS = 200
+"""Number of distinct kinds; all further lines count as one kind."""
+
+_NUMBER = re.compile(r"[0-9]+(?:\.[0-9]+)?")
+
+
+class RateLimit:
+    """Pass the first lines of a kind, then one at each interval with the number of omitted ones.
+
+    Lines that differ only in numbers are of one kind.
+
+    Parameters
+    ----------
+    burst : int, optional
+        Lines of a kind that may come at once.
+    interval : float, optional
+        Time (s) after which one more line may come.
+
+    Examples
+    --------
+    >>> limit = RateLimit(burst=1, interval=10.0)
+    >>> [limit.admit(f"late by {i} ms", now=float(i)) for i in range(3)]
+    ['late by 0 ms', None, None]
+    >>> limit.admit("late by 9 ms", now=11.0)
+    'late by 9 ms (2 more of this kind left out)'
+    >>> limit.admit("late by 9 ms", now=11.5), limit.left_out()
+    (None, ['1 more of this kind left out, the last: late by 9 ms'])
+    """
+
+    def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:
+        self._burst, self._interval = burst, interval
+        self._allowed: dict[str, tuple[float, float]] = {}
+        """Number of lines of each kind that may come, and the time (s) of that number."""
+        self._left: dict[str, tuple[int, str]] = {}
+        """Number of omitted lines of each kind since the last one passed, and the latest of them."""
+
+    def admit(self, text: str, now: float) -> str | None:
+        """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""
+        kind = _NUMBER.sub("0", text)
+        if kind not in self._allowed and len(self._allowed) >= _KINDS:
+            kind = ""
+        allowed, since = self._allowed.get(kind, (float(self._burst), now))
+        allowed = min(float(self._burst), allowed + (now - since) / self._interval)
+        left, _ = self._left.pop(kind, (0, ""))
+        if allowed < 1.0:
+            self._allowed[kind] = allowed, now
+            self._left[kind] = left + 1, text
+            return None
+        self._allowed[kind] = allowed - 1.0, now
+        return f"{text} ({left} more of this kind left out)" if left else text
+
+    def left_out(self) -> list[str]:
+        """Take out one line per kind on its omitted lines, e.g. at the end."""
+        left, self._left = self._left, {}
+        return [f"{count} more of this kind left out, the last: {text}" for count, text in left.values()]
