@@ -45,6 +45,15 @@ class Entry(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
     """One entry; its tag is the first value of the array."""
 
 
+class KeyEntry(Entry, frozen=True, array_like=True):
+    """An entry about a key."""
+
+    at: float | None
+    """Time on the own clock (s, monotonic), of a message its arrival; None in simulated time."""
+    key: str
+    """Key, without `gridpeers/<run>/`; empty for all others, where there are too many to count each."""
+
+
 class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
     """Measurements that the plant sent and states that it heard in one tick of simulated time, as bytes."""
 
@@ -57,24 +66,16 @@ class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
     """The same of `State`, in the order in which they came."""
 
 
-class SentMessage(Entry, frozen=True, array_like=True, tag="sent"):
+class SentMessage(KeyEntry, frozen=True, array_like=True, tag="sent"):
     """A message that the node sent."""
 
-    at: float | None
-    """Time on the own clock (s, monotonic); None in simulated time."""
-    key: str
-    """Key, without `gridpeers/<run>/`."""
     payload: bytes
     """Its bytes."""
 
 
-class MessageReference(Entry, frozen=True, array_like=True, tag="heard"):
+class MessageReference(KeyEntry, frozen=True, array_like=True, tag="heard"):
     """A sound message off the wire whose bytes are in its sender's journal."""
 
-    at: float | None
-    """Time of arrival on the own clock (s, monotonic); None in simulated time."""
-    key: str
-    """Key, without `gridpeers/<run>/`."""
     epoch: int
     """Epoch of the sender."""
     seq: int
@@ -83,39 +84,27 @@ class MessageReference(Entry, frozen=True, array_like=True, tag="heard"):
     """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
 
-class ReceivedMessage(Entry, frozen=True, array_like=True, tag="received"):
+class ReceivedMessage(KeyEntry, frozen=True, array_like=True, tag="received"):
     """A message off the wire, with its bytes: nobody else has noted them, or they are not sound."""
 
-    at: float | None
-    """Time of arrival on the own clock (s, monotonic); None in simulated time."""
-    key: str
-    """Key, without `gridpeers/<run>/`."""
     payload: bytes
     """Its bytes."""
     rejected: str = ""
     """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
 
-class RejectedCount(Entry, frozen=True, array_like=True, tag="rejected"):
+class RejectedCount(KeyEntry, frozen=True, array_like=True, tag="rejected"):
     """Messages or tokens on one key of which nothing else is noted: dropped unread, or more rejected than are noted."""
 
-    at: float | None
-    """Time on the own clock by which they had come (s, monotonic); None in simulated time."""
-    key: str
-    """Key, without `gridpeers/<run>/`; empty for all others, where there are too many."""
     kind: str
     """Kind of their rejection (`gridpeers.wire.codec.KINDS`)."""
     count: Count
     """Number of them."""
 
 
-class Token(Entry, frozen=True, array_like=True, tag="token"):
+class Token(KeyEntry, frozen=True, array_like=True, tag="token"):
     """A liveliness token that appeared or vanished."""
 
-    at: float | None
-    """Time on the own clock (s, monotonic); None in simulated time."""
-    key: str
-    """Key, without `gridpeers/<run>/`."""
     appeared: bool
     """Whether it appeared."""
 
@@ -201,15 +190,7 @@ _encode_into = msgspec.msgpack.Encoder().encode_into
 
 
 class JournalBuffer:
-    r"""Entries since the last part.
-
-    Examples
-    --------
-    >>> journal = JournalBuffer()
-    >>> journal.add(Token(None, "alive/agent/inv1/a", True))
-    >>> len(journal), journal.take_parts()[0][:7], len(journal)
-    (28, b'\x94\xa5token', 0)
-    """
+    """Entries since the last part."""
 
     __slots__ = ("_bytes", "_ends", "_lost", "_rejected")
 
@@ -278,35 +259,17 @@ TO_LINKS = ("link_request", "command")
 
 
 def kind_of(key: str) -> str:
-    """Return the kind of a key.
-
-    Examples
-    --------
-    >>> kind_of("set_points/inv1"), kind_of("telemetry")
-    ('set_points', 'telemetry')
-    """
+    """Return the kind of a key."""
     return key.partition("/")[0]
 
 
 def name_of(key: str) -> str:
-    """Return the inverter that a key is about; empty if it is about none.
-
-    Examples
-    --------
-    >>> name_of("set_points/inv1"), name_of("telemetry")
-    ('inv1', '')
-    """
+    """Return the inverter that a key is about; empty if it is about none."""
     return key.partition("/")[2]
 
 
 def sender_of(key: str) -> str:
-    """Return who sends measurements or states on a key.
-
-    Examples
-    --------
-    >>> sender_of("measurement/inv1"), sender_of("state/inv1")
-    ('plant', 'inv1')
-    """
+    """Return who sends measurements or states on a key."""
     return PLANT if kind_of(key) == "measurement" else name_of(key)
 
 

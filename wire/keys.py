@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from functools import lru_cache
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import msgspec
 
@@ -33,7 +33,7 @@ ANY_TOKEN = "gridpeers/*/alive/**"
 """All tokens of all runs."""
 
 
-class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
+class KeySpec(msgspec.Struct, frozen=True):
     """One kind of key, for the protocol's documentation and for access rules (`gridpeers.wire.trust.credentials`)."""
 
     expression: str
@@ -64,15 +64,7 @@ class KeySpec(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def check_name(what: str, name: str) -> None:
-    """Raise ValueError if a name cannot be a part of a key.
-
-    Examples
-    --------
-    >>> check_name("run", "a/b")
-    Traceback (most recent call last):
-        ...
-    ValueError: run: "a/b" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."
-    """
+    """Raise ValueError if a name cannot be a part of a key."""
     if not is_name(name):
         raise ValueError(
             f'{what}: "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."'
@@ -80,18 +72,7 @@ def check_name(what: str, name: str) -> None:
 
 
 class Keys:
-    """The keys of one run.
-
-    Parameters
-    ----------
-    run : str
-        Name of the run.
-
-    Examples
-    --------
-    >>> Keys("demo").state("inv3")
-    'gridpeers/demo/state/inv3'
-    """
+    """The keys of one run."""
 
     def __init__(self, run: str) -> None:
         check_name("run", run)
@@ -174,24 +155,13 @@ class Keys:
         return f"{self._root}/alive/recorder/{recorder}"
 
     def for_verb(self, verb: str) -> str:
-        """Return the key of a command, by its verb: that of requests if it changes nothing.
-
-        Examples
-        --------
-        >>> Keys("demo").for_verb("status"), Keys("demo").for_verb("open")
-        ('gridpeers/demo/request', 'gridpeers/demo/command')
-        """
+        """Return the key of a command, by its verb: that of requests if it changes nothing."""
         return self.request if verb in READING else self.command
 
     def parts(self, key: str) -> tuple[str, ...]:
         """Split a key of this run into its parts after ``gridpeers/<run>/``; empty for any other key.
 
         It is also empty if a part is no name: anybody can hold a token of any text.
-
-        Examples
-        --------
-        >>> Keys("demo").parts("gridpeers/demo/alive/agent/inv3/a1")
-        ('alive', 'agent', 'inv3', 'a1')
         """
         return _parts(self._root, key)
 
@@ -221,13 +191,7 @@ def epoch_of(part: str) -> int | None:
 
 
 def is_token(key: str) -> bool:
-    """Whether a key can be that of a process's token, as long as those are.
-
-    Examples
-    --------
-    >>> is_token("gridpeers/demo/alive/agent/inv3/a1"), is_token("gridpeers/demo/alive/agent/PV 2")
-    (True, False)
-    """
+    """Whether a key can be that of a process's token, as long as those are."""
     parts = key.split("/", MOST_PARTS)
     return len(parts) <= MOST_PARTS and all(map(is_name, parts))
 
@@ -246,32 +210,21 @@ def run_of_plant(key: str) -> str:
     return ""
 
 
+_PARTS_SHOWN = {
+    "RUN": "run", "INV": "inverter", "INSTANCE": "instance", "EPOCH": "epoch", "NAME": "recorder", "ASKER": "id",
+}  # fmt: skip
+"""Parts of a key that differ, as `describe` makes the key with them and as it shows them."""
+
+
 def describe() -> tuple[KeySpec, ...]:
     """Every kind of key with its message, its two ends and its time; `gridpeers doc keys` prints it."""
     keys = Keys("RUN")
 
-    def row(
-        key: str,
-        kind: Literal["publication", "queryable", "token"],
-        message: str,
-        sender: str,
-        listener: str,
-        when: str,
-        writers: tuple[Role, ...],
-        readers: tuple[Role, ...],
-    ) -> KeySpec:
-        expression = key.replace("RUN", "<run>").replace("INV", "<inverter>").replace("INSTANCE", "<instance>")
-        expression = expression.replace("EPOCH", "<epoch>").replace("NAME", "<recorder>").replace("ASKER", "<id>")
-        return KeySpec(
-            expression=expression,
-            kind=kind,
-            message=message,
-            sender=sender,
-            listener=listener,
-            when=when,
-            writers=writers,
-            readers=readers,
-        )
+    def row(key: str, *rest: Any) -> KeySpec:
+        """Return the row of a key; `rest` are the other fields, in their order."""
+        for name, shown in _PARTS_SHOWN.items():
+            key = key.replace(name, f"<{shown}>")
+        return KeySpec(key, *rest)
 
     agent, instance = "INV", "INSTANCE"
     by_plant: tuple[Role, ...] = ("plant",)

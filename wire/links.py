@@ -46,12 +46,10 @@ class Links(Protocol):
     @property
     def clear(self) -> Set[str]:
         """Senders whose messages `offer` never takes; an attribute, because every message reads it."""
-        ...
 
     @property
     def dropped(self) -> int:
         """Number of messages that the links have lost, of all senders."""
-        ...
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire and return True; return False if no fault ever acts on its link.
@@ -65,15 +63,12 @@ class Links(Protocol):
         at : float
             Present time (s): the arrival time over a link without fault.
         """
-        ...
 
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out the messages that have arrived by now, in the order of arrival."""
-        ...
 
     def stalled(self, t: float) -> bool:
         """Return whether the receiver itself is paused at t (s of run time)."""
-        ...
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Apply a link command to messages sent at t (s of run time) or later.
@@ -83,45 +78,28 @@ class Links(Protocol):
         ValueError
             If the tree is no link command, or a value is wrong; then nothing has changed.
         """
-        ...
 
     def node_events(self, t: float) -> Sequence[tuple[str, str]]:
         """Take out what nodes with faults began or ended by t (s of run time): the agent and a sentence each."""
-        ...
 
     def impaired(self, t: float) -> tuple[str, ...]:
         """Return the senders whose links have a fault at t (s of run time)."""
-        ...
 
     def status(self, t: float) -> bytes:
         """Return the status of all links at t (s of run time), encoded for the client that asked."""
-        ...
 
     def restart(self) -> None:
         """Forget all commands and all messages on their way: the run's time starts from 0 again."""
-        ...
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out the links' account since the last report, for the record; the last report is never empty."""
-        ...
 
 
 def is_usable(links: Links | None, message: State | Measurement, payload: bytes, at: float, who: Admission) -> bool:
     """Return whether a message off the wire is of use at once; if not, `arrived` may yield it later.
 
     An emulated link takes the message if it came over one. The state of a paused agent only keeps the lock-step going:
-    no link carries it, and no node uses it.
-
-    Parameters
-    ----------
-    links : Links or None
-        All links into the receiver.
-    message, payload : State or Measurement, bytes
-        The message, decoded and as it came.
-    at : float
-        Now (s of run time, on the receiver's clock).
-    who : Admission
-        Epochs and numbers of all senders.
+    no link carries it, and no node uses it. `at` is the run time (s) on the receiver's clock.
     """
     if type(message) is State and message.idle:
         return False

@@ -3,6 +3,7 @@
 A node is sans-IO. A driver (`gridpeers.wire.driver.drive` over Zenoh, `gridpeers.scenarios.drivers.inprocess` on a bus)
 owns it in one thread and does
 
+    node.start(now)                                         before all else
     node.appeared(key, now) | node.vanished(key, now)       for a liveliness token that appears or vanishes
     node.received(key, payload, now)                        for a message, or the answer to a `Fetch`
     node.work(now)                                          for at most one piece of work, if it is ready
@@ -19,10 +20,10 @@ error while it is handled, costs that message alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from math import inf
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from gridpeers.wire.backlog import TOKENS, Loss, is_marked
 from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode
@@ -70,6 +71,57 @@ class Log(NamedTuple):
 Action = Publish | Fetch | Listen | WithdrawToken
 
 
+class RejectLines(Protocol):
+    """The log lines of rejected messages, as `RejectedMessages` has them."""
+
+    @property
+    def has_lines(self) -> bool: ...  # noqa: D102
+    def take_lines(self) -> tuple[str, ...]: ...  # noqa: D102
+
+
+class Core(Protocol):
+    """The part of a node that a driver uses; it asks `is_known` and `is_noted` in any thread."""
+
+    @property
+    def rejects(self) -> RejectLines:
+        """Rejected messages."""
+
+    @property
+    def tokens(self) -> tuple[str, ...]:
+        """Keys of the own tokens."""
+
+    @property
+    def subscriptions(self) -> tuple[str, ...]:
+        """Keys to subscribe to before the tokens are declared."""
+
+    @property
+    def watched(self) -> str:
+        """Key expression of the tokens to watch."""
+
+    @property
+    def finished(self) -> bool:
+        """Whether the driver should close."""
+
+    @property
+    def messages_needed(self) -> int:
+        """Number of messages that it needs to continue before its deadline."""
+
+    @property
+    def deadline(self) -> float | None:
+        """Time of the deadline (s); None if there is none."""
+
+    def start(self, now: float) -> None: ...  # noqa: D102
+    def take_actions(self) -> Sequence[Action | Log]: ...  # noqa: D102
+    def appeared(self, key: str, now: float) -> None: ...  # noqa: D102
+    def vanished(self, key: str, now: float) -> None: ...  # noqa: D102
+    def received(self, key: str, payload: bytes, now: float) -> None: ...  # noqa: D102
+    def is_known(self, key: str, payload: bytes) -> bool: ...  # noqa: D102
+    def is_noted(self, key: str) -> bool: ...  # noqa: D102
+    def lost(self, loss: Loss, now: float) -> None: ...  # noqa: D102
+    def work(self, now: float) -> bool: ...  # noqa: D102
+    def expire(self, now: float) -> None: ...  # noqa: D102
+
+
 Handler = Callable[[Any, bytes, float], None]
 """Takes a message of its route, its bytes, and the time; raises RejectedError if the message is unexpected."""
 
@@ -93,17 +145,7 @@ class Route(NamedTuple):
 
 
 class Node:
-    """The common part of an agent, the plant and a recorder.
-
-    Parameters
-    ----------
-    name : str
-        Name under which it sends.
-    run : str
-        Name of the run.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `Admission`.
-    """
+    """The common part of an agent, the plant and a recorder."""
 
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         self.keys = Keys(run)

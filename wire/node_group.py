@@ -11,18 +11,15 @@ declared before it, so nodes share a query, or its answer, unless the group has 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 from gridpeers.wire.backlog import Loss
-from gridpeers.wire.codec import RejectedMessages
-from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Publish, WithdrawToken
 
 
-class GroupedNode(Protocol):
-    """The part of an agent's node that its group uses, beside `gridpeers.wire.driver.drive.Core`."""
+class GroupedNode(Core, Protocol):
+    """The part of an agent's node that its group uses."""
 
-    rejects: RejectedMessages
-    routes: dict[str, Any]
     session_broken: bool
 
     @property
@@ -32,29 +29,8 @@ class GroupedNode(Protocol):
     @property
     def nameplate(self) -> tuple[str, bytes]: ...  # noqa: D102
     @property
-    def subscriptions(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
     def publications(self) -> tuple[str, ...]: ...  # noqa: D102
-    @property
-    def watched(self) -> str: ...  # noqa: D102
-    @property
-    def finished(self) -> bool: ...  # noqa: D102
-    @property
-    def messages_needed(self) -> int: ...  # noqa: D102
-    @property
-    def deadline(self) -> float | None: ...  # noqa: D102
-
     def note_siblings(self, names: frozenset[str]) -> None: ...  # noqa: D102
-    def start(self, now: float) -> None: ...  # noqa: D102
-    def take_actions(self) -> Sequence[Action | Log]: ...  # noqa: D102
-    def appeared(self, key: str, now: float) -> None: ...  # noqa: D102
-    def vanished(self, key: str, now: float) -> None: ...  # noqa: D102
-    def received(self, key: str, payload: bytes, now: float) -> None: ...  # noqa: D102
-    def is_known(self, key: str, payload: bytes) -> bool: ...  # noqa: D102
-    def is_noted(self, key: str) -> bool: ...  # noqa: D102
-    def lost(self, loss: Loss, now: float) -> None: ...  # noqa: D102
-    def work(self, now: float) -> bool: ...  # noqa: D102
-    def expire(self, now: float) -> None: ...  # noqa: D102
 
 
 class _Query(NamedTuple):
@@ -69,13 +45,7 @@ class _Query(NamedTuple):
 
 
 class NodeGroup:
-    """Nodes behind one session, as one `gridpeers.wire.driver.drive.Core`.
-
-    Parameters
-    ----------
-    nodes : sequence of GroupedNode
-        At least one; the names differ.
-    """
+    """Nodes behind one session, as one `Core`."""
 
     def __init__(self, nodes: Sequence[GroupedNode]) -> None:
         self.nodes = tuple(nodes)

@@ -46,38 +46,24 @@ class Traffic(Protocol):
 
     def sent(self, key: str, payload: bytes) -> None:
         """Note a message that the node sends."""
-        ...
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
         """Note a message off the wire, and the kind of its rejection, if it was rejected."""
-        ...
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
         """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
-        ...
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
         """Note a liveliness token that appeared or vanished."""
-        ...
 
     def line(self, text: str) -> None:
         """Note a line of the log."""
-        ...
 
 
 class TickTraffic:
     """The plant's messages in simulated time: what makes a tick is one entry, all else is noted one by one.
 
     No time is noted, because none of them counts: so the record is the same from every driver.
-
-    Parameters
-    ----------
-    keys : Keys
-        Keys of the run.
-    names : Collection[str]
-        Names of all agents that may take part.
-    journal : JournalBuffer
-        Takes the entries.
     """
 
     def __init__(self, keys: Keys, names: Collection[str], journal: JournalBuffer) -> None:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from time import monotonic
-from typing import Protocol
 
-from gridpeers.wire.backlog import Loss
 from gridpeers.wire.driver.machine import FreeLists
 from gridpeers.wire.driver.session import Session
-from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.timing import RateLimit
 
 
@@ -43,93 +41,6 @@ def limit_log(log: logging.Logger) -> LogLimit:
     return limit
 
 
-class RejectLines(Protocol):
-    """The log lines of rejected messages, as `gridpeers.wire.codec.RejectedMessages` has them."""
-
-    @property
-    def has_lines(self) -> bool: ...  # noqa: D102
-    def take_lines(self) -> tuple[str, ...]: ...  # noqa: D102
-
-
-class Core(Protocol):
-    """The part of a node (`gridpeers.wire.node`) that the driver uses."""
-
-    @property
-    def rejects(self) -> RejectLines:
-        """Rejected messages."""
-        ...
-
-    @property
-    def tokens(self) -> tuple[str, ...]:
-        """Keys of the own tokens."""
-        ...
-
-    @property
-    def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to."""
-        ...
-
-    @property
-    def watched(self) -> str:
-        """Tokens to watch."""
-        ...
-
-    @property
-    def finished(self) -> bool:
-        """Whether to close."""
-        ...
-
-    @property
-    def messages_needed(self) -> int:
-        """Number of messages that it needs to continue before its deadline."""
-        ...
-
-    @property
-    def deadline(self) -> float | None:
-        """Time of the deadline (s); None if there is none."""
-        ...
-
-    def start(self, now: float) -> None:
-        """Start."""
-        ...
-
-    def take_actions(self) -> Sequence[Action | Log]:
-        """Take out the actions to perform."""
-        ...
-
-    def appeared(self, key: str, now: float) -> None:
-        """Note a token."""
-        ...
-
-    def vanished(self, key: str, now: float) -> None:
-        """Note a lost token."""
-        ...
-
-    def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message that arrived at `now` (s); it may have waited in the inbox since."""
-        ...
-
-    def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of a known sender; called from any thread."""
-        ...
-
-    def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted; called from any thread."""
-        ...
-
-    def lost(self, loss: Loss, now: float) -> None:
-        """Count messages and tokens that were dropped unread."""
-        ...
-
-    def work(self, now: float) -> bool:
-        """Do a piece of work, if there is one."""
-        ...
-
-    def expire(self, now: float) -> None:
-        """Act on a passed deadline."""
-        ...
-
-
 class StoppedError(BaseException):
     """Request to end, from another part of the process or a signal.
 
@@ -157,7 +68,7 @@ def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logg
 
 
 def drive(core: Core, session: Session, log: logging.Logger) -> None:
-    """Start a core, declare its keys and serve it until it has finished; parameters and errors are those of `serve`.
+    """Start a core, declare its keys and serve it until it has finished, as `serve` does.
 
     The start comes first, because a restarted core needs fewer keys than at the end of its last session. The inbox
     learns of the core before any key is declared: a newcomer gets its history of tokens at once, strangers' included.
@@ -174,16 +85,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 
 
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
-    """Serve a started core until it has finished.
-
-    Parameters
-    ----------
-    core : Core
-        Node that decides.
-    session : Session
-        Session that carries its messages; the caller has declared the core's queryables.
-    log : logging.Logger
-        Log of the core's lines and of rejected messages, one line per kind.
+    """Serve a started core, whose queryables are declared, until it has finished.
 
     Raises
     ------

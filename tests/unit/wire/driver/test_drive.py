@@ -11,9 +11,10 @@ import pytest
 import gridpeers.scenarios.drivers.telemetry_client as telemetry_client
 from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
 from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
-from gridpeers.wire.driver.drive import Core, drive
+from gridpeers.wire.driver.drive import drive
 from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.driver.session import Session
+from gridpeers.wire.node import Core
 
 EXCESS = 5
 """Strangers' tokens for which there is no room."""
