@@ -70,34 +70,12 @@ def _mark(sender: str, epoch: int) -> bytes:
 
 
 def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
-    """Whether a payload begins as a message of this sender in this epoch does.
-
-    Examples
-    --------
-    >>> from gridpeers.wire.codec import encode
-    >>> from gridpeers.wire.messages import Ready
-    >>> payload = encode(Ready(sender="inv1", epoch=7, seq=0, t=0.0))
-    >>> is_marked(payload, "inv1", 7), is_marked(payload, "inv1", 8)
-    (True, False)
-    """
+    """Whether a payload begins as a message of this sender in this epoch does."""
     return _mark(sender, epoch) in payload[:_HEAD]
 
 
 class Backlog:
-    """Decide which messages may wait, from the size of each and what waits already.
-
-    Examples
-    --------
-    >>> backlog = Backlog()
-    >>> backlog.admits("state/inv2", 120, known=False, waiting=ROOM - 1)
-    True
-    >>> backlog.admits("state/inv2", 120, known=False, waiting=ROOM)
-    False
-    >>> backlog.admits("state/inv2", 120, known=True, waiting=ROOM)
-    True
-    >>> [(loss.key, loss.kind, loss.number) for loss in backlog.take_losses()]
-    [('state/inv2', 'excess', 1)]
-    """
+    """Decide which messages may wait, from the size of each and what waits already."""
 
     def __init__(self) -> None:
         self._beyond: Counter[str] = Counter()
@@ -107,19 +85,7 @@ class Backlog:
         self._losses: dict[tuple[str, str], Loss] = {}
 
     def admits(self, key: str, size: int, *, known: bool, waiting: int) -> bool:
-        """Return whether a message may wait; count it as lost if not.
-
-        Parameters
-        ----------
-        key : str
-            Its key.
-        size : int
-            Its bytes.
-        known : bool
-            Whether it is of a known sender, or answers an own question.
-        waiting : int
-            Messages that wait already.
-        """
+        """Return whether a message may wait, `known` if it answers an own question; count it as lost if not."""
         if not self.has_room(key, size, known=known, waiting=waiting):
             self.lose(key, "excess", f"{waiting} messages were waiting, {self._bytes} bytes of them in long ones")
             return False
@@ -181,16 +147,6 @@ class TokenQueue:
     """The tokens that appear to a process, and vanish.
 
     The owner calls `taken` once it has handled all that came in before, and has taken out all that came in since.
-
-    Examples
-    --------
-    >>> queue = TokenQueue()
-    >>> [queue.put("appeared", f"who{i}", 0.0, lambda key: False) for i in range(AT_ONCE + 2)].count(True) == AT_ONCE
-    True
-    >>> queue.put("vanished", "who20", 0.0, lambda key: False)
-    False
-    >>> queue.due, [event[1] for event in queue.taken(PAUSE)]
-    (0.01, ['who21'])
     """
 
     def __init__(self) -> None:
@@ -208,19 +164,7 @@ class TokenQueue:
         self._loss: Loss | None = None
 
     def put(self, event: TokenEvent, key: str, at: float, is_noted: Callable[[str], bool]) -> bool:
-        """Take an event at a time (s); return whether it comes in now.
-
-        Parameters
-        ----------
-        event : {"appeared", "vanished"}
-            The event.
-        key : str
-            The token.
-        at : float
-            The time (s).
-        is_noted : Callable[[str], bool]
-            Whether the process has noted the holder of a token.
-        """
+        """Take an event at a time (s); return whether it comes in now."""
         there = self._came.get(key, self._handled.get(key))
         if event == "vanished":
             self._waiting.pop(key, None)  # one that is announced again waits although its holder is noted

@@ -128,13 +128,7 @@ _TEXT = re.compile(_PRINTABLE)
 
 
 def is_name(text: str) -> bool:
-    """Whether a text is a `Name`.
-
-    Examples
-    --------
-    >>> is_name("inv1"), is_name("PV 2")
-    (True, False)
-    """
+    """Whether a text is a `Name`."""
     return _PATTERN.fullmatch(text) is not None
 
 
@@ -146,15 +140,7 @@ def check_names(*names: str) -> None:
 
 
 def check_tree(tree: Any) -> None:
-    """Check that a tree is finite, printable, at most `TREE_DEPTH` deep, and has at most `TREE_SIZE` values.
-
-    Examples
-    --------
-    >>> check_tree({"fault": {"on": "inv1 -> inv4", "loss": float("nan")}})
-    Traceback (most recent call last):
-    ...
-    ValueError: a number in it is not finite
-    """
+    """Check that a tree is finite, printable, at most `TREE_DEPTH` deep, and has at most `TREE_SIZE` values."""
     level, size = [tree], 0
     for _ in range(TREE_DEPTH):
         inner: list[Any] = []

@@ -57,15 +57,7 @@ TRACED = 40
 
 
 class RejectedError(Exception):
-    """A message that must be dropped.
-
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-    text : str
-        The problem of this message.
-    """
+    """A message that must be dropped."""
 
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
@@ -86,14 +78,7 @@ def payload_of(message: AnyMessage) -> bytes:
 
 
 def decode(payload: bytes) -> AnyMessage:
-    """Return the message of a payload, whole and within its bounds; raise RejectedError for any other payload.
-
-    Examples
-    --------
-    >>> from gridpeers.wire.messages import Ready
-    >>> decode(encode(Ready(sender="inv1", epoch=1, seq=0, t=0.0))).sender
-    'inv1'
-    """
+    """Return the message of a payload, whole and within its bounds; raise RejectedError for any other payload."""
     global _latest
     if payload is _latest[0]:
         return _latest[1]
@@ -112,13 +97,7 @@ def decode(payload: bytes) -> AnyMessage:
 
 
 def sound(payload: bytes) -> AnyMessage | None:
-    """Return the message of a payload; None if no receiver of this version would take it.
-
-    Examples
-    --------
-    >>> sound(b"noise") is None
-    True
-    """
+    """Return the message of a payload; None if no receiver of this version would take it."""
     try:
         return decode(payload)
     except RejectedError:
@@ -150,13 +129,7 @@ def _is_finite(value: Any) -> bool:
 
 
 class RejectedMessages:
-    """Count dropped messages by kind, and keep one log line per kind.
-
-    Parameters
-    ----------
-    who : str
-        Name of the receiver, for the log lines.
-    """
+    """Count dropped messages by kind, and keep one log line per kind."""
 
     def __init__(self, who: str) -> None:
         self.counts: Counter[str] = Counter()
@@ -195,14 +168,7 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    r"""Return the value that bytes or a text encode.
-
-    Parameters
-    ----------
-    decode : Callable[[bytes], T]
-        `decode` of a decoder of msgspec.
-    data : bytes or str
-        The bytes, or the text.
+    """Return the value that bytes or a text encode.
 
     Raises
     ------

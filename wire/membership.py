@@ -41,18 +41,6 @@ class Admission:
     rate : float, optional
         Most messages of one sender per s of run time: a larger gap in the numbers is not counted as lost. In simulated
         time numbers are ticks, and each is awaited.
-
-    Examples
-    --------
-    >>> from gridpeers.wire.messages import Ready
-    >>> admission, ready = Admission(), Ready(sender="inv1", epoch=7, seq=0, t=0.0)
-    >>> admission.bind("inv1", 7)
-    >>> admission.check(ready)
-    >>> admission.bind("inv1", 3)
-    >>> admission.check(ready)
-    Traceback (most recent call last):
-        ...
-    gridpeers.wire.codec.RejectedError: Ready(0) of epoch 7 of inv1, whose epoch is 3
     """
 
     def __init__(self, rate: float = inf) -> None:
@@ -148,23 +136,7 @@ ASKED_AT_ONCE = 20
 
 
 class Membership:
-    """Tokens and nameplates of the agents.
-
-    Parameters
-    ----------
-    admission : Admission
-        Receives the epoch of each process that counts.
-
-    Examples
-    --------
-    >>> members = Membership(Admission())
-    >>> members.appeared("inv2", "a"), members.appeared("inv2", "b")
-    (True, False)
-    >>> list(members.unmet)
-    [('inv2', 'a'), ('inv2', 'b')]
-    >>> members.vanished("inv2", "a"), members.instance("inv2")
-    (True, 'b')
-    """
+    """Tokens and nameplates of the agents."""
 
     def __init__(self, admission: Admission) -> None:
         self._admission = admission

@@ -15,17 +15,7 @@ that are mistaken."""
 
 
 class PlantFollower(Node):
-    """Follow the present plant that sends first, until its token is gone.
-
-    Parameters
-    ----------
-    name : str
-        Name under which it sends.
-    run : str
-        Name of the run.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
-    """
+    """Follow the present plant that sends first, until its token is gone."""
 
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         super().__init__(name, run, rate)

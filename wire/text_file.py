@@ -33,20 +33,12 @@ class TextFileError(ValueError):
 
 
 def text_of(data: bytes) -> str:
-    r"""Return the text of a file, with line ends as Python has them.
+    """Return the text of a file, with line ends as Python has them.
 
     Raises
     ------
     TextFileError
         If its bytes do not tell the encoding.
-
-    Examples
-    --------
-    >>> text_of("süd\r\n".encode("utf-16")), text_of("a\rb".encode("utf-16-le"))
-    ('süd\n', 'a\nb')
-    >>> text_of("a\nsüd".encode("latin-1"))
-    Traceback (most recent call last):
-    gridpeers.wire.text_file.TextFileError: line 2 has byte 0xfc, which is not UTF-8 (Windows or Latin-1?); save it ...
     """
     encoding = _encoding(data)
     try:
@@ -104,7 +96,7 @@ class TextTable(NamedTuple):
 
 
 def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str]) -> TextTable:
-    r"""Return the table of a CSV file as programs and spreadsheets write it.
+    """Return the table of a CSV file as programs and spreadsheets write it.
 
     The separator is the one by which the header has most of the known columns. Decimal commas become points where no
     number can be read in two ways. Empty rows, and empty cells beyond the header, as Excel leaves them, are left out.
@@ -122,11 +114,6 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
     ------
     TextFileError
         If it is no text, no table, or a number has two meanings.
-
-    Examples
-    --------
-    >>> read_table_text(b"sep=;\nbus;kW\n48;12,5\n;\n", ["bus", "kW"], ["kW"])
-    TextTable(header=['bus', 'kW'], rows=[(3, ['48', '12.5'])])
     """
     text = text_of(data)
     lines = text.splitlines() or [""]
@@ -161,13 +148,7 @@ def _separator(header: str, known: Collection[str]) -> str:
 
 
 def _replace_commas(rows: Iterable[tuple[int, list[str]]], columns: Collection[int]) -> None:
-    """Replace decimal commas in these columns by points.
-
-    Raises
-    ------
-    TextFileError
-        If they may separate thousands, or there are decimal points as well.
-    """
+    """Replace decimal commas in these columns by points."""
     places = [(row, cells, i) for row, cells in rows for i in columns if i < len(cells)]
     commas = [(row, cells, i) for row, cells, i in places if _DECIMAL_COMMA.fullmatch(cells[i])]
     if not commas:

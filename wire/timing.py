@@ -105,25 +105,7 @@ class Awaited(NamedTuple):
 
 
 class TickBarrier:
-    """The awaited messages, their deadline, and the last sign of life of every sender.
-
-    Parameters
-    ----------
-    name : str
-        Name of the waiting node.
-    timeout : float
-        Longest wait without progress (s on the driver's clock).
-
-    Examples
-    --------
-    >>> barrier = TickBarrier("plant", 10.0)
-    >>> barrier.wait_for({"inv2": "State(41)", "inv3": "State(41)"}, now=2.0)
-    >>> barrier.came("inv2"); barrier.last_heard["inv3"] = 40, 2.0
-    >>> barrier.is_open, barrier.deadline
-    (False, 12.0)
-    >>> barrier.complaint(barrier.missing_messages(), now=12.0)
-    'plant: no State(41) from inv3 within 10 s; last heard of inv3: tick 40, 10.0 s ago'
-    """
+    """The awaited messages, their deadline after `timeout` (s) without progress, and the last sign of life of all."""
 
     def __init__(self, name: str, timeout: float) -> None:
         self._name, self._timeout = name, timeout
@@ -275,23 +257,6 @@ class RateLimit:
     """Pass the first lines of a kind, then one at each interval with the number of omitted ones.
 
     Lines that differ only in numbers are of one kind.
-
-    Parameters
-    ----------
-    burst : int, optional
-        Lines of a kind that may come at once.
-    interval : float, optional
-        Time (s) after which one more line may come.
-
-    Examples
-    --------
-    >>> limit = RateLimit(burst=1, interval=10.0)
-    >>> [limit.admit(f"late by {i} ms", now=float(i)) for i in range(3)]
-    ['late by 0 ms', None, None]
-    >>> limit.admit("late by 9 ms", now=11.0)
-    'late by 9 ms (2 more of this kind left out)'
-    >>> limit.admit("late by 9 ms", now=11.5), limit.left_out()
-    (None, ['1 more of this kind left out, the last: late by 9 ms'])
     """
 
     def __init__(self, burst: int = BURST, interval: float = INTERVAL) -> None:

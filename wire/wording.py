@@ -44,15 +44,6 @@ def utf8(text: str) -> str:
 def counted(number: int, one: str, several: str = "") -> str:
     """Return a number of things with its noun.
 
-    Parameters
-    ----------
-    number : int
-        How many.
-    one : str
-        The noun for one of them.
-    several : str, optional
-        The noun for more, or none; by default with an s.
-
     Examples
     --------
     >>> counted(1, "switch", "switches"), counted(2, "switch", "switches"), counted(0, "inverter")
@@ -71,16 +62,7 @@ SHORTEST_START = 3
 def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] = ()) -> str:
     """Sentence that names what was probably meant and what there is.
 
-    Parameters
-    ----------
-    wrong : str
-        The unknown name.
-    known : Iterable[str]
-        All names that there are, in the order in which a reader wants them.
-    what : str
-        What they name, in the plural.
-    also : Iterable[str], optional
-        Other names for the same things: they may be meant too, and are not listed.
+    Known names come in the order in which a reader wants them; `also` may be meant too, and are not listed.
 
     Examples
     --------

@@ -25,11 +25,6 @@ def command_line(*words: str, program: str = PROGRAM, within: Path | None = None
         The program.
     within : Path, optional
         Folder in which the command will be typed; the present one if left out.
-
-    Examples
-    --------
-    >>> command_line("run", "my islanding.toml")
-    "gridpeers run 'my islanding.toml'"
     """
     return shlex.join([*_called(program, within), *words])
 

@@ -37,15 +37,7 @@ Error = Callable[[str], BaseException]
 
 
 class StopSignal:
-    """Handler of signals, for `signal.signal`.
-
-    Parameters
-    ----------
-    error : Error
-        Makes the error that it raises in the main thread.
-    clock : Callable[[], float], optional
-        Time (s).
-    """
+    """Handler of signals, for `signal.signal`."""
 
     def __init__(self, error: Error, clock: Callable[[], float] = monotonic) -> None:
         self._error, self._clock = error, clock
@@ -167,13 +159,7 @@ class _Watched(_Unclosed, io.FileIO):
 
 @contextmanager
 def speaking(program: str) -> Iterator[None]:
-    """Run a command that exists for its output; end it by `OutputLostError` when the output is lost.
-
-    Parameters
-    ----------
-    program : str
-        Name of the program, for its message on standard error.
-    """
+    """Run a command that exists for its output; end it by `OutputLostError` when the output is lost."""
     watch_readers(quits=True)
     try:
         try:
@@ -228,15 +214,7 @@ GRACE = 1.0
 
 
 def leave(status: int, tell: Callable[[str], None]) -> None:
-    """Return if no thread keeps the process alive, for Python to end; else end the process.
-
-    Parameters
-    ----------
-    status : int
-        Exit status of the process.
-    tell : Callable[[str], None]
-        Logs a sentence on the threads that still run.
-    """
+    """Return if no thread keeps the process alive, for Python to end; else end the process."""
     gc.freeze()  # Python would seek garbage twice at its end: 0.2 s of a command, and 20 ms of each agent
     deadline = monotonic() + GRACE
     own = (threading.main_thread(), threading.current_thread())

@@ -101,12 +101,6 @@ class LinkAddresses:
         Endpoints to listen on, as they were asked for.
     here : Collection[str]
         The addresses of this host as the session opens.
-
-    Examples
-    --------
-    >>> known = LinkAddresses(["tcp/0.0.0.0:0"], {"10.9.0.2"})
-    >>> known.moved({"10.9.0.2"}, here={"10.9.0.2", "10.8.0.1"}), known.moved((), here={"10.8.0.1"})
-    (False, True)
     """
 
     def __init__(self, listen: Collection[str], here: Collection[str]) -> None:

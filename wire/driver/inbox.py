@@ -42,15 +42,6 @@ class Inbox:
         Whether the owner has noted the holder of a token, so that it must learn of its end
         (`gridpeers.wire.backlog`); called from Zenoh's threads. By default it has noted everybody, and no token is
         lost.
-
-    Examples
-    --------
-    >>> inbox = Inbox()
-    >>> inbox.put(("message", "a", b"1"))
-    >>> [event[:3] for event in inbox.take(1, timeout=0.0)]
-    [('message', 'a', b'1')]
-    >>> inbox.take(1, timeout=0.0)
-    []
     """
 
     def __init__(self, *, holds: bool = False) -> None:
@@ -71,12 +62,7 @@ class Inbox:
     def put(self, event: Event, *, asked: bool = False) -> None:
         """Put an event in, from any thread; drop and count a message or token for which there is no room.
 
-        Parameters
-        ----------
-        event : Event
-            The event.
-        asked : bool, optional
-            Whether it answers an own question.
+        An answer to an own question (`asked`) has room as a known sender's message has.
         """
         if event[0] == "appeared" or event[0] == "vanished":
             self._put_token(event[0], event[1])

@@ -119,11 +119,6 @@ class FreeLists:
     Python keeps up to 2000 freed tuples of each length up to 20 for new ones, 5 MB in all. Messages of many lengths
     fill these lists within half an hour. Only a full collection empties them, and one hardly ever comes in a process
     that makes no garbage.
-
-    Parameters
-    ----------
-    now : float
-        Time of the process (s).
     """
 
     def __init__(self, now: float) -> None:

@@ -127,18 +127,7 @@ def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[Problem]:
 def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...], keys: tuple[str, ...] = KEYS) -> str:
     """Return why something is no class of a kind, "" if it is.
 
-    Parameters
-    ----------
-    it : Any
-        What somebody has written.
-    base : type
-        Its base class; `gridpeers` has it under its name.
-    method : str
-        The method that it must define.
-    arguments : tuple[str, ...]
-        Arguments of the method, without self.
-    keys : tuple[str, ...], optional
-        Names that its parameters cannot have.
+    It is to define the method of `base` with these arguments, and none of its parameters may be named as one of `keys`.
 
     Examples
     --------

@@ -104,14 +104,7 @@ class Registry(Generic[T]):
         return add
 
     def resolve(self, reference: str, folder: str = "") -> T:
-        """Return the object of a name or of a reference `module:Name`.
-
-        Parameters
-        ----------
-        reference : str
-            Registered name, name of an entry point, or `module:Name`.
-        folder : str, optional
-            Where the module is looked for if it is not on the Python path.
+        """Return the object of a name, or of `module:Name`, also from a `folder` that is not on the Python path.
 
         Raises
         ------

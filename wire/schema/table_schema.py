@@ -316,16 +316,7 @@ class Divides:
 
 
 def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
-    """Return the numbers that do not stand to those of other fields as they must.
-
-    Parameters
-    ----------
-    cls : type
-        Its fields say the relations.
-    values : Any
-        Has the values as attributes.
-    known : Callable[[Field], bool], optional
-        Whether a field has a right value; else nothing is said of it.
+    """Return the numbers that do not stand to those of other fields as they must, where both fields are `known` right.
 
     Examples
     --------

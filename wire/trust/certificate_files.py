@@ -27,13 +27,7 @@ class KeysError(ValueError):
 
 
 def own_certificate(folder: Path, member: Member) -> x509.Certificate | None:
-    """Return the certificate of a member if it is in the folder; None if it is not, or is of an earlier generation.
-
-    Raises
-    ------
-    KeysError
-        If the file is no certificate, or cannot be read.
-    """
+    """Return the certificate of a member if it is in the folder; None if it is not, or is of an earlier generation."""
     path = folder / f"{member.name}.pem"
     if not path.exists():
         return None
@@ -64,12 +58,7 @@ def exposed_keys(folder: Path) -> list[str]:
 def mistaken_keys(folder: Path, members: Sequence[Member]) -> dict[str, str]:
     """Return a sentence for each private key in a folder that is not that of the certificate beside it, by its file.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of a site, or what was copied of it.
-    members : Sequence[Member]
-        Members of its list; the authority's key is looked at in any case.
+    The authority's key is looked at in any case.
     """
     sentences = {}
     pairs: list[tuple[str, x509.Certificate | None]] = [(CA_KEY, read_certificate(folder / CA))]
@@ -177,15 +166,6 @@ def validity(folder: Path, member: Member, now: datetime) -> str:
 
     They are those of the certificate in the folder, as that is the one which a process here shows. Where it is not
     there, the end is that of the list of members, and its begin is not known.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the site, or what was copied of it.
-    member : Member
-        Of its list.
-    now : datetime
-        Present time.
 
     Returns
     -------

@@ -61,11 +61,6 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
         The next generation is among them: it exists only once the site has issued it, and so a name that gets a new
         certificate can take part in a run that has begun before.
-
-        Examples
-        --------
-        >>> Member(name="inv4", role="agent", revoked=True).accepted
-        ('agent:inv4:2',)
         """
         following = self._in_generation(self.generation + 1)
         return (following,) if self.revoked else (self.common_name, following)
@@ -78,11 +73,6 @@ def with_inverters(members: Iterable[Member], inverters: Iterable[str]) -> tuple
     """Return the members, and an agent for each inverter that is not among them.
 
     The site may issue its certificate during the run: until then nobody can be it.
-
-    Examples
-    --------
-    >>> [member.common_name for member in with_inverters((Member(name="inv1", role="agent"),), ("inv1", "inv10"))]
-    ['agent:inv1', 'agent:inv10']
     """
     known = tuple(members)
     names = {member.name for member in known}
@@ -121,13 +111,6 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
         one entry says so.
     star : bool, optional
         Whether the plant relays the messages of all others.
-
-    Examples
-    --------
-    >>> plant, inv1 = Member(name="plant", role="plant"), Member(name="inv1", role="agent")
-    >>> rules = access_control(plant, [inv1])
-    >>> rules["default_permission"], rules["subjects"]
-    ('deny', [{'id': 'agent:inv1', 'cert_common_names': ['agent:inv1', 'agent:inv1:2']}])
     """
     rules: list[dict[str, Any]] = []
     subjects: list[dict[str, Any]] = []
@@ -158,14 +141,7 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
 
 
 def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
-    """Return what a process allows on a link whose other end has the certificate of a member.
-
-    Examples
-    --------
-    >>> inv1, inv2 = Member(name="inv1", role="agent"), Member(name="inv2", role="agent")
-    >>> [rule.key for rule in rules_between(inv1, inv2) if rule.flow == "ingress" and "put" in rule.messages]
-    ['gridpeers/*/state/inv2']
-    """
+    """Return what a process allows on a link whose other end has the certificate of a member."""
     return tuple(_rules(own, other, star=star))
 
 
@@ -273,15 +249,7 @@ class Link(Protocol):
 
 
 class LinkCertificates:
-    """Note the certificates of a session's links.
-
-    Parameters
-    ----------
-    credentials : Credentials
-        Members of the site.
-    relayed : bool
-        Whether all links lead through a relay. Only the plant's certificate can be seen then.
-    """
+    """Note the certificates of a session's links."""
 
     def __init__(self, credentials: Credentials, *, relayed: bool) -> None:
         self._credentials, self._relayed = credentials, relayed

@@ -47,15 +47,6 @@ FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operato
 def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = None) -> MemberList:
     """Make a site's authority and its first certificates in a new folder, which is there whole or not at all.
 
-    Parameters
-    ----------
-    folder : Path
-        New folder; its name is the site's.
-    days : float, optional
-        Life of the first certificates (days).
-    now : datetime, optional
-        Present time.
-
     Raises
     ------
     KeysError
@@ -99,18 +90,7 @@ def issue(
 ) -> Member:
     """Issue a certificate to a name, or renew it; return the member.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the site, with its authority's key.
-    name : str
-        Name; of an agent that of its inverter.
-    role : Role, optional
-        Its role; a name keeps the one it has, and any other is an agent if left out.
-    days : float, optional
-        Life of the certificate (days).
-    now : datetime, optional
-        Present time.
+    An agent's name is that of its inverter. Without a role a name keeps the one it has, and any other is an agent.
 
     Raises
     ------
