@@ -113,9 +113,7 @@ def _program_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[
 
 
 def _fmu_problems(choice: LawChoice, parameters: Mapping[str, Any]) -> list[Problem]:
-    from gridpeers.agents.carriers.fmu_interface import fmu_problems
-
-    from gridpeers.agents.carriers.fmu import load_problem
+    from gridpeers.agents.carriers.fmu import fmu_problems, load_problem
 
     path = Path(choice.folder) / choice.fmu
     found = [Problem(*problem) for problem in fmu_problems(path, parameters)]

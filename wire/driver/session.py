@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
 from gridpeers.wire.backlog import Loss, Stamped
-from gridpeers.wire.driver.host_addresses import LinkAddresses, address_in, host_addresses
 from gridpeers.wire.driver.inbox import Inbox
-from gridpeers.wire.driver.left_links import do_not_linger, end_left_links
 from gridpeers.wire.driver.machine import give_back_freed, limit
+from gridpeers.wire.driver.sockets import LinkAddresses, address_in, do_not_linger, end_left_links, host_addresses
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
     PROFILES,

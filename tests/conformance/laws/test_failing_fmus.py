@@ -11,10 +11,9 @@ from pathlib import Path
 
 import msgspec
 import pytest
-from gridpeers.agents.carriers.fmu_interface import fmu_problems
 
 from gridpeers.agents.agent_config import LawChoice
-from gridpeers.agents.carriers.fmu import FmuLaw, load_problem
+from gridpeers.agents.carriers.fmu import FmuLaw, fmu_problems, load_problem
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from tests.conformance.laws.test_programs_end import OWN
 

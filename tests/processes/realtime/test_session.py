@@ -9,8 +9,8 @@ from time import monotonic
 import pytest
 
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
-from gridpeers.wire.driver.left_links import tcp_sockets
 from gridpeers.wire.driver.session import Session, SessionError
+from gridpeers.wire.driver.sockets import tcp_sockets
 
 
 def test_a_port_in_use_is_explained() -> None:
