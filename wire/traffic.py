@@ -120,26 +120,18 @@ class TickTraffic:
         It is encoded at once: to keep the messages of ten ticks for one go is dearer than to encode them, as what is
         made meanwhile finds its memory cold.
         """
-        if len(measurements) <= AT_ONCE:
-            self._journal.add(Exchange(tick, list(map(astuple, measurements)), list(map(astuple, states))))
-            return
-        for i in range(0, len(measurements), AT_ONCE):
-            part = slice(i, i + AT_ONCE)
-            self._journal.add(Exchange(tick, list(map(astuple, measurements[part])), list(map(astuple, states[part]))))
+        self._add_exchange(tick, list(map(astuple, measurements)), list(map(astuple, states)))
 
     def ticked(self, tick: int) -> None:
         """Note that tick k is complete, or that it ends as it is."""
         self._rejected = 0
-        measurements, states = self._measurements, self._states
-        if not (measurements or states):
-            return
-        if len(measurements) <= AT_ONCE:
-            self._journal.add(Exchange(tick, measurements, states))
-        else:
-            for i in range(0, max(len(measurements), len(states)), AT_ONCE):
-                self._journal.add(Exchange(tick, measurements[i : i + AT_ONCE], states[i : i + AT_ONCE]))
-        measurements.clear()
-        states.clear()
+        self._add_exchange(tick, self._measurements, self._states)
+        self._measurements.clear()
+        self._states.clear()
+
+    def _add_exchange(self, tick: int, measurements: list[Any], states: list[Any]) -> None:
+        for i in range(0, max(len(measurements), len(states)), AT_ONCE):
+            self._journal.add(Exchange(tick, measurements[i : i + AT_ONCE], states[i : i + AT_ONCE]))
 
 
 class TimedTraffic:

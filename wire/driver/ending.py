@@ -81,26 +81,26 @@ UNWRITABLE = 2
 class OutputLostError(SystemExit):
     """End of a command whose output is lost; contexts exit as on any other end."""
 
+    def __init__(self, status: int, text: str) -> None:
+        super().__init__(status)
+        self._text = text
+
+    def __str__(self) -> str:
+        return self._text
+
 
 class ReaderGoneError(OutputLostError):
     """The reader of the output has gone."""
 
     def __init__(self) -> None:
-        super().__init__(READER_GONE)
-
-    def __str__(self) -> str:
-        return "nobody reads its output any more"
+        super().__init__(READER_GONE, "nobody reads its output any more")
 
 
 class UnwritableError(OutputLostError):
     """The output cannot be written, e.g. to a full disk."""
 
     def __init__(self, why: str) -> None:
-        super().__init__(UNWRITABLE)
-        self._why = why
-
-    def __str__(self) -> str:
-        return f"standard output cannot be written: {self._why}"
+        super().__init__(UNWRITABLE, f"standard output cannot be written: {why}")
 
 
 class _Unclosed(io.IOBase):

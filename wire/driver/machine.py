@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
 import ctypes
 import errno
 import gc
 import os
 from contextlib import suppress
+
+try:
+    import resource
+except ImportError:  # a system without limits
+    resource = None  # type: ignore[assignment]
 
 
 def usable_cores() -> int:
@@ -26,11 +30,6 @@ def schedule_as_batch() -> None:
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
 
-
-try:
-    import resource
-except ImportError:  # a system without limits
-    resource = None  # type: ignore[assignment]
 
 BESIDE_LINKS = 12
 """Files that a process has open beside its links: standard streams, Zenoh's own, its listener."""
@@ -96,7 +95,7 @@ def keep_out_of_the_heap() -> None:
     32 MB. Large messages then come and go in the heap, between small ones that stay: a recorder grew by a tenth in an
     hour with nothing more in use.
     """
-    with contextlib.suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
+    with suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)
 
 
@@ -105,7 +104,7 @@ def give_back_freed() -> None:
 
     It takes 1 ms in an agent, and more where more is free: 28 ms for 75 MB.
     """
-    with contextlib.suppress(OSError, AttributeError, TypeError):
+    with suppress(OSError, AttributeError, TypeError):
         ctypes.CDLL(None).malloc_trim(0)
 
 

@@ -7,7 +7,7 @@ import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -294,16 +294,12 @@ def _write_pem(path: Path, certificate: x509.Certificate) -> None:
     _write(path, certificate.public_bytes(Encoding.PEM), 0o644)
 
 
-def _opener(mode: int) -> Callable[[str, int], int]:
-    return lambda path, flags: os.open(path, flags, mode)
-
-
 def _write(path: Path, data: bytes, mode: int) -> None:
     """Write a file whole or not at all; it has its mode before anything stands in it."""
     part = path.with_name(f".{path.name}.part")
     try:
         part.unlink(missing_ok=True)
-        with open(part, "xb", opener=_opener(mode)) as file:
+        with open(part, "xb", opener=lambda name, flags: os.open(name, flags, mode)) as file:
             file.write(data)
         part.replace(path)
     except OSError as error:
