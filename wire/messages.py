@@ -5,8 +5,7 @@ The type of a field contains its bounds (`gridpeers.wire.bounds`), and fields of
 
 Every message has its sender (`sender`), the sender's epoch (`epoch`, which identifies one process; see
 `gridpeers.wire.membership`), a number (`seq`) and the run time (`t`, s). In messages of the tick loop `seq` is the tick
-k and
-`t` is k T_c.
+k and `t` is k T_c.
 """
 
 from __future__ import annotations

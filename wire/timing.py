@@ -194,11 +194,6 @@ LONGEST = 60.0
 class SessionDeadline:
     """Measure how long each sender has been silent in this session.
 
-    Parameters
-    ----------
-    patience : float, optional
-        Longest silence (s).
-
     Examples
     --------
     >>> patience = SessionDeadline(3.5)

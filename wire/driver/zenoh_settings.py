@@ -65,8 +65,7 @@ PROFILES: dict[Clock, Profile] = {
 MOST_BYTES = 8_000_000
 """Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have
 `gridpeers.wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it
-passes nothing
-more of that sender on that link."""
+passes nothing more of that sender on that link."""
 
 
 def zenoh_settings(

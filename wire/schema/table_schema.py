@@ -232,18 +232,28 @@ def below(path: str, problems: Iterable[Problem]) -> list[Problem]:
 
 
 @dataclass(frozen=True)
-class Below:
-    """A number that must be less than that of another field."""
+class Relation:
+    """What a number must be beside that of another field."""
 
     field: str
     """Name of the other field."""
-    or_equal: bool = False
-    """Whether both may be equal."""
     only_with: str = ""
     """Name of a field without which, or with 0 in which, the relation does not hold."""
 
     def objection(self, value: float, other: float, key: str) -> str:
         """Return why a number does not stand so to the one at `key`, "" if it does."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class Below(Relation):
+    """A number that must be less than that of another field."""
+
+    or_equal: bool = False
+    """Whether both may be equal."""
+
+    def objection(self, value: float, other: float, key: str) -> str:
+        """Return why a number is not below the one at `key`, "" if it is."""
         if value <= other if self.or_equal else value < other:
             return ""
         rule = "not be above" if self.or_equal else "be below"
@@ -251,13 +261,8 @@ class Below:
 
 
 @dataclass(frozen=True)
-class After:
+class After(Relation):
     """An end (s) that must come after the beginning of another field."""
-
-    field: str
-    """Name of the other field."""
-    only_with: str = ""
-    """As of `Below`."""
 
     def objection(self, value: float, other: float, key: str) -> str:
         """Return why an end does not come after the beginning at `key`, "" if it does."""
@@ -267,13 +272,8 @@ class After:
 
 
 @dataclass(frozen=True)
-class MultipleOf:
+class MultipleOf(Relation):
     """A time (s) that must be a whole multiple of the step (s) of another field."""
-
-    field: str
-    """Name of the other field."""
-    only_with: str = ""
-    """As of `Below`."""
 
     def objection(self, value: float, step: float, key: str, rule: str = "") -> str:
         """Return why a time is no multiple of the step at `key`, "" if it is, or if one of them is not above 0.
@@ -290,13 +290,8 @@ class MultipleOf:
 
 
 @dataclass(frozen=True)
-class Divides:
+class Divides(Relation):
     """A step (s) that must divide the time (s) of another field."""
-
-    field: str
-    """Name of the other field."""
-    only_with: str = ""
-    """As of `Below`."""
 
     def objection(self, step: float, value: float, key: str) -> str:
         """Return why a step does not divide the time at `key`, "" if it does, or if one of them is not above 0.
@@ -326,7 +321,7 @@ def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lamb
     """
     found: dict[str, str] = {}
     for field in fields_of(cls):
-        for relation in (mark for mark in field.marks if isinstance(mark, Below | After | MultipleOf | Divides)):
+        for relation in (mark for mark in field.marks if isinstance(mark, Relation)):
             other = named(cls, relation.field)
             idle = {field.key, other.key} & found.keys() or not (known(field) and known(other))
             if idle or (relation.only_with and not getattr(values, relation.only_with)):
