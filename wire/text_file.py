@@ -101,14 +101,7 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
     The separator is the one by which the header has most of the known columns. Decimal commas become points where no
     number can be read in two ways. Empty rows, and empty cells beyond the header, as Excel leaves them, are left out.
 
-    Parameters
-    ----------
-    data : bytes
-        The file.
-    known : Collection[str]
-        Columns that the table may have.
-    numbers : Collection[str]
-        Those of them that have numbers.
+    `known` are the columns that the table may have, `numbers` those of them that have numbers.
 
     Raises
     ------

@@ -50,14 +50,7 @@ def rounded_up(t: float, T_c: float) -> float:
 
 
 class Timer:
-    """Due times of a periodic task.
-
-    Parameters
-    ----------
-    period : float
-        Distance of the due times (s of wall time).
-    now : float
-        The first due time (s).
+    """Due times of a periodic task, the first one now, a period apart (s of wall time).
 
     Examples
     --------

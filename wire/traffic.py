@@ -138,18 +138,9 @@ class TimedTraffic:
     """The messages and tokens of a node in wall-clock time, each with its time, in the order in which they came.
 
     What went into the core is noted call by call, so that the core can be given the same again.
-
-    Parameters
-    ----------
-    keys : Keys
-        Keys of the run.
-    journal : JournalBuffer
-        Takes the entries.
-    arrivals : bool, optional
-        Whether tokens and arriving messages are noted too, not only what the node sends.
-    whole : bool, optional
-        Whether states are noted with their bytes, as by the plant, which hears all of them: a killed agent takes the
-        end of its own journal with it, and an agent of others keeps none.
+    Without `arrivals` only what the node sends is noted. With `whole` states are noted with their bytes, as by the
+    plant, which hears all of them: a killed agent takes the end of its own journal with it, and an agent of others
+    keeps none.
     """
 
     def __init__(self, keys: Keys, journal: JournalBuffer, *, arrivals: bool = True, whole: bool = False) -> None:

@@ -15,16 +15,8 @@ def command_line(*words: str, program: str = PROGRAM, within: Path | None = None
     """Return a command as it can be typed in the terminal in which this one was.
 
     A program that was called by its path is not found by its name alone; so it keeps the path, as does another program
-    that is installed beside it. From Python, where nothing was typed, it has its name.
-
-    Parameters
-    ----------
-    words : str
-        What follows the program; they are quoted for a shell.
-    program : str, optional
-        The program.
-    within : Path, optional
-        Folder in which the command will be typed; the present one if left out.
+    that is installed beside it. From Python, where nothing was typed, it has its name. The command will be typed in the
+    folder `within`, by default the present one.
     """
     return shlex.join([*_called(program, within), *words])
 

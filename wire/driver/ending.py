@@ -174,12 +174,9 @@ def speaking(program: str) -> Iterator[None]:
 def watch_readers(*, quits: bool) -> None:
     """Let standard output and error detect their loss; a later call changes the reaction.
 
-    Streams that are not the process's own, such as those of tests, stay as they are.
+    If a process quits, it ends by `OutputLostError` in its main thread; else it continues silently.
 
-    Parameters
-    ----------
-    quits : bool
-        Whether the process then ends, by `OutputLostError` in its main thread, or continues silently.
+    Streams that are not the process's own, such as those of tests, stay as they are.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)

@@ -73,23 +73,10 @@ def no_links(name: str, tree: Mapping[str, Any]) -> None:
 
 
 def main(module: str, what: str, config_type: type[C] | UnionType, run: Callable[[C], str]) -> int:
-    """Read the configuration and run.
+    """Read the configuration, run, and return the exit status.
 
-    Parameters
-    ----------
-    module : str
-        Name of the module, for the usage message.
-    what : str
-        Description of the process, for the usage message.
-    config_type : type
-        Type of the configuration; of a union, the usage message names the first.
-    run : Callable[[C], str]
-        Runs, and returns why the run broke, or an empty text.
-
-    Returns
-    -------
-    int
-        Exit status.
+    The module's name and what it runs are for the usage message, which names the first type of a union. `run` returns
+    why the run broke, or an empty text.
     """
     status = _main(module, what, config_type, run) + (IN_ORDER if LEASH in sys.argv[1:2] else 0)
     leave(status, logging.getLogger(module).warning)

@@ -105,15 +105,7 @@ def _reaches_others(text: str) -> bool:
 
 
 class LinkAddresses:
-    """The addresses of this host that a session depends on.
-
-    Parameters
-    ----------
-    listen : Collection[str]
-        Endpoints to listen on, as they were asked for.
-    here : Collection[str]
-        The addresses of this host as the session opens.
-    """
+    """The addresses of this host that a session depends on."""
 
     def __init__(self, listen: Collection[str], here: Collection[str]) -> None:
         self._listen = listen
@@ -125,12 +117,7 @@ class LinkAddresses:
     def moved(self, sources: Collection[str], here: Collection[str]) -> bool:
         """Return whether links use an address that the host has lost, or that this session does not tell others.
 
-        Parameters
-        ----------
-        sources : Collection[str]
-            Addresses that links come from now.
-        here : Collection[str]
-            The addresses of this host now; while it has none a new session is of no use.
+        `sources` are the addresses that links come from now. While the host has none a new session is of no use.
         """
         self._used.update(set(sources).intersection(here))
         told, anew = (set(map(address_in, listen)) for listen in (self.endpoints, at_addresses(self._listen, here)))

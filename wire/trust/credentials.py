@@ -100,17 +100,9 @@ class Rule(NamedTuple):
 
 
 def access_control(own: Member, members: Iterable[Member], *, star: bool = False) -> dict[str, Any]:
-    """Return Zenoh's ``access_control`` for a process.
+    """Return Zenoh's ``access_control`` for a process among all members of its site, in any order.
 
-    Parameters
-    ----------
-    own : Member
-        The process.
-    members : Iterable[Member]
-        Everybody with a certificate of the site, in any order. A name that stands in it twice counts once, revoked if
-        one entry says so.
-    star : bool, optional
-        Whether the plant relays the messages of all others.
+    A name that stands in it twice counts once, revoked if one entry says so. In a star the plant relays all messages.
     """
     rules: list[dict[str, Any]] = []
     subjects: list[dict[str, Any]] = []

@@ -111,16 +111,7 @@ def open_credentials(
 ) -> tuple[Credentials, str]:
     """Check a member's files and return its credentials, and a sentence if its certificate ends soon.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the site, or what was copied of it.
-    roles : Sequence[Role]
-        Roles that will do, the preferred first.
-    name : str, optional
-        Name of the member; without one, the first of these roles whose key is there.
-    now : datetime, optional
-        Present time.
+    Without a name the member is the first of these roles, the preferred one first, whose key is there.
 
     Raises
     ------

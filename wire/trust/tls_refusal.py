@@ -26,21 +26,8 @@ name and another key."""
 def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
     """Return why the other end and this one do not agree on a link; empty if they do, or if it is not known.
 
-    Parameters
-    ----------
-    host : str
-        Name or address.
-    port : int
-        Its port.
-    credentials : Credentials or None
-        What this end shows, and whom it accepts; None if its links are open.
-    timeout : float
-        Longest wait for a connection, for the handshake on it, and for the alert after that (s each).
-
-    Returns
-    -------
-    str
-        The end of a sentence that begins with the other end.
+    It is the end of a sentence that begins with the other end. Without credentials the links of this end are open. A
+    connection, the handshake on it, and the alert after that are waited for as long as `timeout` each (s).
     """
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # a member is known by its name alone
