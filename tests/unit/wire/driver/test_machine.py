@@ -12,7 +12,7 @@ import pytest
 
 from gridpeers.wire.driver.machine import schedule_as_batch
 
-pytestmark = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
+with_policies = pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="this system knows no such policy")
 
 
 def policies(before: int) -> tuple[int, int]:
@@ -33,11 +33,13 @@ def policies(before: int) -> tuple[int, int]:
     return found[0], found[1]
 
 
+@with_policies
 def test_a_thread_and_those_it_starts_become_batch_work() -> None:
     """Zenoh's threads, which start later, are scheduled as the agent that opens the session."""
     assert policies(os.SCHED_OTHER) == (os.SCHED_BATCH, os.SCHED_BATCH)
 
 
+@with_policies
 def test_a_policy_that_the_user_has_chosen_stays() -> None:
     """A run under `chrt --idle` stays in the background."""
     assert policies(os.SCHED_IDLE) == (os.SCHED_IDLE, os.SCHED_IDLE)
