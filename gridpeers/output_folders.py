@@ -9,7 +9,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gridpeers.plant.tables.read import DATA, feeders
+from gridpeers.plant.imports.gridlabd.glm_classes import DATA
+from gridpeers.plant.tables.read import feeders
 from gridpeers.scenarios.results.run_files import (
     RUNS,
     FolderError,

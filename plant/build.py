@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from gridpeers.plant.dynamics.kernel.compiled import is_compiled
+from gridpeers.plant.dynamics.kernel.step import run_steps
 from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.tables import read_feeder
-from gridpeers.plant.tables.feeder_changes import changed
 
 
 def start_plant(config: PlantConfig) -> LivePlant:
@@ -73,3 +75,25 @@ def plant_at_rest(config: PlantConfig) -> Plant:
 def _feeder(config: PlantConfig) -> Feeder:
     settings = config.settings
     return changed(read_feeder(settings.feeder, settings.load_set), settings.changes)
+
+
+def load_kernels() -> None:
+    """Build and step a plant of the feeder that comes with gridpeers, unless its step would have to be compiled.
+
+    The first compilation takes up to a minute; it is for the plant's own process, which says that it compiles.
+    """
+    # a check compiles the operating point alone
+    if not is_compiled(run_steps.__name__):
+        return
+    settings = PlantSettings()
+    config = PlantConfig(
+        run="none",
+        settings=settings,
+        agents=(),
+        T_c=settings.h,
+        end=None,
+        record_step=settings.h,
+        deadline=1.0,
+        listen=(),
+    )
+    build_plant(config).advance()

@@ -28,8 +28,7 @@ from typing import Literal
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode
-from gridpeers.plant.telemetry_reporter import measurement_of
-from gridpeers.plant.unacknowledged_telemetry import UnacknowledgedTelemetry
+from gridpeers.plant.telemetry_reporter import UnacknowledgedTelemetry, measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
 from gridpeers.wire.messages import (

@@ -8,9 +8,9 @@ import msgspec
 
 from gridpeers.plant.equipment.inverter_parameters import GflParameters as GflParameters
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmParameters
-from gridpeers.plant.equipment.own_parameters import OwnParameters
+from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.plant.helics.helics_settings import HelicsSettings
-from gridpeers.plant.simulator import Simulator
+from gridpeers.plant.known_names import Simulator
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.plausible import Plausible, Unit

@@ -11,11 +11,11 @@ from time import monotonic
 import msgspec
 from msgspec.structs import replace
 
+from gridpeers.plant.known_names import COMPILING, LISTENING, READY
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
-from gridpeers.plant.start_words import COMPILING, LISTENING, READY
 from gridpeers.wire.driver.drive import StoppedError, drive, perform, serve
 from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, schedule_as_batch
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links

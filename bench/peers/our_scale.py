@@ -23,7 +23,7 @@ from unittest.mock import patch
 import bench.harness  # noqa: F401  # one thread, before numpy is imported
 from gridpeers.feeder import Feeder
 from gridpeers.plant.build import build_plant
-from gridpeers.plant.equipment.joined_copies import copy_name, joined_copies
+from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.inprocess import run_inprocess

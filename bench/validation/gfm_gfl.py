@@ -12,7 +12,7 @@ import scipy.sparse as sp
 
 from bench.validation.delta_mode import COMPLEX, REAL, Property, RecordedRun, delta_header, record
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from gridpeers.plant.gridlabd.model.glm_block import block
 from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks

@@ -19,7 +19,7 @@ from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_script
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from bench.validation.write_opendss import LIMITS, write_opendss
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
-from gridpeers.plant.dynamics.phasors import aligned_sum
+from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.equipment import Bus, Feeder, Source
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters

@@ -8,10 +8,10 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kept_network import kept_network
 from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.live_network import TOLERANCE
-from gridpeers.plant.dynamics.reduction.kept_network import kept_network
-from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.plant.dynamics.reduction import SparseReduction
 
 
 def kirchhoff_residual(dynamics: Dynamics) -> float:

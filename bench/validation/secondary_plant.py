@@ -46,7 +46,7 @@ from bench.validation.secondary_gridlabd import (
 from bench.validation.validation_part import inverter_row
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, advance_inverters, keep_start, turn_frames
-from gridpeers.plant.dynamics.kernel.current_limit import solve_within_limits
+from gridpeers.plant.dynamics.kernel.step import solve_within_limits
 from gridpeers.plant.dynamics.live_network import TOLERANCE
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.feeder.circuits import circuit_of

@@ -1,4 +1,4 @@
-"""The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals.
+"""The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals; and its errors.
 
 `gridpeers.plant.feeder.circuits` makes one for every set of closed switches; tests make their own small ones.
 """
@@ -13,8 +13,108 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from gridpeers.plant.dynamics.load_law import LoadLaw
-from gridpeers.plant.dynamics.phasors import PHASES
+from gridpeers.plant.dynamics.kernel.compiled import A120
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.solve import COLUMNS, limited_currents, limited_tangents
+
+
+class PlantError(RuntimeError):
+    """The plant has no solution; the message says where, and what to try."""
+
+
+class NoSolutionError(PlantError):
+    """Islands of a network have no solution with the present injections.
+
+    Attributes
+    ----------
+    islands : tuple of int
+        Their numbers in the network's reduction.
+    """
+
+    def __init__(self, islands: tuple[int, ...]) -> None:
+        super().__init__(f"{len(islands)} islands have no solution")
+        self.islands = islands
+
+
+class NoPowerFlowError(PlantError):
+    """No operating point at the start.
+
+    Attributes
+    ----------
+    weak : dict of int to float
+        Load branches that the network cannot feed even alone, and their short-circuit powers (VA).
+    """
+
+    def __init__(self, weak: dict[int, float]) -> None:
+        super().__init__("no initial operating point: the power flow did not converge")
+        self.weak = weak
+
+
+PHASES = np.array([1.0, A120.conjugate(), A120])
+"""Balanced set of phasors, phase A at 0."""
+
+_ONTO_A = np.array([1.0, A120, A120**2])
+"""Factors that turn the phases of a balanced set onto phase A."""
+
+
+def aligned_sum(V: Complex) -> Complex:
+    """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence.
+
+    Examples
+    --------
+    >>> float(abs(aligned_sum(240.0 * PHASES)).round(9)), float(abs(aligned_sum(240.0 * PHASES[::-1])).round(9))
+    (720.0, 0.0)
+    """
+    return np.asarray(V @ _ONTO_A)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoadLaw:
+    """The law of m load branches, as parallel arrays."""
+
+    S: Complex
+    """Constant power of each (VA)."""
+    I0: Complex
+    """Constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)."""
+    limited_at: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    """Branches with a `LoadPart`'s law; their S and I0 are 0."""
+    law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))
+    """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
+
+    def __add__(self, others: LoadLaw) -> LoadLaw:
+        """Return the law of these branches and then of the others."""
+        return LoadLaw(
+            S=np.concatenate([self.S, others.S]),
+            I0=np.concatenate([self.I0, others.I0]),
+            limited_at=np.concatenate([self.limited_at, others.limited_at + self.S.size]),
+            law=np.concatenate([self.law, others.law]),
+        )
+
+    def of(self, branches: NDArray[np.int64]) -> LoadLaw:
+        """Return the law of some of the branches."""
+        place = np.full(self.S.size, -1, np.int64)
+        place[branches] = np.arange(branches.size)
+        at = place[self.limited_at]
+        return LoadLaw(S=self.S[branches], I0=self.I0[branches], limited_at=at[at >= 0], law=self.law[at >= 0])
+
+    def currents(self, V: Complex) -> Complex:
+        """Return the branches' currents (A) at their voltages (V); a branch without voltage takes none."""
+        magnitude = np.abs(V)
+        alive = magnitude > 0.0
+        divisor = np.where(alive, V, 1.0)
+        current = np.conj(self.S / divisor) + self.I0 * divisor / np.where(alive, magnitude, 1.0)
+        if self.limited_at.size:
+            limited_currents(self.limited_at, self.law, np.concatenate([V.real, V.imag]), current)
+        return np.asarray(np.where(alive, current, 0.0), dtype=np.complex128)
+
+    def tangent(self, V: Complex) -> tuple[Complex, Complex]:
+        """Return the factors (S) by which the currents follow the voltages V (V), and these conjugate."""
+        magnitude = np.abs(V)
+        A = self.I0 / (2.0 * magnitude)
+        B = -np.conj(self.S) / np.conj(V) ** 2 - self.I0 * V / (2.0 * magnitude * np.conj(V))
+        if self.limited_at.size:
+            limited_tangents(self.limited_at, self.law, V, A, B)
+        return A, B
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.circuit import PHASES, aligned_sum
 from gridpeers.plant.dynamics.kernel import gfl as gfl_model
 from gridpeers.plant.dynamics.kernel import gfm as gfm_model
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
-from gridpeers.plant.dynamics.phasors import PHASES, aligned_sum
-from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from gridpeers.plant.plant_config import Method

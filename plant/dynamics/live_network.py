@@ -2,18 +2,77 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable, Iterator
+from typing import Generic, TypeVar
+
 import numpy as np
 
-from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.error import NoSolutionError
-from gridpeers.plant.dynamics.foreseen_cache import ForeseenCache
+from gridpeers.plant.dynamics.circuit import Circuit, NoSolutionError
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.island_parts import IslandParts, is_large
 from gridpeers.plant.dynamics.kernel.controller_pass import Units
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
 from gridpeers.plant.dynamics.kernel.solve import solve_network
-from gridpeers.plant.dynamics.reduction.island_parts import IslandParts, is_large
-from gridpeers.plant.dynamics.reduction.reduce_network import Reduction, reduce_network
-from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
-from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
+from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
+
+ROOM = 64
+"""Values that are foreseen that are kept: a factored network of 123 nodes has 1 MB."""
+
+OTHERS = 8
+"""Values that are not foreseen that are kept: a person who switches to and fro needs a few. With 64 a plant grew by
+10 MB in an hour in which loads were set to ever new powers."""
+
+K = TypeVar("K", bound=Hashable)
+V = TypeVar("V")
+
+
+class ForeseenCache(Generic[K, V]):
+    """Values by key; of more than `OTHERS` that are not foreseen the one goes that was not asked for for longest.
+
+    The first `ROOM` values that are foreseen stay. Further ones, as of a schedule with hundreds of events, count as
+    others: none may keep an unbounded part of the memory.
+
+    Examples
+    --------
+    >>> cache = ForeseenCache()
+    >>> cache.get("event", lambda: [1], foreseen=True)
+    [1]
+    >>> for number in range(OTHERS + 1):
+    ...     kept = cache.get(number, lambda: [2])
+    >>> "event" in cache, 0 in cache, 1 in cache
+    (True, False, True)
+    """
+
+    def __init__(self) -> None:
+        self._foreseen: dict[K, V] = {}
+        self._others: dict[K, V] = {}
+
+    def __iter__(self) -> Iterator[K]:
+        yield from self._foreseen
+        yield from self._others
+
+    def get(self, key: K, make: Callable[[], V], *, foreseen: bool = False) -> V:
+        """Return the value of a key; make it if it is not there.
+
+        Parameters
+        ----------
+        key
+            What it is for.
+        make
+            Makes it.
+        foreseen
+            Whether an event to come needs it, so that it stays.
+        """
+        if key in self._foreseen:
+            return self._foreseen[key]
+        stays = foreseen and len(self._foreseen) < ROOM
+        value = self._others.pop(key) if key in self._others else make()
+        if not stays and len(self._others) == OTHERS:
+            del self._others[next(iter(self._others))]
+        (self._foreseen if stays else self._others)[key] = value
+        return value
+
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
@@ -199,3 +258,42 @@ class LiveNetwork:
         C = self.circuit.C.tocsc()
         first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
         return np.asarray(angle[self.reduction.label[first]])
+
+
+def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:
+    """Return the island whose voltages still change most after as many iterations as the inner loop takes.
+
+    Nothing but the work arrays of `net` is changed.
+
+    Parameters
+    ----------
+    net
+        Linearised at the present angles: all frames stand at 0.
+    units
+        Of which a network solution within the current limits has failed.
+    x
+        Where that solution began (V), [Re; Im] of all branches.
+    tolerance
+        Of a network solution (V).
+    """
+    x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
+    I_b, work = np.empty(x.size // 2, complex), np.empty(12 * len(J) + 3 * x.size)
+    still = np.ones(net.leader.size, complex)
+    with np.errstate(all="ignore"):  # what diverges is not finite in the end
+        for _ in range(MAX_LIMITING):
+            surplus = limit_currents(units.gfm, units.gfm_at, units.online, J, V, limiting)
+            before = x.copy(), V.copy()
+            status = solve_network(net, J, still, x, I_b, V, tolerance, work)
+            if status < 0 or surplus <= tolerance:
+                break
+        if status < 0:  # the last iterations alone tell who diverges: those that have settled do not move again
+            before = x.copy(), V.copy()
+            solve_network(net, J, still, x, I_b, V, tolerance, work)
+        change = np.zeros(net.leader.size)
+        np.maximum.at(change, np.tile(net.branch_island, 2), _size(x - before[0]))
+        np.maximum.at(change, net.inverter_island[units.online], _size(V - before[1]).max(axis=1)[units.online])
+    return int(np.argmax(change))
+
+
+def _size(change: Complex | Real) -> Real:
+    return np.nan_to_num(np.abs(change), nan=np.inf)

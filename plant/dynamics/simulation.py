@@ -8,19 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import switching
-from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.error import NoSolutionError
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
+from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
 from gridpeers.plant.dynamics.inverters import Inverter, Inverters
+from gridpeers.plant.dynamics.island_parts import is_large
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
-from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork
-from gridpeers.plant.dynamics.phasors import PHASES
-from gridpeers.plant.dynamics.reduction.island_parts import is_large
-from gridpeers.plant.dynamics.reduction.reduced import Complex, Real
-from gridpeers.plant.dynamics.start.at_rest import set_equilibrium
-from gridpeers.plant.dynamics.start.operating_point import OperatingPoint, equilibrium
-from gridpeers.plant.dynamics.unsettled_island import unsettled_island
+from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
 from gridpeers.plant.plant_config import Method
 
 MOST_RENEWALS = 20

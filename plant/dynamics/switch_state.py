@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.reduction.reduced import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
 
 FLOATING = 1e-12
 """Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it

@@ -8,11 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.error import NoSolutionError
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.live_network import LiveNetwork
-from gridpeers.plant.dynamics.phasors import PHASES, aligned_sum
 
 
 class Trip(NamedTuple):

@@ -9,8 +9,14 @@ import msgspec
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, is_behind
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters, OwnParameters, given, with_published
+from gridpeers.plant.equipment.inverter_parameters import (
+    GflParameters,
+    GfmParameters,
+    InverterParameters,
+    OwnParameters,
+    given,
+    with_published,
+)
 
 Phase = Literal["A", "B", "C"]
 PHASES: tuple[Phase, ...] = ("A", "B", "C")

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Circuit, PlantError
-from gridpeers.plant.dynamics.foreseen_cache import ForeseenCache
+from gridpeers.plant.dynamics.live_network import ForeseenCache
 from gridpeers.plant.equipment.equipment import PHASES
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches

@@ -1,11 +1,19 @@
-"""Islands by the names of their inverters, and as events of a run."""
+"""Events of islands: their inverters, dead buses, neutrals, and trips of those without a solution."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Iterable
+from typing import NamedTuple
 
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
 from gridpeers.plant.dynamics.switch_state import SwitchState
+from gridpeers.plant.equipment.imported_equipment import is_behind
+from gridpeers.plant.known_names import SUBSTATION
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import counted
@@ -91,3 +99,165 @@ class Islands:
         alive = live[self._network.merge(closed).representative]
         fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]
+
+
+TOUCHABLE = 50.0
+"""Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""
+
+
+class NeutralEvents:
+    """Report the neutrals of a feeder when its network has changed; each once, until it is as before.
+
+    Parameters
+    ----------
+    network
+        The feeder's network.
+    """
+
+    def __init__(self, network: Network) -> None:
+        self._network = network
+        self._all = np.array([network.index(*node) for node in network.neutrals.items()], np.int64)
+        self._neutrals = [node for node in network.neutrals.items() if not is_behind(node[0])]
+        self._nodes = np.array([network.index(*node) for node in self._neutrals], np.int64)
+        self._earthing: set[int] = set()
+        self._tied: set[int] = set()
+        self._off: set[int] = set()
+
+    def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
+        """Return the events at t (s), with these switches closed."""
+        if not self._neutrals:
+            return []
+        earthing = set(dynamics.network.reduction.earthing)
+        rows = [self._network.inverters[i] for i in sorted(earthing - self._earthing)]
+        self._earthing = earthing
+        events = [
+            PlantEvent(
+                t=t,
+                kind="island",
+                subject=row.name,
+                text=f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does",
+            )
+            for row in rows
+        ]
+        tied = set(self._tied_alone(closed, dynamics))
+        rows = [self._network.inverters[i] for i in sorted(tied - self._tied)]
+        self._tied = tied
+        events += [
+            PlantEvent(
+                t=t,
+                kind="warning",
+                subject=row.name,
+                text=f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
+                "the switch open the neutral, too",
+            )
+            for row in rows
+        ]
+        V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
+        off = set(np.flatnonzero(V > TOUCHABLE).tolist())
+        new, self._off = off - self._off, off
+        if new:
+            worst = max(new, key=lambda k: V[k])
+            bus, letter = self._neutrals[worst]
+            others = f" (and of {counted(len(new) - 1, 'bus', 'buses')} more)" if len(new) > 1 else ""
+            text = (
+                f"the neutral of bus {bus}{others}, node {letter}, has {V[worst]:.0f} V to earth, more than the "
+                f"{TOUCHABLE:.0f} V that may last: nothing earths it well enough; let the grid-forming inverter return "
+                "to it, or earth it"
+            )
+            events.append(PlantEvent(t=t, kind="warning", subject=bus, text=text))
+        return events
+
+    def _tied_alone(self, closed: frozenset[str], dynamics: Dynamics) -> list[int]:
+        """Return the grid-forming inverters that nothing but a neutral connects with the substation."""
+        network, reduction = self._network, dynamics.network.reduction
+        forming = np.flatnonzero(dynamics.inverters.forming & reduction.online)
+        forming = forming[reduction.has_source[reduction.inverter_island[forming]]]
+        if not forming.size:
+            return []
+        merge = network.merge(closed)
+        keep = np.ones(len(network.nodes))
+        keep[merge.representative[self._all]] = 0.0
+        phases = sp.diags_array(keep)
+        _, label = connected_components(phases @ abs(network.admittance(closed)) @ phases, directed=False)
+        first = [merge.representative[network.index(*network.inverters[i].node)] for i in forming.tolist()]
+        alone = ~np.isin(label[first], label[network.source_nodes])
+        return [int(i) for i in forming[alone]]
+
+
+RECENT = 1.0
+"""Time (s) after a closing out of phase within which a collapse counts as its effect."""
+
+BEYOND = 10.0
+"""Voltage (pu) that no network has: where there is no solution, it says nothing."""
+
+
+class Closing(NamedTuple):
+    """A switch that has joined two live islands."""
+
+    t: float
+    """Time (s)."""
+    switch: str
+    """Its name."""
+    angle: float
+    """Angle between the two sides before (deg, 0 to 180)."""
+    in_phase: bool
+    """Whether the angle was within the window of a synchronism check."""
+
+
+def raise_for_trip(events: Iterable[PlantEvent]) -> None:
+    """Raise PlantError if a trip is among these events, for callers that need a plant without trips."""
+    for event in events:
+        if event.kind == "trip":
+            raise PlantError(f"at t = {event.t:g} s {event.text}")
+
+
+def trip_event(
+    t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
+) -> PlantEvent:
+    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase).
+
+    Parameters
+    ----------
+    t
+        Time (s).
+    trip
+        Disconnected units.
+    network
+        The feeder's network.
+    closed
+        Switches closed at that time.
+    closings
+        Earlier closings that joined live islands.
+    """
+    names = [network.inverters[i].name for i in trip.inverters]
+    buses = {network.inverters[i].bus for i in trip.inverters}
+    if trip.substation:
+        names.append(SUBSTATION)
+        source = network.feeder.source
+        buses |= {source.bus} if source else set()
+    own = [island for island in network.islands(closed) if island & buses]
+    load = sum(S.real for bus, _, S in network.feeder.demands() if any(bus in of for of in own))
+    rating = sum(network.inverters[i].P_rated for i in trip.inverters)
+    fed = network.feeder.source is not None and any(network.feeder.source.bus in of for of in own)
+    culprit = next(
+        (
+            closing
+            for closing in closings
+            if not closing.in_phase
+            and t - closing.t <= RECENT
+            and any(network.switches[closing.switch].from_bus in of for of in own)
+        ),
+        None,
+    )
+    if culprit is not None:
+        switch = network.switches[culprit.switch].event_name
+        cause = f"closed out of phase, {culprit.angle:.0f} deg across {switch} at t = {culprit.t:.3f} s"
+    elif load > rating and not fed:
+        cause = f"overload, {load / 1e3:.0f} kW of load on inverters of {rating / 1e3:.0f} kVA"
+    elif load < 0.0:
+        cause = f"constant generation of {-load / 1e3:.0f} kW more than the load"
+    else:
+        cause = f"voltage collapse under {load / 1e3:.0f} kW of load"
+    lowest = f"; lowest terminal voltage {trip.V_min:.2f} pu" if trip.inverters and trip.V_min < BEYOND else ""
+    text = f"{', '.join(names)} tripped, as the island has no solution: {cause}{lowest}"
+    return PlantEvent(t=t, kind="trip", subject=names[0], text=text)

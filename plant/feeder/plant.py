@@ -9,28 +9,48 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
-from gridpeers.plant.dynamics.error import NoPowerFlowError
-from gridpeers.plant.dynamics.foreseen_cache import ROOM
-from gridpeers.plant.dynamics.start.at_rest import require_within_limits
+from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter, PlantError
+from gridpeers.plant.dynamics.circuit import NoPowerFlowError
+from gridpeers.plant.dynamics.equilibrium import require_within_limits
+from gridpeers.plant.dynamics.live_network import ROOM
 from gridpeers.plant.feeder.circuits import Circuits
-from gridpeers.plant.feeder.closings import Closings
-from gridpeers.plant.feeder.current_limits import CurrentLimits
-from gridpeers.plant.feeder.hunting import hunting_event
 from gridpeers.plant.feeder.in_service import InService
-from gridpeers.plant.feeder.installed_inverters import installed_inverters
-from gridpeers.plant.feeder.islands import Islands
-from gridpeers.plant.feeder.load_board import LoadBoard
-from gridpeers.plant.feeder.load_limits import LoadLimits
-from gridpeers.plant.feeder.neutral_events import NeutralEvents
-from gridpeers.plant.feeder.set_points import SetPointLimits
-from gridpeers.plant.feeder.switchboard import Switchboard
-from gridpeers.plant.feeder.synchronism import Difference, Synchronism
-from gridpeers.plant.feeder.trips import trip_event
+from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
+from gridpeers.plant.feeder.limit_events import CurrentLimits, LoadLimits, SetPointLimits
+from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
+from gridpeers.plant.feeder.synchronism import Closings, Difference, Synchronism
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
+
+
+def hunting_event(name: str) -> PlantEvent:
+    """Return the event of an inverter that starts on the edge of its dead band."""
+    text = (
+        f"{name} has no rest at t = 0: without vars its voltage is beyond its dead band, with those of its droop it is "
+        "within, so Q hunts between both; choose another db_UV_pu, db_OV_pu or V_set0_pu to avoid it"
+    )
+    return PlantEvent(t=0.0, kind="warning", subject=name, text=text)
+
+
+def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inverter, ...]:
+    """Return all inverters of a network, spare ones too, in its order, with the parameters of each."""
+    feeder = network.feeder
+    return tuple(
+        Inverter(
+            name=unit.name,
+            kind=unit.kind,
+            phases=unit.phases,
+            S_b=unit.P_rated,
+            V_b=unit.V_nom,
+            m_p=unit.m_p,
+            m_q=unit.m_q,
+            parameters=feeder.parameters_of(unit, settings.gfm, settings.gfl),
+            f_nom=feeder.f_nom,
+        )
+        for unit in network.inverters
+    )
 
 
 class Reading(NamedTuple):

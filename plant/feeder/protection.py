@@ -13,8 +13,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from gridpeers.plant.known_names import F_BASE, defaults
 from gridpeers.plant.plant_config import Protection
-from gridpeers.plant.trip_settings import F_BASE, defaults
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -1,4 +1,4 @@
-"""The closed switches of a feeder, and the operations by step."""
+"""The switches and the loads of a feeder, as a scenario, and people while a run goes on, set them."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from gridpeers.plant.equipment import Switch
+from gridpeers.plant.equipment.named_loads import LoadPowers, with_powers
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import SwitchEvent
-from gridpeers.wire.messages import PlantEvent
+from gridpeers.plant.plant_config import LoadEvent, SwitchEvent
+from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 
 _PAST = {"open": "opened", "close": "closed"}
@@ -117,3 +118,115 @@ class Switchboard:
 
 def _operated(closed: frozenset[str], name: str, action: str) -> frozenset[str]:
     return closed | {name} if action == "close" else closed - {name}
+
+
+class LoadBoard:
+    """The powers of a feeder's loads at nominal voltage, and those that they are to have.
+
+    Parameters
+    ----------
+    network
+        The feeder's network as the run began.
+    events
+        Changes on schedule, in the order of time.
+    h
+        Step (s).
+
+    Raises
+    ------
+    ValueError
+        If an event names no load, or a number of it makes no sense.
+    """
+
+    def __init__(self, network: Network, events: Iterable[LoadEvent] = (), h: float = 1.0) -> None:
+        self._network, self._h = network, h
+        self._powers = LoadPowers(network.feeder, sum(unit.P_rated for unit in network.inverters))
+        self._set: dict[str, complex] = {}
+        self._coming: dict[str, complex] = {}
+        self._at: dict[int, list[tuple[str, LoadSetting]]] = {}
+        for event in events:
+            known = self._powers.name(event.load)
+            self._at.setdefault(round(event.t / h), []).append((known, event.setting))
+        self._networks = {_key({}): network}
+        """Networks of the states of loads that are foreseen: made once, so that their circuits are, too."""
+        for _ in self.foreseen():  # makes them, and refuses what makes no sense
+            pass
+
+    @property
+    def changed(self) -> dict[str, complex]:
+        """Power (VA, nominal) of each load that has another one than in the feeder's tables now."""
+        return dict(self._set)
+
+    @property
+    def steps(self) -> Collection[int]:
+        """Steps with scheduled changes to come."""
+        return self._at.keys()
+
+    def foreseen(self) -> Iterator[tuple[int, Network]]:
+        """Yield each step with scheduled changes to come and the network from then on, in the order of time."""
+        now = dict(self._set)
+        for step in sorted(self._at):
+            for name, setting in self._at[step]:
+                self._put(now, name, self._power(name, setting, now))
+            network = self._networks[_key(now)] = self._network_with(now)
+            yield step, network
+
+    def put(self, text: str, setting: LoadSetting) -> str:
+        """Have a load take another power at nominal voltage from the next step on; return it in words.
+
+        Parameters
+        ----------
+        text
+            Name of the load, or of its bus.
+        setting
+            Its power; what is None stays as it is.
+
+        Raises
+        ------
+        ValueError
+            If there is no such load, or a number makes no sense.
+        """
+        name = self._powers.name(text)
+        S = self._coming[name] = self._power(name, setting, self._set | self._coming)
+        return f"load {name}: {self._powers.words(name, S)}"
+
+    def is_due(self, step: int) -> bool:
+        """Return whether a load changes at a step: by its schedule, or because a person has set it since the last."""
+        return bool(self._coming) or step in self._at
+
+    def apply(self, step: int) -> tuple[Network, list[PlantEvent]]:
+        """Change the loads that are due at a step; return the network with them, and an event of each.
+
+        What the schedule says of a load replaces what a person has set since the last step.
+        """
+        for name, setting in self._at.pop(step, ()):
+            self._coming[name] = self._power(name, setting, self._set | self._coming)
+        t, events = time_of(step, self._h), []
+        for name, S in self._coming.items():
+            text = f"load {name} set to {self._powers.words(name, S)}"
+            events.append(PlantEvent(t=t, kind="load", subject=name, text=text, P=S.real, Q=S.imag))
+            self._put(self._set, name, S)
+        self._coming = {}
+        return self._network_with(self._set), events
+
+    def _power(self, name: str, setting: LoadSetting, now: dict[str, complex]) -> complex:
+        try:
+            return self._powers.power(name, setting, now.get(name, self._powers.table(name)))
+        except ValueError as error:
+            raise ValueError(f"load {name}: {error}") from None
+
+    def _put(self, powers: dict[str, complex], name: str, S: complex) -> None:
+        """Note the power of a load, if it is another one than that of the table."""
+        if self._powers.table(name) == S:
+            powers.pop(name, None)
+        else:
+            powers[name] = S
+
+    def _network_with(self, powers: dict[str, complex]) -> Network:
+        """Return the network with these powers (VA) of loads: the one that was made before, if they are foreseen."""
+        made = self._networks.get(_key(powers))
+        return self._network.with_loads(with_powers(self._network.feeder, powers)) if made is None else made
+
+
+def _key(powers: dict[str, complex]) -> frozenset[tuple[str, complex]]:
+    return frozenset(powers.items())

@@ -1,4 +1,4 @@
-"""Differences of two live islands across an open switch, and the largest at which it may close.
+"""Switches that join live islands: the differences across them, and the closings that wait for synchronism.
 
 The limits are the synchronization parameter limits of IEEE Std 1547-2018, Table 5: of frequency, voltage and
 phase-angle difference for connecting an energized local system, by the aggregate rating of its units.
@@ -10,14 +10,19 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import compress
 from math import degrees
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.feeder.islands import Closing
+from gridpeers.plant.feeder.switchboard import Switchboard
+from gridpeers.plant.known_names import F_BASE
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import SyncCheck
-from gridpeers.plant.trip_settings import F_BASE
+from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.timing import time_of
 
 _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0.03, 10.0))
 """Rating (VA) up to which these limits hold: frequency (Hz), voltage (pu), angle (deg)."""
@@ -186,3 +191,105 @@ class Synchronism:
         if reduction.has_source[island]:
             return float("inf")
         return float(units.S_b[reduction.online & (reduction.inverter_island == island)].sum())
+
+
+class _Pending(NamedTuple):
+    """A closing that waits for synchronism."""
+
+    since: int
+    """Step of its scheduled closing."""
+    last: int
+    """Step at which it gives up."""
+
+
+class Closings:
+    """Judge the closings of a feeder's switches.
+
+    Parameters
+    ----------
+    switches
+        The switches.
+    sync
+        Measures the differences across them.
+    timeout
+        Longest wait of a switch for synchronism (steps).
+    h
+        Step (s).
+
+    Attributes
+    ----------
+    joined : list of Closing
+        Closings that have joined live islands, the latest last.
+    """
+
+    def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:
+        self._switches, self._sync, self._timeout, self._h = switches, sync, timeout, h
+        self._waiting: dict[str, _Pending] = {}
+        self.joined: list[Closing] = []
+
+    def difference(self, name: str) -> Difference | None:
+        """Return the difference across a switch (by its name) now; None if it does not part two live islands."""
+        return self._sync.across(name, self._switches.closed)
+
+    def refusal(self, name: str) -> str:
+        """Return why a switch (by its name) may not close now under a synchronism check; "" if it may."""
+        difference = self.difference(name)
+        if difference is None or difference.within:
+            return ""
+        return (
+            f"switch {self._switches.switch(name).full_name} not closed: its sides are {difference}; allowed are "
+            f"{difference.limits}; {difference.way_out}, or close it without the check"
+        )
+
+    def check_waiting(self, step: int) -> list[PlantEvent]:
+        """Close the waiting switches that are in step now; return the events of those that give up."""
+        events = []
+        for name, waiting in list(self._waiting.items()):
+            difference = self._sync.across(name, self._switches.closed)
+            if difference is None or difference.within:
+                del self._waiting[name]
+                self._switches.put(step, name, "close", synchronised=True)
+            elif step >= waiting.last:
+                del self._waiting[name]
+                waited = (step - waiting.since) * self._h
+                text = f"not closed: not in step within {waited:g} s, now {difference}; allowed are {difference.limits}"
+                events.append(self._warning(step, name, text))
+        return events
+
+    def judge(self, step: int) -> tuple[dict[str, str], list[PlantEvent]]:
+        """Hold back closings that must wait, among the operations of a step; return notes by switch, and events."""
+        closed = self._switches.closed
+        due = self._switches.due(step)
+        closing = [operation.switch for operation in due if operation.action == "close"]
+        notes: dict[str, str] = {}
+        events: list[PlantEvent] = []
+        for operation in due:
+            name = operation.switch
+            self._waiting.pop(name, None)  # a new operation replaces a waiting one
+            if operation.action != "close" or name in closed:
+                continue
+            difference = self._sync.across(name, closed, closing)
+            if difference is None:
+                continue
+            if operation.synchronised and not difference.within:
+                self._switches.drop(step, operation)
+                self._waiting[name] = _Pending(step, step + self._timeout)
+                text = f"waits for synchronism: its sides are {difference}; allowed are {difference.limits}"
+                events.append(self._warning(step, name, text))
+            elif operation.synchronised:
+                notes[name] = f" in step: {difference}"
+                self._note(step, difference)
+            else:
+                events.append(self._warning(step, name, f"joins two live islands: its sides are {difference}"))
+                self._note(step, difference)
+        return notes, events
+
+    def _note(self, step: int, difference: Difference) -> None:
+        t = time_of(step, self._h)
+        self.joined.append(Closing(t, difference.switch, difference.angle, difference.angle <= difference.limits.angle))
+        del self.joined[:-20]
+
+    def _warning(self, step: int, name: str, text: str) -> PlantEvent:
+        switch = self._switches.switch(name)
+        text = f"switch {switch.full_name} {text}"
+        return PlantEvent(t=time_of(step, self._h), kind="warning", subject=switch.event_name, text=text)

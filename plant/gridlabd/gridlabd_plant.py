@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.equipment.inverter_parameters import GflParameters
 from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.limit_events import SetPointLimits
 from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.feeder.protection import Relays
-from gridpeers.plant.feeder.set_points import SetPointLimits
 from gridpeers.plant.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
 from gridpeers.plant.gridlabd.model.glm import write_glm
 from gridpeers.plant.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError

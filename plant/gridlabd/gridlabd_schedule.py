@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from gridpeers.plant.dynamics.switch_state import SwitchState
-from gridpeers.plant.equipment.inverter_parameters import GflParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, InverterParameters
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.switchboard import Switchboard

@@ -12,7 +12,7 @@ from gridpeers.plant.gridlabd.gridlabd_plant import GridlabdPlant
 from gridpeers.plant.gridlabd.model.export_glm import write_tables
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import FeederChanges, PlantConfig
-from gridpeers.plant.transient_folder import TransientFolder
+from gridpeers.plant.request_process import TransientFolder
 
 
 def start_gridlabd(config: PlantConfig, feeder: Feeder) -> GridlabdPlant:

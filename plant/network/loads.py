@@ -8,13 +8,13 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.network.merging import Merge
 
 
 def law_row(part: LoadPart) -> tuple[float, ...]:
-    """Return a part of a load as a row of `gridpeers.plant.dynamics.kernel.limited_load.COLUMNS`."""
+    """Return a part of a load as a row of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
     limits = (V * part.V_nom for V in (part.V_low, part.V_min, part.V_max))
     off = part.V_off * part.V_nom, part.V_off_above * part.V_nom
     return (part.S.real, part.S.imag, part.V_nom, *part.exponents, *limits, part.edge, *off)

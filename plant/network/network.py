@@ -14,15 +14,14 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Switch
-from gridpeers.plant.equipment.bus_islands import bus_islands, switch_name
+from gridpeers.plant.equipment.connectivity import bus_islands, switch_name
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.plant.equipment.neutrals import neutrals_of
 from gridpeers.plant.network.loads import LoadBranches, law_row
-from gridpeers.plant.network.merging import Merge, merge_nodes
-from gridpeers.plant.network.primitives import line_admittance, transformer_admittance
+from gridpeers.plant.network.merging import Merge, line_admittance, merge_nodes, transformer_admittance
 from gridpeers.wire.wording import first_of
 
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
@@ -161,7 +160,7 @@ class Network:
         Parameters
         ----------
         weak
-            Branches of `loads`, and the short-circuit powers there (VA): see `gridpeers.plant.dynamics.weak_branches`.
+            Branches of `loads`, and the short-circuit powers there (VA): see `gridpeers.plant.dynamics.island_newton`.
         """
         pairs = zip(self.feeder.loads, self._first.loads, strict=True)
         names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]

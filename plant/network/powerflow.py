@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
-from gridpeers.plant.dynamics.weak_branches import weak_branches
+from gridpeers.plant.dynamics.island_newton import weak_branches
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.network import Network
 

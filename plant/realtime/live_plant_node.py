@@ -14,9 +14,8 @@ from typing import Literal
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.plant_node import STAYS, PlantNode
-from gridpeers.plant.realtime.kept_telemetry import KEPT_BYTES, KEPT_BYTES_RECORDED
-from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
-from gridpeers.plant.realtime.recorder_feed import RecorderFeed
+from gridpeers.plant.realtime.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed
+from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
 from gridpeers.wire.links import Links, is_usable
 from gridpeers.wire.membership import FASTER

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from gridpeers.plant.equipment.own_parameters import InverterParameters, OwnParameters, foreign, with_published
+from gridpeers.plant.equipment.inverter_parameters import InverterParameters, OwnParameters, foreign, with_published
 from gridpeers.plant.tables.csv_table import CsvTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
 from gridpeers.wire.schema.table_reading import read_table

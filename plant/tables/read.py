@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import buses_without_ground
@@ -16,12 +18,38 @@ from gridpeers.plant.tables.branches import (
 )
 from gridpeers.plant.tables.buses import BusTable, report_unconnected
 from gridpeers.plant.tables.csv_table import required_columns
-from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns
+from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES, LoadColumns, Manifest
 from gridpeers.plant.tables.imported import read_elements, read_load_parts
-from gridpeers.plant.tables.manifest import MANIFEST, read_f_nom
 from gridpeers.plant.tables.parameter_sets import read_parameter_sets
 from gridpeers.plant.tables.shunts import read_capacitors, read_inverters, read_loads, read_source
+from gridpeers.wire.schema.table_reading import read_table
+from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
+
+MANIFEST = "feeder.toml"
+"""Name of the file."""
+
+
+def read_f_nom(folder: Path, problems: list[str]) -> float:
+    """Return the nominal frequency (Hz) of a feeder; without a file, 60 Hz."""
+    manifest, found = read_table(Manifest, _tables(folder / MANIFEST, problems))
+    problems += [f"{MANIFEST}: {path}: {text}" for path, text in found]
+    return manifest.f_nom_Hz
+
+
+def _tables(path: Path, problems: list[str]) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text_of(path.read_bytes()))
+    except FileNotFoundError:
+        return {}
+    except OSError as error:
+        problems.append(f"{path.name}: cannot be read: {error.strerror}")
+    except TextFileError as error:
+        problems.append(f"{path.name}: {error}")
+    except (ValueError, RecursionError) as error:
+        problems.append(f"{path.name}: not valid TOML: {error}")
+    return {}
+
 
 DATA = Path(__file__).parents[1] / "data"
 """Folder of the feeders that come with the package."""

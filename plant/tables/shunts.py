@@ -11,8 +11,8 @@ from typing import Any
 
 from gridpeers.plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
 from gridpeers.plant.equipment.connectivity import buses_without_ground
+from gridpeers.plant.equipment.inverter_parameters import OwnParameters, foreign, with_published
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
-from gridpeers.plant.equipment.own_parameters import OwnParameters, foreign, with_published
 from gridpeers.plant.tables.buses import GROUND_NEEDED, BusTable
 from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
 from gridpeers.plant.tables.feeder_columns import (

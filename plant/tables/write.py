@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from gridpeers.plant.equipment import Feeder, LineConfig
+from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
-from gridpeers.plant.equipment.own_parameters import OwnParameters
 from gridpeers.plant.tables import feeder_columns as columns
 from gridpeers.plant.tables.parameter_sets import FILE
 from gridpeers.wire.schema.table_schema import fields_of

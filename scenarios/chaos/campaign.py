@@ -7,7 +7,7 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from gridpeers.plant.transient_folder import TransientFolder
+from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, again
 from gridpeers.scenarios.chaos.chaos_run import (
     ASKED,

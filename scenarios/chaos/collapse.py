@@ -8,7 +8,7 @@ from typing import NamedTuple
 import msgspec
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.bus_islands import bus_islands
+from gridpeers.plant.equipment.connectivity import bus_islands
 from gridpeers.scenarios.chaos.chaos_checks import RESTORED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
 from gridpeers.scenarios.results.island_membership import closed_switches

@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-from gridpeers.plant.transient_folder import no_room as temporary_folder_is_full
+from gridpeers.plant.request_process import no_room as temporary_folder_is_full
 from gridpeers.scenarios.results.run_files import no_room
 from gridpeers.wire.driver.machine import too_few_files
 

@@ -13,8 +13,8 @@ from typing import Any
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.plant.known_names import READY
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.start_words import READY
 from gridpeers.scenarios.drivers.children import Child, Children
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.drivers.supervisor import Supervisor

@@ -1,9 +1,9 @@
 """The plant's messages for a recorder, in order and without gaps; when to ask for missing ones again. Pure.
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
-keeps its latest messages (`gridpeers.plant.realtime.kept_telemetry`) and publishes them again when asked by a
+keeps its latest messages (`gridpeers.plant.realtime.recorder_feed`) and publishes them again when asked by a
 `Command`. In simulated time the same question acknowledges all before its number
-(`gridpeers.plant.unacknowledged_telemetry`): it is sent after each Telemetry, and again and again until the next.
+(`gridpeers.plant.telemetry_reporter`): it is sent after each Telemetry, and again and again until the next.
 """
 
 from __future__ import annotations

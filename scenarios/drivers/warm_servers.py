@@ -23,7 +23,7 @@ _OF_AGENTS = (
 
 _OF_PLANTS = (
     *("gridpeers.wire.driver.session:load_zenoh", "gridpeers.plant.plant_process"),
-    *("gridpeers.plant.build", "gridpeers.plant.loaded_kernels:load_kernels"),
+    *("gridpeers.plant.build", "gridpeers.plant.build:load_kernels"),
 )
 """The same for plants. Agents have another server, because they do not load numpy."""
 

@@ -12,7 +12,7 @@ from gridpeers.netem.models.loss import Bernoulli
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.bus_islands import switch_names
+from gridpeers.plant.equipment.connectivity import switch_names
 from gridpeers.plant.equipment.named_loads import load_name, named_loads
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.results.event_windows import Window, as_they_came, windows

@@ -15,10 +15,10 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.agent_process import run_agents
+from gridpeers.plant.known_names import COMPILING, READY
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.plant.realtime.pacer import sentence
-from gridpeers.plant.start_words import COMPILING, READY
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder

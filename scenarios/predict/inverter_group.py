@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from gridpeers.agents.agent_config import Control, Gains
 from gridpeers.agents.graphs import adjacency
 from gridpeers.plant.equipment import F_NOM, Feeder, InverterRow
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.participants import inverters_of, without_agent

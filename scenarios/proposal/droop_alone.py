@@ -9,7 +9,7 @@ import numpy as np
 
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.feeder.current_limits import LIMITS
+from gridpeers.plant.feeder.limit_events import LIMITS
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.bus_islands import bus_islands, switch_name, switch_names
+from gridpeers.plant.equipment.connectivity import bus_islands, switch_name, switch_names
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.history import Floats, History, Nameplates
 from gridpeers.scenarios.schema.participants import inverters_of

@@ -9,9 +9,15 @@ from collections.abc import Mapping
 from itertools import pairwise
 
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.plant.equipment.inverter_parameters import GfmParameters
-from gridpeers.plant.equipment.own_parameters import PARAMETERS_OF, InverterParameters, foreign, given, with_published
-from gridpeers.plant.trip_settings import DEFAULTS, defaults
+from gridpeers.plant.equipment.inverter_parameters import (
+    PARAMETERS_OF,
+    GfmParameters,
+    InverterParameters,
+    foreign,
+    given,
+    with_published,
+)
+from gridpeers.plant.known_names import DEFAULTS, defaults
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
 from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel

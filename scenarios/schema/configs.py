@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
 from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment.derived_feeders import changed
 from gridpeers.plant.plant_config import (
     FeederChanges,
     InverterChange,
@@ -12,7 +13,6 @@ from gridpeers.plant.plant_config import (
     PowerLimit,
     SwitchEvent,
 )
-from gridpeers.plant.tables.feeder_changes import changed
 from gridpeers.scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
 from gridpeers.scenarios.schema.participants import inverters_of, schedule_of, with_agent
 from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of

@@ -6,8 +6,7 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel

@@ -10,7 +10,7 @@ import msgspec
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.bus_islands import SwitchOperations, islands_after
+from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.schema.participants import inverters_of

@@ -12,12 +12,11 @@ import msgspec
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains, Secondary
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.plant.equipment.own_parameters import OwnParameters
 from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.plant.known_names import Simulator
 from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
-from gridpeers.plant.simulator import Simulator
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.schema.plausible import Plausible, Unit
 from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Divides, Example, Label, MultipleOf

@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import Connectivity, Node
-from gridpeers.plant.equipment.load_powers import LoadPowers
-from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.plant.equipment.named_loads import LoadPowers, with_powers
 from gridpeers.plant.plant_config import LoadEvent
 from gridpeers.scenarios.schema.participants import inverters_of
 from gridpeers.scenarios.schema.scenario_errors import Problems

@@ -9,7 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.dynamics.threads import one_thread
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import Method, PlantConfig, SwitchEvent

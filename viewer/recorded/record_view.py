@@ -12,7 +12,7 @@ from itertools import takewhile
 
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment.load_powers import set_power
+from gridpeers.plant.equipment.named_loads import set_power
 from gridpeers.rooms import ROOMS
 from gridpeers.scenarios.live.feeder_map import FeederMap, feeder_map
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus

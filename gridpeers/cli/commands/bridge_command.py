@@ -9,7 +9,7 @@ import typer
 
 from gridpeers.cli.commands.run_command import carry_out
 from gridpeers.cli.usage import BAD_INPUT, ScenarioName, check_choice, chosen, fail, load
-from gridpeers.plant.simulator import OwnSimulator
+from gridpeers.plant.known_names import OwnSimulator
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.schema import ScenarioModel

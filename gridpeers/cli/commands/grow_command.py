@@ -66,7 +66,7 @@ def grow(
     """
     from gridpeers.feeder import Feeder
     from gridpeers.output_folders import FolderError, shown, whole_folder
-    from gridpeers.plant.equipment.joined_copies import copy_name, joined_copies
+    from gridpeers.plant.equipment.derived_feeders import copy_name, joined_copies
     from gridpeers.plant.tables import FeederError
     from gridpeers.wire.wording import suggestion
 

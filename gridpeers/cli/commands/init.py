@@ -202,7 +202,7 @@ def _tried_with_agents(file: Path, case: str, settings: str, rewritten: Callable
     unequal, var sharing weighs more.
     """
     import gridpeers as gp
-    from gridpeers.plant.feeder.current_limits import LIMITS
+    from gridpeers.plant.feeder.limit_events import LIMITS
 
     def failed() -> tuple[dict[str, str], bool]:
         result = gp.load(file).run(case)

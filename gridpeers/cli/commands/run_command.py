@@ -24,7 +24,7 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
-from gridpeers.plant.simulator import Simulator
+from gridpeers.plant.known_names import Simulator
 from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.arithmetic import A120, magnitude, unit_phasor
-from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, magnitude, unit_phasor
 from gridpeers.plant.dynamics.kernel.gfl import advance_gfl
 from gridpeers.plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
 
@@ -118,7 +117,7 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
     units
         `Units`.
     net
-        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
     theta
         Room for a number an inverter.
     rotation

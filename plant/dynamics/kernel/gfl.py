@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat, unit_phasor
-from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat, unit_phasor
 from gridpeers.plant.plant_config import GflParameters, Method
 
 PARAMETERS = np.dtype(

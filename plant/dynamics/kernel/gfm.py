@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.arithmetic import A120, heun, magnitude, sat
-from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat
 from gridpeers.plant.plant_config import GfmParameters
 
 PARAMETERS = np.dtype(

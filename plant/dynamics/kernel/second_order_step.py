@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.kernel.compiled import compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
-from gridpeers.plant.dynamics.kernel.current_limit import solve_within_limits
-from gridpeers.plant.dynamics.kernel.sparse import extrapolate, note_increment
-from gridpeers.plant.dynamics.kernel.step import FAILURES
+from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
+from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
 
 CONSISTENT = 1e-10
 """Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
@@ -118,7 +117,7 @@ def solve_together(
     Parameters
     ----------
     net
-        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
     units
         `Units` whose states at the start of the step are the present ones.
     forward
@@ -195,7 +194,7 @@ def run_second_order_steps(
     tolerance
         Of the network solution (V).
     net
-        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
     units
         A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
     present

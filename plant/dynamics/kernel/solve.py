@@ -1,4 +1,7 @@
-"""The network solution of the inner loop, compiled; equations: `gridpeers.plant.dynamics.reduction.reduction`."""
+"""The network solution of the inner loop, compiled; equations: `gridpeers.plant.dynamics.reduction`.
+
+With the law of imported loads, and the fixed point between the network and inverters of constant power.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,96 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.arithmetic import A120, multiply_add
-from gridpeers.plant.dynamics.kernel.block_factors import solve_blocks
-from gridpeers.plant.dynamics.kernel.compiled import compiled
-from gridpeers.plant.dynamics.kernel.limited_load import limited_currents
-from gridpeers.plant.dynamics.kernel.sparse import COPY, branch_voltages, draw_remainders
+from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, multiply_add
+from gridpeers.plant.dynamics.kernel.network_arrays import COPY, branch_voltages, draw_remainders, solve_blocks
+
+COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
+"""Columns of `law`: P (W), Q (var), voltages (V), and the exponents n_p, n_q and edge; see `LoadPart`."""
+
+
+STEEPNESS = 500.0
+"""How fast a load drops out around V_off or V_off_above: the hyperbolic tangent of this times the distance (pu), as in
+OpenDSS."""
+
+
+@compiled
+def power(m: float, n: float) -> float:
+    """Return m to the power of n, which is a small integer for nearly every load: they need no logarithm."""
+    if n == -2.0:
+        return 1.0 / (m * m)
+    if n == -1.0:
+        return 1.0 / m
+    if n == 0.0:
+        return 1.0
+    return float(m**n)
+
+
+@compiled
+def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
+    """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
+
+    Parameters
+    ----------
+    row
+        A row of `COLUMNS`.
+    V
+        Magnitude of the voltage across the load (V).
+    """
+    P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off, V_off_above = row
+    per_square = 1.0 / (V_nom * V_nom)
+    if (V_low >= V and V_low != V_min) or V <= 0.0:
+        return complex(P * per_square, -Q * per_square), 0.0j
+    if V_min >= V and V_low == V_min:  # a current limit: as at V_min
+        p = q = per_square * V_nom * power(V_min / V_nom, edge - 1.0) / V
+        p_slope = q_slope = -p / V
+    elif V_min >= V:  # current in proportion: from the nominal impedance's at V_low to the load's own at V_min
+        at_min = V_nom * power(V_min / V_nom, edge - 1.0)
+        rise = (at_min - V_low) / (V_min - V_low)
+        p = q = per_square * (V_low + rise * (V - V_low)) / V
+        p_slope = q_slope = per_square * (rise - 1.0) * V_low / (V * V)
+    elif V_max > 0.0 and V_max < V:
+        p = q = per_square * power(V_max / V_nom, edge - 2.0)
+        p_slope = q_slope = 0.0
+    else:
+        p, q = per_square * power(V / V_nom, n_p - 2.0), per_square * power(V / V_nom, n_q - 2.0)
+        p_slope, q_slope = (n_p - 2.0) * p / V, (n_q - 2.0) * q / V
+    g, slope = complex(P * p, -Q * q), complex(P * p_slope, -Q * q_slope)
+    for limit, steepness in ((V_off, STEEPNESS), (V_off_above, -STEEPNESS)):
+        if limit > 0.0:
+            t = np.tanh(steepness * (V - limit) / V_nom)
+            on = 0.5 * (1.0 + t)
+            g, slope = g * on, slope * on + g * (0.5 * steepness / V_nom * (1.0 - t * t))
+    return g, slope
+
+
+@compiled
+def limited_currents(
+    at: NDArray[np.int64], law: NDArray[np.float64], x: NDArray[np.float64], I_b: NDArray[np.complex128]
+) -> None:
+    """Write the currents (A) of the branches `at`, one for each row of `law`, at x = [Re V_b; Im V_b]."""
+    m = I_b.size
+    for k in range(at.size):
+        b = at[k]
+        re, im = x[b], x[m + b]
+        I_b[b] = limited_admittance(law[k], np.sqrt(re * re + im * im))[0] * complex(re, im)
+
+
+@compiled
+def limited_tangents(
+    at: NDArray[np.int64],
+    law: NDArray[np.float64],
+    V: NDArray[np.complex128],
+    A: NDArray[np.complex128],
+    B: NDArray[np.complex128],
+) -> None:
+    """Write the factors (S) by which the branches' currents follow their voltages (V) and these conjugate."""
+    for k in range(at.size):
+        b = at[k]
+        magnitude = abs(V[b])
+        g, slope = limited_admittance(law[k], magnitude)
+        A[b] = g + 0.5 * slope * magnitude
+        B[b] = 0.5 * slope * V[b] * V[b] / magnitude if magnitude > 0.0 else 0.0j
+
 
 MAX_ITERATIONS = 60
 
@@ -122,7 +210,7 @@ def solve_network(
     Parameters
     ----------
     net
-        A `gridpeers.plant.dynamics.reduction.reduced.Reduced`.
+        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
     J
         Injections, n_inv x 3 (A).
     rotation
@@ -191,3 +279,84 @@ def solve_network(
             size += abs(V_G[phase * n + i]) + abs(V_G[n3 + phase * n + i])
     # not a number is no change either: the loop above takes it for converged
     return iterations if np.isfinite(size) else -1
+
+
+EXACT, SETTLED = 1e-13, 1e-11
+"""Largest change of an injection (pu of its rated current) at which to end: at once, and after `PATIENCE`."""
+
+PATIENCE = 100
+
+NO_NETWORK = -1
+"""Result of `settle_powers` where the network has no solution at the injections."""
+
+
+@compiled
+def settle_powers(
+    most: int,
+    net: Any,
+    J: NDArray[np.complex128],
+    S: NDArray[np.complex128],
+    y: NDArray[np.complex128],
+    rated: NDArray[np.float64],
+    delivers: NDArray[np.bool_],
+    balanced: NDArray[np.bool_],
+    x: NDArray[np.float64],
+    I_b: NDArray[np.complex128],
+    V: NDArray[np.complex128],
+    tolerance: float,
+) -> tuple[int, float]:
+    """Find the injections with which every inverter delivers its power; return the rounds taken, and the last change.
+
+    The change is that of an injection (pu of its rated current). Where they have not settled, one round more than
+    `most` is returned; where the network has no solution at the injections J, `NO_NETWORK`.
+
+    Parameters
+    ----------
+    most
+        Most rounds.
+    net
+        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest.
+    J
+        Injections (A), n_inv x 3: first guess, then solution.
+    S
+        Powers of all three phases (VA).
+    y
+        Admittances of the inverters that are part of the network (S).
+    rated
+        Ratings over nominal voltages (A).
+    delivers
+        Inverters whose injection is to be found; the others keep theirs.
+    balanced
+        Inverters of equal powers, in place of a balanced injection.
+    x, I_b, V, tolerance
+        As in `solve_network`.
+    """
+    n = J.shape[0]
+    work = np.empty(12 * n + 6 * net.S.size)
+    still = np.ones(net.leader.size, np.complex128)
+    change = 0.0
+    for rounds in range(1, most + 1):
+        if solve_network(net, J, still, x, I_b, V, tolerance, work) < 0:
+            return NO_NETWORK, change
+        if rounds > 1 and (change < EXACT or (rounds > PATIENCE and change < SETTLED)):
+            return rounds, change
+        change = 0.0
+        for i in range(n):
+            if not delivers[i]:
+                continue
+            V_1 = (V[i, 0] + A120 * V[i, 1] + A120.conjugate() * V[i, 2]) / 3.0
+            if V_1 == 0.0:
+                V_1 = 1.0 + 0.0j
+            own = 0.0j
+            for phase in range(3):
+                own += V[i, phase] * (y[i] * V[i, phase]).conjugate()
+            J_A = ((S[i] + own) / (3.0 * V_1)).conjugate()
+            for phase in range(3):
+                turn = 1.0 + 0.0j if phase == 0 else A120.conjugate() if phase == 1 else A120
+                updated = J_A * turn
+                if balanced[i]:
+                    at = V[i, phase] if V[i, phase] != 0.0 else 1.0 + 0.0j
+                    updated = (S[i] / (3.0 * at)).conjugate()
+                change = max(change, abs(updated - J[i, phase]) / rated[i])
+                J[i, phase] = updated
+    return most + 1, change

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from math import sqrt
 from pathlib import Path
 
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import InverterParameters
 from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks, node_blocks
 from gridpeers.plant.gridlabd.model.glm_network import network_blocks
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from math import pi
 
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.plant.gridlabd.model.glm_block import TableRow, block
 from gridpeers.plant.gridlabd.model.glm_network import F_NOM
 

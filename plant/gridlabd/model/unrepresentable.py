@@ -7,8 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
-from gridpeers.plant.equipment.own_parameters import InverterParameters
+from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
 from gridpeers.plant.gridlabd.model.glm_inverters import node_of
 from gridpeers.plant.gridlabd.model.glm_network import F_NOM
 

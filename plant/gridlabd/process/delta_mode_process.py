@@ -9,8 +9,7 @@ from time import monotonic
 from typing import Any
 
 from gridpeers.plant.gridlabd.process.gridlabd_messages import messages
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
-from gridpeers.plant.transient_folder import TransientFolder
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
 from gridpeers.wire.packages import damaged
 
 DELTA_MODE = Path(__file__).with_name("delta_mode.py")

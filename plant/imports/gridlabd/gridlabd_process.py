@@ -12,9 +12,8 @@ from typing import Any
 
 from gridpeers.plant.gridlabd.process.gridlabd_messages import messages
 from gridpeers.plant.imports.gridlabd.glm_text import GlmText
-from gridpeers.plant.request_process import program
+from gridpeers.plant.request_process import TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.plant.transient_folder import TransientFolder, no_room
 from gridpeers.wire.packages import damaged
 from gridpeers.wire.wording import printable
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from msgspec.structs import replace
 
-from gridpeers.plant.dynamics.kernel.limited_load import limited_admittance
+from gridpeers.plant.dynamics.kernel.solve import limited_admittance
 from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
 from gridpeers.plant.imports.opendss.dss_branches import branches_of
 from gridpeers.plant.imports.opendss.dss_elements import complex_of

@@ -15,9 +15,8 @@ from time import monotonic
 from typing import Any
 
 from gridpeers.plant.imports.opendss.dss_circuit import DssCircuit, ImportRequest
-from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, program
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.plant.transient_folder import TransientFolder, no_room
 from gridpeers.wire.packages import damaged
 from gridpeers.wire.wording import printable
 

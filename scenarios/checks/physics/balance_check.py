@@ -12,16 +12,15 @@ from math import inf
 from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
+from gridpeers.plant.dynamics.phasors import PHASES
+from gridpeers.plant.dynamics.start.power_flow import PowerFlow
 
 from gridpeers.plant.dynamics.circuit import Circuit
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.phasors import PHASES
-from gridpeers.plant.dynamics.start.power_flow import PowerFlow
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.load_powers import set_power
-from gridpeers.plant.equipment.named_loads import with_powers
+from gridpeers.plant.equipment.named_loads import set_power, with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
-from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation

@@ -8,7 +8,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
-from gridpeers.plant import unacknowledged_telemetry
+from gridpeers.plant import telemetry_reporter
 from gridpeers.plant.lockstep_plant import AGAIN, LockstepPlant
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.wire.codec import decode, encode
@@ -412,7 +412,7 @@ def test_a_death_while_the_run_goes_on_is_told() -> None:
 def test_the_plant_waits_for_its_recorder_however_long(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beyond a window it goes on with no tick; agents hear every second that it waits, and no deadline passes."""
     lab = recorded(end=20.0)
-    monkeypatch.setattr(unacknowledged_telemetry, "WINDOW", 20_000)
+    monkeypatch.setattr(telemetry_reporter, "WINDOW", 20_000)
     while lab.node.phase == "ticking":
         lab.tick(1)
     tick = lab.node.tick
@@ -432,7 +432,7 @@ def test_who_dies_while_the_plant_waits_for_its_recorder_is_off_the_next_roster(
 ) -> None:
     """A death is no reason to go on without the recorder, nor to wait for the dead."""
     lab = recorded(end=20.0)
-    monkeypatch.setattr(unacknowledged_telemetry, "WINDOW", 0)
+    monkeypatch.setattr(telemetry_reporter, "WINDOW", 0)
     lab.tick(10)
     assert lab.node.phase == "holding"
     lab.token("inv4", gone=True)

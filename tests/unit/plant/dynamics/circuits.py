@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.plant_config import GflParameters, GfmParameters
 
 S_B = 200e3

@@ -6,7 +6,7 @@ from threading import Event, Thread
 
 from threadpoolctl import threadpool_info, threadpool_limits
 
-from gridpeers.plant.dynamics.reduction.blas import one_thread
+from gridpeers.plant.dynamics.threads import one_thread
 
 
 def _threads() -> set[int]:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
-from gridpeers.plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
+from gridpeers.plant.dynamics.kept_network import BlockPattern, elimination_order
+from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
 
 Network = tuple[sp.csc_array, sp.csc_array]
 

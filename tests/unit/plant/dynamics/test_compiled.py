@@ -64,7 +64,7 @@ def test_another_process_loads_the_step_and_compiles_nothing() -> None:
     """A plant that has run on this machine starts in a second, where its compilation takes up to a minute."""
     compile_once()
     code = (
-        "from gridpeers.plant.loaded_kernels import load_kernels; load_kernels()\n"
+        "from gridpeers.plant.build import load_kernels; load_kernels()\n"
         "from gridpeers.plant.dynamics.kernel.step import run_steps\n"
         "print(*(sum(of.values()) for of in (run_steps.stats.cache_hits, run_steps.stats.cache_misses)))"
     )

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics.kernel.block_factors import factorise_blocks, solve_blocks
-from gridpeers.plant.dynamics.reduction.block_pattern import BlockPattern, elimination_order
-from gridpeers.plant.dynamics.reduction.elimination import eliminated
+from gridpeers.plant.dynamics.kept_network import BlockPattern, eliminated, elimination_order
+from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
 
 NONE = np.zeros(0, complex)
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics import Circuit, Dynamics
-from gridpeers.plant.dynamics.load_law import LoadLaw
-from gridpeers.plant.dynamics.reduction import island_parts, on_all_cores, reduce_network
-from gridpeers.plant.dynamics.reduction.reduced import Real
+from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, threads
+from gridpeers.plant.dynamics.circuit import LoadLaw
+from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.reduction import reduce_network
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5
@@ -89,7 +89,7 @@ def test_the_number_of_cores_does_not_move_a_byte(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(island_parts, "PART", 6)
     found = []
     for cores in (1, 3):
-        monkeypatch.setattr(on_all_cores, "usable_cores", lambda cores=cores: cores)
+        monkeypatch.setattr(threads, "usable_cores", lambda cores=cores: cores)
         found.append(readings(islands()).tobytes())
 
     assert found[0] == found[1]
@@ -109,8 +109,8 @@ def test_an_island_without_solution_ends_as_it_does_among_all_at_once(monkeypatc
 
 def test_an_error_on_another_core_is_raised_here(monkeypatch: pytest.MonkeyPatch) -> None:
     """Work that fails on any thread fails for the caller, with the first item's error."""
-    monkeypatch.setattr(on_all_cores, "usable_cores", lambda: 3)
+    monkeypatch.setattr(threads, "usable_cores", lambda: 3)
 
     with pytest.raises(ZeroDivisionError):
-        on_all_cores.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])
-    assert on_all_cores.each_on_a_core(lambda x: 6 // x, [3, 2, 1]) == [2, 3, 6]
+        threads.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])
+    assert threads.each_on_a_core(lambda x: 6 // x, [3, 2, 1]) == [2, 3, 6]

@@ -13,7 +13,7 @@ from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
 from gridpeers.plant.feeder.circuits import circuit_of
-from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings

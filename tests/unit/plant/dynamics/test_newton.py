@@ -7,11 +7,10 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.island_newton import DenseIsland, solve_island
-from gridpeers.plant.dynamics.load_law import LoadLaw
-from gridpeers.plant.dynamics.reduction.reduced import Complex
-from gridpeers.plant.dynamics.reduction.reduction import DenseReduction
-from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseIsland, SparseReduction
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex
+from gridpeers.plant.dynamics.reduction import DenseReduction, SparseIsland, SparseReduction
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gridpeers.plant.dynamics.start import by_droop
+from gridpeers.plant.dynamics import power_flow_at_rest
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
@@ -34,9 +34,9 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
         methods.append(named["method"])
         return root(*arguments, **named)
 
-    root = by_droop.root
-    monkeypatch.setattr(by_droop, "root", noted)
-    monkeypatch.setattr(by_droop, "MOST_BY_DIFFERENCES", 0)
+    root = power_flow_at_rest.root
+    monkeypatch.setattr(power_flow_at_rest, "root", noted)
+    monkeypatch.setattr(power_flow_at_rest, "MOST_BY_DIFFERENCES", 0)
     many = start()
 
     assert methods == ["krylov"]
@@ -46,7 +46,7 @@ def test_many_inverters_start_where_few_do(monkeypatch: pytest.MonkeyPatch) -> N
 def test_many_inverters_that_newton_krylov_does_not_solve_start_as_few_do(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where Newton-Krylov does not converge, the full Jacobian decides."""
     few = start()
-    monkeypatch.setattr(by_droop, "MOST_BY_DIFFERENCES", 0)
-    monkeypatch.setattr(by_droop, "KRYLOV", by_droop.KRYLOV | {"maxiter": 1})
+    monkeypatch.setattr(power_flow_at_rest, "MOST_BY_DIFFERENCES", 0)
+    monkeypatch.setattr(power_flow_at_rest, "KRYLOV", power_flow_at_rest.KRYLOV | {"maxiter": 1})
 
     assert reactive_powers(start()) == pytest.approx(reactive_powers(few), abs=1e-10)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gridpeers.plant.dynamics.error import PlantError
+from gridpeers.plant.dynamics.circuit import PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.start.power_flow import PowerFlow
+from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
 
 REACTANCE = 1.0

@@ -8,7 +8,7 @@ from msgspec.structs import replace
 from scipy.linalg import expm
 
 from gridpeers.plant.dynamics import Circuit, Dynamics
-from gridpeers.plant.dynamics.phasors import aligned_sum
+from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
 from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import BALANCED, S_B, V_B, Z_B, circuit, inverter, move_source, pair

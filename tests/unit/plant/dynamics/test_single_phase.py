@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from msgspec.structs import replace as changed
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters
 from gridpeers.plant.plant_config import Method
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, circuit, inverter, lone

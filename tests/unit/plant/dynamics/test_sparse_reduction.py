@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gridpeers.plant.dynamics import live_network
-from gridpeers.plant.dynamics.kernel.constant_power import NO_NETWORK
+from gridpeers.plant.dynamics import live_network, power_flow_at_rest
+from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK
 from gridpeers.plant.dynamics.reduction import reduce_network
-from gridpeers.plant.dynamics.start import power_flow
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import Method, PlantSettings, SwitchEvent
@@ -61,9 +60,11 @@ def test_a_tangent_that_is_renewed_gives_the_same_run_in_fewer_iterations(monkey
 def test_a_start_to_which_the_tangent_does_not_lead_is_found_by_newton(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the frozen tangent fails, e.g. across a limit of the loads' law, the operating point is the same."""
     plain, failures = rows(monkeypatch, 0, "first-order"), iter([True, False] * 3)
-    settle = power_flow.settle_powers
+    settle = power_flow_at_rest.settle_powers
     monkeypatch.setattr(
-        power_flow, "settle_powers", lambda *words: (NO_NETWORK, 0.0) if next(failures, False) else settle(*words)
+        power_flow_at_rest,
+        "settle_powers",
+        lambda *words: (NO_NETWORK, 0.0) if next(failures, False) else settle(*words),
     )
 
     np.testing.assert_allclose(rows(monkeypatch, 0, "first-order"), plain, rtol=1e-9, atol=1e-3)

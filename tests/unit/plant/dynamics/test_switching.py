@@ -7,8 +7,8 @@ import pytest
 import scipy.sparse as sp
 
 from gridpeers.plant.dynamics import Circuit, Dynamics
+from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.load_law import LoadLaw
 from tests.unit.plant.dynamics.circuits import (
     BALANCED,
     GFL_D,

@@ -8,9 +8,9 @@ import scipy.sparse as sp
 from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import Circuit, Dynamics
-from gridpeers.plant.dynamics.load_law import LoadLaw
+from gridpeers.plant.dynamics.circuit import LoadLaw
+from gridpeers.plant.dynamics.live_network import unsettled_island
 from gridpeers.plant.dynamics.reduction import reduce_network
-from gridpeers.plant.dynamics.unsettled_island import unsettled_island
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 3

@@ -11,9 +11,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.reduction.reduced import Real
-from gridpeers.plant.dynamics.start.by_droop import MOST_ROUNDS
-from gridpeers.plant.dynamics.start.volt_var_at_rest import DROOP, INSIDE, OVER, UNDER, VoltVarAtRest
+from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.power_flow_at_rest import DROOP, INSIDE, MOST_ROUNDS, OVER, UNDER, VoltVarAtRest
 from gridpeers.plant.plant_config import GflParameters
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
 

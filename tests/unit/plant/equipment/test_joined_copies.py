@@ -9,7 +9,7 @@ import pytest
 
 from gridpeers.feeder import Feeder
 from gridpeers.plant.equipment.connectivity import Connectivity
-from gridpeers.plant.equipment.joined_copies import joined_copies
+from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.network import Network, solve_power_flow
 
 

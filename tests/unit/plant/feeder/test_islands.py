@@ -1,6 +1,6 @@
 import numpy as np
 
-from gridpeers.plant.dynamics.reduction.reduction import DenseReduction
+from gridpeers.plant.dynamics.reduction import DenseReduction
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.network import Network

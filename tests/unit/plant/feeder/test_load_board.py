@@ -11,11 +11,10 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import live_network
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.foreseen_cache import OTHERS
-from gridpeers.plant.equipment.load_powers import set_power
-from gridpeers.plant.equipment.named_loads import named_loads, with_powers
+from gridpeers.plant.dynamics.live_network import OTHERS
+from gridpeers.plant.equipment.named_loads import named_loads, set_power, with_powers
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.feeder.load_board import LoadBoard
+from gridpeers.plant.feeder.switchboard import LoadBoard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import LoadEvent, PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder

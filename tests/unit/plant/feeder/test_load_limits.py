@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.feeder.load_limits import PAUSE, LoadLimits
+from gridpeers.plant.feeder.limit_events import PAUSE, LoadLimits
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder

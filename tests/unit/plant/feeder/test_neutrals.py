@@ -14,7 +14,7 @@ import gridpeers as gp
 from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import circuit_of
-from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.powerflow import solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays, Tripped
+from gridpeers.plant.known_names import DEFAULTS
 from gridpeers.plant.plant_config import Protection
-from gridpeers.plant.trip_settings import DEFAULTS
 
 H = 0.002
 ON = np.array([True])

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 from gridpeers.plant.dynamics.switching import Trip
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.feeder.trips import trip_event
+from gridpeers.plant.feeder.islands import trip_event
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.equipment import Line, LineConfig, Load, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.network import Network, solve_power_flow
-from gridpeers.plant.network.primitives import DELTA
+from gridpeers.plant.network.merging import DELTA
 from tests.unit.plant.networks import diagonal, feeder, three_phase_bus
 
 

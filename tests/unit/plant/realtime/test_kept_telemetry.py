@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.realtime import kept_telemetry
-from gridpeers.plant.realtime.kept_telemetry import KeptTelemetry
+from gridpeers.plant.realtime import recorder_feed
+from gridpeers.plant.realtime.recorder_feed import KeptTelemetry
 from gridpeers.scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
 from gridpeers.wire.messages import Answer, Command, LinkReport, Message, Telemetry
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
@@ -213,7 +213,7 @@ def test_what_comes_again_is_what_was_kept_whatever_blocks_are_filled_anew(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Messages of any size, asked for at any time: those that are still kept come, byte by byte and in order."""
-    monkeypatch.setattr(kept_telemetry, "BLOCK", 1000)
+    monkeypatch.setattr(recorder_feed, "BLOCK", 1000)
     rng, kept = random.Random(seed), KeptTelemetry(limit=4000)
     sent: list[bytes] = []
     for number in range(300):
@@ -230,7 +230,7 @@ def test_messages_that_come_while_others_are_published_again_do_not_overwrite_th
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What is due is out of the limit before it is published: its bytes stay until then."""
-    monkeypatch.setattr(kept_telemetry, "BLOCK", 100)
+    monkeypatch.setattr(recorder_feed, "BLOCK", 100)
     kept = KeptTelemetry(limit=400)
     sent = [bytes([number]) * 50 for number in range(100)]
     for number in range(8):
@@ -250,8 +250,8 @@ def test_a_plant_goes_through_no_more_blocks_than_it_keeps(monkeypatch: pytest.M
         made.append(size)
         return bytearray(size)
 
-    monkeypatch.setattr(kept_telemetry, "BLOCK", 1000)
-    monkeypatch.setattr(kept_telemetry, "bytearray", counted, raising=False)
+    monkeypatch.setattr(recorder_feed, "BLOCK", 1000)
+    monkeypatch.setattr(recorder_feed, "bytearray", counted, raising=False)
     kept = KeptTelemetry(limit=5000)
     for number in range(500):
         kept.add(number, bytes(100 + number % 7))

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 from msgspec.structs import replace as with_fields
 
-from gridpeers.plant.equipment.bus_islands import islands_after
+from gridpeers.plant.equipment.connectivity import islands_after
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.island_membership import closed_switches, switch_events
 from gridpeers.wire.messages import PlantEvent

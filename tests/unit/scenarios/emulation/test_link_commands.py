@@ -17,8 +17,8 @@ from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import links_among
-from gridpeers.plant.realtime.link_command_sender import LinkCommandSender
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
 from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, decode_statuses

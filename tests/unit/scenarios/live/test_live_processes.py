@@ -13,7 +13,7 @@ from msgspec.structs import replace
 from gridpeers.agents.agent_config import Control, LawChoice
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.start_words import COMPILING, LISTENING
+from gridpeers.plant.known_names import COMPILING, LISTENING
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live import live_processes
 from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, limited, meaning

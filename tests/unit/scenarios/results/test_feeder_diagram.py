@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.equipment.joined_copies import joined_copies
+from gridpeers.plant.equipment.derived_feeders import joined_copies
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram
 from gridpeers.scenarios.results.plots.places import Label, label_sides, places

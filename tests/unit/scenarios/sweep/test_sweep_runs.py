@@ -21,7 +21,7 @@ from scipy.stats import binomtest
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.dynamics import Circuit
 from gridpeers.plant.dynamics.live_network import LiveNetwork
-from gridpeers.plant.dynamics.reduction.sparse_reduction import SparseReduction
+from gridpeers.plant.dynamics.reduction import SparseReduction
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.scenarios.results.run_files import FolderError

@@ -5,7 +5,7 @@ from typing import Any, Literal, get_args, get_origin
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment.own_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
+from gridpeers.plant.equipment.inverter_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
 from gridpeers.plant.gridlabd.model.glm_inverters import inverter_blocks
 from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd
 from gridpeers.wire.schema.table_schema import Field, fields_of

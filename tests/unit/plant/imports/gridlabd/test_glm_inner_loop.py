@@ -11,7 +11,7 @@ from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.equipment import InverterRow
 from gridpeers.plant.feeder.circuits import circuit_of
-from gridpeers.plant.feeder.installed_inverters import installed_inverters
+from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.gridlabd.model.export_glm import export_glm
 from gridpeers.plant.imports.gridlabd.read_glm import read_glm
 from gridpeers.plant.network import Network

@@ -1,6 +1,25 @@
-"""Default trip settings of IEEE 1547-2018. Pure, and without numpy, because the check of a scenario needs them."""
+"""What others know of the plant without importing it: simulators, words of its start, names and settings of trips."""
 
 from __future__ import annotations
+
+from typing import Literal
+
+OwnSimulator = Literal["gridpeers", "gridlabd"]
+"""A simulator that the run starts itself: our own plant, or GridLAB-D (docs/plant.md)."""
+
+Simulator = Literal[OwnSimulator, "helics"]
+"""The same, or a federate of a HELICS co-simulation (docs/helics.md)."""
+
+
+LISTENING = "listening"
+"""Its session is open."""
+
+COMPILING = "compiling"
+"""It is being built; its step is compiled first if there is no machine code of it, which takes up to a minute."""
+
+READY = "ready"
+"""It waits for agents."""
+
 
 SUBSTATION = "substation"
 """Name of a substation that trips, in the text of the event, beside those of inverters."""

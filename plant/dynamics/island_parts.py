@@ -15,12 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.block_factors import BlockFactors
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.sparse import SparseMaps
+from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Real, Reduced, SparseMaps
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
-from gridpeers.plant.dynamics.reduction.on_all_cores import each_on_a_core
-from gridpeers.plant.dynamics.reduction.reduced import Real, Reduced
+from gridpeers.plant.dynamics.threads import each_on_a_core
 
 PART = 1000
 """Nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters."""

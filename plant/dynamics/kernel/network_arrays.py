@@ -1,0 +1,342 @@
+"""A network in the inner loop, by dense matrices or by sparse factors; what of the latter is compiled.
+
+The sparse matrix is the real form of a network and of its loads' tangent, in blocks of 2 x 2. A node's real and
+imaginary part stay together, so that a pivot is a block: the real form of a reactance alone has a diagonal of zeros,
+but its blocks are regular. Blocks are (a, b, c, d) for [[a, b], [c, d]].
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridpeers.plant.dynamics.kernel.compiled import compiled
+
+Integers = NDArray[np.int64]
+Real = NDArray[np.float64]
+
+
+class BlockFactors(NamedTuple):
+    """A matrix of n x n blocks whose pattern is symmetric, as (L + 1) D (1 + D^-1 U); before, as its own blocks."""
+
+    start: Integers
+    """First entry of each node in `later`, n + 1."""
+    later: Integers
+    """Later nodes that each node is coupled with, ascending."""
+    D: Real
+    """Inverse pivots, n x 4; before, the diagonal."""
+    L: Real
+    """Blocks below the diagonal, [later, node], by columns."""
+    U: Real
+    """Blocks above it, [node, later], by rows."""
+
+
+def no_factors() -> BlockFactors:
+    """Return the factors of an empty matrix."""
+    return BlockFactors(np.zeros(1, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 4)) for _ in range(3)))
+
+
+@compiled
+def add_tangent(
+    f: BlockFactors,
+    first: Integers,
+    second: Integers,
+    across: Integers,
+    a_first: Real,
+    a_second: Real,
+    A: NDArray[np.complex128],
+    B: NDArray[np.complex128],
+) -> None:
+    """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
+
+    Parameters
+    ----------
+    f
+        The matrix; written.
+    first, second, a_first, a_second
+        Nodes of each branch, or -1, and the ratios with which they count.
+    across
+        Entry that couples the two nodes, or -1.
+    A, B
+        Factors of each branch (S).
+    """
+    for b in range(first.size):
+        p, q, r, s = A[b].real + B[b].real, B[b].imag - A[b].imag, A[b].imag + B[b].imag, A[b].real - B[b].real
+        for node, ratio in ((first[b], a_first[b]), (second[b], a_second[b])):
+            if node >= 0:
+                square = ratio * ratio
+                f.D[node, 0] += square * p
+                f.D[node, 1] += square * q
+                f.D[node, 2] += square * r
+                f.D[node, 3] += square * s
+        if across[b] >= 0:
+            product = a_first[b] * a_second[b]
+            for entry in (f.L[across[b]], f.U[across[b]]):
+                entry[0] += product * p
+                entry[1] += product * q
+                entry[2] += product * r
+                entry[3] += product * s
+
+
+@compiled
+def subtract_product(to: Real, left: Real, right: Real) -> None:
+    """Subtract the product of two blocks from a third."""
+    to[0] -= left[0] * right[0] + left[1] * right[2]
+    to[1] -= left[0] * right[1] + left[1] * right[3]
+    to[2] -= left[2] * right[0] + left[3] * right[2]
+    to[3] -= left[2] * right[1] + left[3] * right[3]
+
+
+@compiled
+def factorise_blocks(f: BlockFactors) -> bool:
+    """Factorise a matrix in place, without pivoting; return whether its determinant is positive.
+
+    A matrix that is singular has factors that are not finite.
+    """
+    positive = True
+    for k in range(f.D.shape[0]):
+        a, b, c, d = f.D[k]
+        determinant = a * d - b * c
+        if determinant < 0.0:
+            positive = not positive
+        f.D[k, 0], f.D[k, 1], f.D[k, 2], f.D[k, 3] = (
+            d / determinant,
+            -b / determinant,
+            -c / determinant,
+            a / determinant,
+        )
+        begin, end = f.start[k], f.start[k + 1]
+        for s in range(begin, end):
+            p, q, r, v = f.L[s]
+            f.L[s, 0], f.L[s, 1] = p * f.D[k, 0] + q * f.D[k, 2], p * f.D[k, 1] + q * f.D[k, 3]
+            f.L[s, 2], f.L[s, 3] = r * f.D[k, 0] + v * f.D[k, 2], r * f.D[k, 1] + v * f.D[k, 3]
+        for s in range(begin, end):
+            i = f.later[s]
+            subtract_product(f.D[i], f.L[s], f.U[s])
+            at = f.start[i]  # what two nodes after k share with k they are coupled by, too: both lists ascend
+            for t in range(s + 1, end):
+                while f.later[at] != f.later[t]:
+                    at += 1
+                subtract_product(f.U[at], f.L[s], f.U[t])
+                subtract_product(f.L[at], f.L[t], f.U[s])
+    return positive
+
+
+@compiled
+def solve_blocks(f: BlockFactors, x: Real) -> None:
+    """Solve in place: right-hand side in, solution out, [Re, Im] of each node."""
+    # indices without a sign need no test whether they count from the end; a pair of new values before either is written
+    # is one vector operation, because then no write can change what is still to be read: together a third of the time
+    start, later, D, L, U = f.start.view(np.uint64), f.later.view(np.uint64), f.D, f.L, f.U
+    one, two = np.uint64(1), np.uint64(2)
+    n = np.uint64(D.shape[0])
+    for k in range(n):
+        re, im = x[two * k], x[two * k + one]
+        for s in range(start[k], start[k + one]):
+            i = two * later[s]
+            x[i], x[i + one] = x[i] - (L[s, 0] * re + L[s, 1] * im), x[i + one] - (L[s, 2] * re + L[s, 3] * im)
+    row = n
+    while row > 0:
+        row -= one
+        re, im = x[two * row], x[two * row + one]
+        for s in range(start[row], start[row + one]):
+            i = two * later[s]
+            re, im = re - (U[s, 0] * x[i] + U[s, 1] * x[i + one]), im - (U[s, 2] * x[i] + U[s, 3] * x[i + one])
+        x[two * row], x[two * row + one] = D[row, 0] * re + D[row, 1] * im, D[row, 2] * re + D[row, 3] * im
+
+
+COPY = -2
+"""In place of the position of a terminal that copies the first one of its single-phase inverter."""
+
+
+class SparseMaps(NamedTuple):
+    """A network by sparse factors for the inner loop.
+
+    Unknowns are node voltages, [Re V_1, Im V_1, Re V_2, ...].
+    """
+
+    factored: BlockFactors
+    """Of the admittances and the loads' tangent."""
+    constant: Real
+    """Right-hand side (A) without injections: sources, and the constant part of the tangent."""
+    first: Integers
+    """Position of the node at each branch's beginning, or -1: at a source."""
+    second: Integers
+    """The same at its end, or -1: ground, or a source."""
+    a_first: Real
+    """Ratio with which the first node's voltage counts in the branch's."""
+    a_second: Real
+    """The same for the second."""
+    from_sources: NDArray[np.complex128]
+    """Part of each branch's voltage that the ideal sources give (V)."""
+    terminals: Integers
+    """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
+    fixed: NDArray[np.complex128]
+    """Voltages (V) of the terminals that have no position: a source's, or 0."""
+    feeds: NDArray[np.bool_]
+    """Which inverters inject."""
+    scratch: Real
+    """Room for the solution and its right-hand side."""
+    increments: Real
+    """How the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last."""
+    rate: Real
+    """Part of an iteration's change that the next one has, when last seen, 1: unknown; and how much it can grow by a
+    change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
+
+
+def no_maps() -> SparseMaps:
+    """Return the maps of a network that is solved by dense matrices."""
+    nowhere, values = np.zeros(0, np.int64), np.zeros(0)
+    terminals, fixed = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128)
+    none = np.zeros(0, np.complex128)
+    held, increments = np.zeros(0, np.bool_), np.zeros((4, 0))
+    return SparseMaps(
+        no_factors(),
+        values,
+        nowhere,
+        nowhere,
+        values,
+        values,
+        none,
+        terminals,
+        fixed,
+        held,
+        values,
+        increments,
+        values,
+    )
+
+
+NO_MAPS = no_maps()
+
+
+@compiled
+def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
+    """Write [Re V_b; Im V_b] of the branches (V) from the nodes' voltages; return the largest change (V)."""
+    first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
+    from_sources = maps.from_sources
+    m = first.size
+    change = 0.0
+    for b in range(m):
+        re, im = from_sources[b].real, from_sources[b].imag
+        i, j = 2 * first[b], 2 * second[b]
+        if i >= 0:
+            re += a_first[b] * V[i]
+            im += a_first[b] * V[i + 1]
+        if j >= 0:
+            re += a_second[b] * V[j]
+            im += a_second[b] * V[j + 1]
+        change = max(change, abs(re - x[b]), abs(im - x[m + b]))
+        x[b], x[m + b] = re, im
+    return change
+
+
+@compiled
+def draw_remainders(
+    maps: SparseMaps,
+    I_b: NDArray[np.complex128],
+    i_c: NDArray[np.complex128],
+    A: NDArray[np.complex128],
+    B: NDArray[np.complex128],
+    x: Real,
+    right: Real,
+) -> None:
+    """Take what the branches draw (A) beyond the loads' tangent from the nodes at their ends.
+
+    Parameters
+    ----------
+    maps
+        The network.
+    I_b
+        Currents of the branches (A) at x.
+    i_c, A, B
+        The tangent; see `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
+    x
+        [Re V_b; Im V_b] of the branches (V).
+    right
+        Currents into the nodes (A); written.
+    """
+    first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
+    m = first.size
+    for b in range(m):
+        re, im = x[b], x[m + b]
+        p, q = A[b].real + B[b].real, B[b].imag - A[b].imag
+        r, s = A[b].imag + B[b].imag, A[b].real - B[b].real
+        drawn_re = I_b[b].real - i_c[b].real - (p * re + q * im)
+        drawn_im = I_b[b].imag - i_c[b].imag - (r * re + s * im)
+        i, j = 2 * first[b], 2 * second[b]
+        if i >= 0:
+            right[i] -= a_first[b] * drawn_re
+            right[i + 1] -= a_first[b] * drawn_im
+        if j >= 0:
+            right[j] -= a_second[b] * drawn_re
+            right[j + 1] -= a_second[b] * drawn_im
+
+
+@compiled
+def extrapolate(maps: SparseMaps, x: Real) -> None:
+    """Guess the next solution x (V): predictor and corrector alternate, so changes follow those two solutions ago."""
+    increments = maps.increments
+    for i in range(increments.shape[1]):
+        x[i] += 2.0 * increments[2, i] - increments[0, i]
+
+
+@compiled
+def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
+    """Note how a solution x differs from the one before, x_0 (V)."""
+    increments = maps.increments
+    for i in range(increments.shape[1]):
+        increments[0, i], increments[1, i], increments[2, i] = increments[1, i], increments[2, i], increments[3, i]
+        increments[3, i] = x[i] - x_0[i]
+
+
+Complex = NDArray[np.complex128]
+
+NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), np.zeros(0)
+"""In place of the dense matrices of a network that is solved by sparse factors."""
+
+
+class Reduced(NamedTuple):
+    """A network at a tangent of its loads, by dense matrices or by sparse factors.
+
+    Real matrices act on [Re; Im] and are stored transposed, rows contiguous.
+    """
+
+    S: Complex
+    """Constant power of the live branches (VA)."""
+    I0: Complex
+    """Constant current of the live branches (A)."""
+    limited_at: NDArray[np.int64]
+    """Live branches with the law of a `LoadPart`."""
+    law: Real
+    """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
+    i_c: Complex
+    """Tangent of the load law, constant part (A)."""
+    A: Complex
+    """Tangent, factor of V_b (S)."""
+    B: Complex
+    """Tangent, factor of V_b^* (S)."""
+    branch_island: NDArray[np.int64]
+    """Island of each live branch."""
+    inverter_island: NDArray[np.int64]
+    """Island of each inverter."""
+    leader: NDArray[np.int64]
+    """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
+    theta_lin: Real
+    """That inverter's angle at the point of linearisation (rad)."""
+    PT: Real = NO_MATRIX
+    """J to x, (6 n_inv) x (2 m)."""
+    QT: Real = NO_MATRIX
+    """N to x, (2 m) x (2 m)."""
+    x_c: Real = NO_VECTOR
+    """Constant part of x, 2 m (V)."""
+    GGT: Real = NO_MATRIX
+    """J to V_G, (6 n_inv) x (6 n_inv)."""
+    GBT: Real = NO_MATRIX
+    """I_b to V_G, (2 m) x (6 n_inv)."""
+    s_G: Real = NO_VECTOR
+    """Constant part of V_G, 6 n_inv (V)."""
+    sparse: SparseMaps = NO_MAPS
+    """Sparse factors in place of the dense matrices."""

@@ -1,0 +1,295 @@
+"""The network between inverters of constant power, and the reactive powers that their characteristics give at rest.
+
+Unless the droop begins at the edge of its dead band, a volt-var characteristic jumps there, from 0 to db / m_q (section
+4.4). An inverter whose droop would bring its voltage back into the band, and whose voltage would leave the band without
+it, rests at neither: its Q hunts around the one that holds the voltage on the edge. With that Q the characteristic has
+no gap and never rises with the voltage; so where vars raise voltages, there is one operating point, and only one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from gridpeers.plant.dynamics.circuit import Circuit, NoPowerFlowError, PlantError
+from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.island_newton import weak_branches
+from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
+from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics.threads import one_thread
+
+MOST_ROUNDS = 500
+"""Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:
+near the largest power that a network carries a round leaves most of an error."""
+
+NEAR = 4
+"""Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
+
+
+class PowerFlow:
+    """Fixed point between the network and inverters of constant power."""
+
+    def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
+        # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
+        y = np.where(units.forming & ~held, units.y_f, 0.0)
+        self.reduction = reduce_network(circuit, y, units.forming, units.connected)
+        self.circuit, self.units, self.y = circuit, units, y
+        self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
+        self.I_b = np.empty(self.V_b.size, complex)
+        """Currents of the live load branches (A), of the last solution."""
+        self.net = self._linearise()
+        self._near = False
+
+    def _linearise(self) -> Reduced:
+        theta = np.zeros(len(self.units))
+        return self.reduction.linearise(self.V_b, self.circuit.source_voltage, theta)
+
+    def _renew(self, J: Complex) -> None:
+        """Move the tangent to where Newton's method leads: across a limit of the loads' law it does not itself."""
+        self.V_b, failed = self.reduction.solve_islands(J, self.circuit.source_voltage, self.V_b)
+        if failed:
+            raise self._no_power_flow()
+        self.net = self._linearise()
+
+    def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+        """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
+        units, m = self.units, self.V_b.size
+        J, V = J.copy(), np.empty(J.shape, complex)
+        tolerance, left, renewed = 1e-12 * float(units.V_b.max()), MOST_ROUNDS, False
+        total, before = MOST_ROUNDS, 1.0
+        while left > 0:
+            most = left if self._near else min(left, NEAR)
+            x = np.concatenate([self.V_b.real, self.V_b.imag])
+            rounds, change = settle_powers(
+                most,
+                self.net,
+                J,
+                (P + 1j * Q) * units.S_3,
+                self.y,
+                units.S_3 / units.V_b,
+                ~frozen & self.reduction.online,
+                units.balanced,
+                x,
+                self.I_b,
+                V,
+                tolerance,
+            )
+            if rounds == NO_NETWORK:
+                if renewed:
+                    raise self._no_power_flow()
+                renewed = True
+                self._renew(J)
+                continue
+            left, renewed = left - rounds, False
+            self.V_b = x[:m] + 1j * x[m:]
+            if rounds <= most:
+                return J, V
+            if not self._near:
+                self.net, self._near = self._linearise(), True
+            if left <= 0 and change < 0.5 * before:
+                left, total, before = MOST_ROUNDS, total + MOST_ROUNDS, change
+        raise PlantError(
+            f"no initial operating point: injections still change by {change:.1e} pu after {total} iterations; "
+            "the inverters may have to deliver more than the network can carry; try another P_set0 or V_set0"
+        )
+
+    def _no_power_flow(self) -> NoPowerFlowError:
+        reduction, at = self.reduction, self.reduction.unknown
+        weak = weak_branches(
+            reduction.Y[at][:, at].tocsc(),
+            reduction.C.tocsr()[at].tocsc(),
+            reduction.loads,
+            np.abs(self.circuit.V_branch[reduction.branches]),
+        )
+        return NoPowerFlowError({int(reduction.branches[k]): S for k, S in weak.items()})
+
+
+DROOP, INSIDE, UNDER, OVER = range(4)
+"""Where an inverter rests: on the droop, inside its band, or on the edge below or above V_set."""
+
+AT_ONCE = 8
+"""Rounds in which all inverters may change their place, then the first of them alone (Murty's least-index rule)."""
+
+
+class VoltVarAtRest(NamedTuple):
+    """Droops and bands of inverters, and the set-points and limits at rest; arrays over the inverters."""
+
+    V_set: Real
+    """pu."""
+    m_q: Real
+    """pu per pu."""
+    db_UV: Real
+    """Dead bands below V_set (pu); 0 for a GFM, infinite without volt-var."""
+    db_OV: Real
+    """The same above V_set."""
+    from_edge: NDArray[np.bool_]
+    """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
+    Q_min: Real
+    """Limits of reactive power (pu)."""
+    Q_max: Real
+
+    def first_places(self) -> NDArray[np.int64]:
+        """Return where the search begins: inside of every band at whose edges the characteristic jumps."""
+        return np.where(((self.db_UV > 0.0) | (self.db_OV > 0.0)) & ~self.from_edge, INSIDE, DROOP)
+
+    def beyond(self, v: Real) -> Real:
+        """Return the deviation on which the droop acts (pu): from V_set, or from the edge of the band."""
+        low = self.V_set - v
+        return np.where(self.from_edge, low - np.clip(low, -self.db_OV, self.db_UV), low)
+
+    def within(self) -> Real:
+        """Return the vars within the band (pu): none, unless the limits exclude that."""
+        return np.clip(np.zeros(self.m_q.size), self.Q_min, self.Q_max)
+
+    def mismatch(self, place: NDArray[np.int64], v: Real, Q: Real) -> Real:
+        """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
+        low = self.V_set - v
+        wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
+        off = (np.where(place == INSIDE, self.within(), wanted) - Q) * self.m_q
+        off = np.where(place == UNDER, low - self.db_UV, off)
+        return np.where(place == OVER, low + self.db_OV, off)
+
+    def next_places(self, place: NDArray[np.int64], v: Real, Q: Real, rounds: int) -> NDArray[np.int64]:
+        """Return where inverters belong that rest with Q at v; the same places once they are right.
+
+        Parameters
+        ----------
+        place
+            Where they were taken to be.
+        v, Q
+            Voltages and reactive powers with which they rest there (pu).
+        rounds
+            How often places have changed before.
+        """
+        low = self.V_set - v
+        within = (-self.db_OV < low) & (low < self.db_UV) & ~self.from_edge
+        band, limit = (
+            np.where(place == UNDER, *pair) for pair in ((self.db_UV, self.db_OV), (self.Q_max, -self.Q_min))
+        )
+        on_jump = np.minimum(band / self.m_q, limit)
+        inward = np.where(place == UNDER, Q, -Q)  # of an inverter on an edge: what holds its voltage there
+        edge = np.where(Q > 0.0, UNDER, OVER)
+        edge = np.where(np.isinf(np.where(Q > 0.0, self.db_UV, self.db_OV)), INSIDE, edge)
+        right = np.where((place == INSIDE) & ~within, DROOP, place)
+        right = np.where((place == DROOP) & within, edge, right)
+        on_edge = (place == UNDER) | (place == OVER)
+        right = np.where(on_edge & (inward <= 0.0), INSIDE, right)
+        right = np.where(on_edge & (inward > on_jump), DROOP, right)
+        if rounds < AT_ONCE:
+            return right
+        changed = place.copy()
+        first = np.flatnonzero(right != place)[:1]
+        changed[first] = right[first]
+        return changed
+
+
+MOST_BY_DIFFERENCES = 100
+"""Inverters up to which a Jacobian by differences is worth its power flows, one an inverter; else Newton-Krylov."""
+
+KRYLOV = {"fatol": 1e-12, "maxiter": 20, "jac_options": {"rdiff": 1e-6}}
+"""Largest deviation (pu), most iterations of Newton's method (it takes 3 to 5), and its relative difference."""
+
+MOST_PLACE_ROUNDS = 100
+"""Most rounds in which inverters may change their place at their dead bands; it takes 2 to 4 on our feeder."""
+
+
+class DroopPowers(NamedTuple):
+    """Injections, voltages and reactive powers at rest, and where each inverter rests on its characteristic."""
+
+    J: Complex
+    """Norton injections (A)."""
+    V: Complex
+    """Terminal voltages (V)."""
+    Q: Real
+    """pu."""
+    on_droop: NDArray[np.bool_]
+    """Inverters whose voltage is V_set - m_q q."""
+    on_edge: NDArray[np.bool_]
+    """Inverters on the edge of a dead band."""
+
+
+def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: NDArray[np.bool_]) -> DroopPowers:
+    """Find the Q that each characteristic gives at its terminal's voltage.
+
+    Parameters
+    ----------
+    flow
+        The power flow of constant powers.
+    J, Q
+        First guesses of the injections (A) and reactive powers (pu).
+    P, V_set
+        Real powers and voltage set-points (pu).
+    swing
+        Inverters that hold their voltage, whatever their droop.
+
+    Raises
+    ------
+    PlantError
+        If there are none.
+    """
+    units = flow.units
+    free = ~swing & flow.reduction.online
+    limit = np.sqrt(np.maximum(units.S_max**2 - P**2, 0.0))
+    low, high = np.maximum(-limit, units.Q_min), np.minimum(limit, units.Q_max)
+    at_rest = VoltVarAtRest(V_set, units.m_q, units.db_UV, units.db_OV, units.from_edge, low, high)
+    place = np.where(free, at_rest.first_places(), DROOP)
+    for rounds in range(MOST_PLACE_ROUNDS):
+        J, V, Q = _at_places(flow, J, P, Q, at_rest, place, np.flatnonzero(free), swing)
+        v = units.regulated(V, J - flow.y[:, None] * V)
+        right = np.where(free, at_rest.next_places(place, v, Q, rounds), DROOP)
+        if np.array_equal(right, place):
+            deviation = V_set - v
+            on_droop = (place == DROOP) & (low * units.m_q <= deviation) & (deviation <= high * units.m_q)
+            on_droop &= at_rest.beyond(v) == deviation
+            return DroopPowers(J, V, Q, on_droop | ~free, (place == UNDER) | (place == OVER))
+        place = right
+    raise PlantError(
+        "no initial operating point: it is not found which GFL rest within their dead bands (db_UV_pu, db_OV_pu); "
+        "try another V_set0"
+    )
+
+
+def _at_places(
+    flow: PowerFlow,
+    J: Complex,
+    P: Real,
+    Q: Real,
+    at_rest: VoltVarAtRest,
+    place: NDArray[np.int64],
+    free: NDArray[np.int64],
+    swing: NDArray[np.bool_],
+) -> tuple[Complex, Complex, Real]:
+    """Find the Q at which the free inverters rest at these places of their characteristics."""
+    if not free.size:  # swings alone: they hold their voltage, and nothing is left to find
+        return *flow.solve(J, P, Q, swing), Q
+    units = flow.units
+
+    def mismatch(change: Real) -> Real:
+        nonlocal J
+        trial = Q.copy()
+        trial[free] += change  # from 0: differences relative to a Q near 0 would vanish
+        J, V = flow.solve(J, P, trial, swing)
+        I_out = J - flow.y[:, None] * V
+        measured = np.where(units.positive_sequence, units.measured(V, I_out)[0].imag, trial)
+        return np.asarray(at_rest.mismatch(place, units.regulated(V, I_out), measured)[free])
+
+    solution = None
+    if free.size > MOST_BY_DIFFERENCES:
+        with one_thread():
+            solution = root(mismatch, np.zeros(free.size), method="krylov", options=KRYLOV)
+    if solution is None or not solution.success:
+        solution = root(mismatch, np.zeros(free.size), method="hybr", options={"xtol": 1e-13})
+    if not solution.success and float(np.max(np.abs(solution.fun))) > 1e-10:
+        raise PlantError(
+            "no initial operating point: V_set0 cannot be met by droop, "
+            f"mismatch {np.max(np.abs(solution.fun)):.1e} pu; try another V_set0"
+        )
+    Q = Q.copy()
+    Q[free] += solution.x
+    Q = np.where(place == INSIDE, at_rest.within(), Q)
+    J, V = flow.solve(J, P, Q, swing)
+    return J, V, Q

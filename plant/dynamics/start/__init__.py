@@ -1,1 +1,0 @@
-"""The start of a run: its operating point, and inverters that rest there."""
