@@ -275,7 +275,7 @@ class After(Relation):
 class MultipleOf(Relation):
     """A time (s) that must be a whole multiple of the step (s) of another field."""
 
-    def objection(self, value: float, step: float, key: str, rule: str = "") -> str:
+    def objection(self, value: float, other: float, key: str, rule: str = "") -> str:
         """Return why a time is no multiple of the step at `key`, "" if it is, or if one of them is not above 0.
 
         Examples
@@ -283,17 +283,17 @@ class MultipleOf(Relation):
         >>> MultipleOf("T_c_s").objection(0.05, 0.02, "T_c_s")
         '0.05 s is not a multiple of T_c_s = 0.02 s; the nearest is 0.04'
         """
-        if value <= 0 or step <= 0 or _whole(value / step):
+        if value <= 0 or other <= 0 or _whole(value / other):
             return ""
-        near = f"{max(round(value / step), 1) * step:.9g}"
-        return f"{value:g} s is not a multiple of {key} = {step:g} s{rule and f', {rule}'}; the nearest is {near}"
+        near = f"{max(round(value / other), 1) * other:.9g}"
+        return f"{value:g} s is not a multiple of {key} = {other:g} s{rule and f', {rule}'}; the nearest is {near}"
 
 
 @dataclass(frozen=True)
 class Divides(Relation):
     """A step (s) that must divide the time (s) of another field."""
 
-    def objection(self, step: float, value: float, key: str) -> str:
+    def objection(self, value: float, other: float, key: str) -> str:
         """Return why a step does not divide the time at `key`, "" if it does, or if one of them is not above 0.
 
         Examples
@@ -301,13 +301,13 @@ class Divides(Relation):
         >>> Divides("T_c_s").objection(0.003, 0.02, "T_c_s")
         '0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025'
         """
-        if value <= 0 or step <= 0 or _whole(value / step):
+        if value <= 0 or other <= 0 or _whole(other / value):
             return ""
-        ratio = value / step
+        ratio = other / value
         # a step that can be written down in microseconds, for 0.02 / 7 cannot be typed
-        whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(value / n, 6) * n - value) < 1e-12]
-        near = value / min(whole, key=lambda n: abs(n - ratio), default=1)
-        return f"{step:g} s does not divide {key} = {value:g} s; the nearest that does is {near:g}"
+        whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(other / n, 6) * n - other) < 1e-12]
+        near = other / min(whole, key=lambda n: abs(n - ratio), default=1)
+        return f"{value:g} s does not divide {key} = {other:g} s; the nearest that does is {near:g}"
 
 
 def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
