@@ -9,8 +9,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
-from gridpeers.plant.tables.read import feeders
+from gridpeers.plant.tables.read import DATA, feeders
 from gridpeers.scenarios.results.run_files import (
     RUNS,
     FolderError,

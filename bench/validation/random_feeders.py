@@ -17,8 +17,7 @@ from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.random_script import RandomFeeder, Shape, random_feeder
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
-from gridpeers.plant.dynamics import Dynamics, PlantError
-from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics import Dynamics, PlantError, reduction
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
@@ -63,12 +62,12 @@ def run_states(drawn: RandomFeeder, script: Path, *, dense: bool = False) -> Fee
 
     FeederError, PlantError, ArithmeticError: the import or the plant refuses it, or an island has no solution.
     """
-    before = reduce_network.MOST_DENSE
-    reduce_network.MOST_DENSE = before if dense else 0
+    before = reduction.MOST_DENSE
+    reduction.MOST_DENSE = before if dense else 0
     try:
         return _Run(drawn, read_opendss(script, switches=[drawn.switch])).states()
     finally:
-        reduce_network.MOST_DENSE = before
+        reduction.MOST_DENSE = before
 
 
 class _Run:

@@ -12,11 +12,10 @@ from math import inf
 from typing import Annotated, NamedTuple, TypeVar
 
 import numpy as np
-from gridpeers.plant.dynamics.phasors import PHASES
-from gridpeers.plant.dynamics.start.power_flow import PowerFlow
 
-from gridpeers.plant.dynamics.circuit import Circuit
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import set_power, with_powers
 from gridpeers.plant.feeder.circuits import circuit_of

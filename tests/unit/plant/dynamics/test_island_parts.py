@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, threads
+from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, reduction, threads
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.network_arrays import Real
-from gridpeers.plant.dynamics.reduction import reduce_network
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5
@@ -52,7 +51,7 @@ def readings(dynamics: Dynamics) -> Real:
 
 @pytest.fixture(autouse=True)
 def _sparse(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", 0)
+    monkeypatch.setattr(reduction, "MOST_DENSE", 0)
 
 
 @pytest.mark.parametrize("PART", [6, 10])

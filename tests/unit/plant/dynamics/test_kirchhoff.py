@@ -9,8 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual
-from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics import Dynamics, reduction
 from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
@@ -64,7 +63,7 @@ def test_currents_balance_where_couplings_are_not_mutual(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_dense: int
 ) -> None:
     """At every node of an imported feeder with z12 unlike z21: at the start, after islanding, and after 0.1 s."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     network = Network(asymmetric(tmp_path))
     Y = network.admittance(network.closed0)
     assert abs(Y - Y.T).max() > 0.01, "the network is symmetric, so nothing is tested"
@@ -89,7 +88,7 @@ def test_the_start_is_the_power_flow_where_couplings_are_not_mutual(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_dense: int
 ) -> None:
     """The first point of the inner loop is that of `solve_power_flow` with the inverters' currents fed in."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     network = Network(asymmetric(tmp_path))
     circuit = circuit_of(network, network.closed0, network.loads())
     dynamics = Dynamics(circuit, installed_inverters(network, PlantSettings()), 0.002)
@@ -144,7 +143,7 @@ def with_open_ends(seed: int) -> Feeder:
 @pytest.mark.parametrize("seed", range(40))
 def test_currents_balance_where_terms_of_the_network_cancel(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """At the start and after islanding, with unloaded line ends behind a wye-wye transformer."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", 0)
+    monkeypatch.setattr(reduction, "MOST_DENSE", 0)
     network = Network(with_open_ends(seed))
     loads, units = network.loads(), installed_inverters(network, PlantSettings())
     dynamics = Dynamics(circuit_of(network, network.closed0, loads), units, 0.002)

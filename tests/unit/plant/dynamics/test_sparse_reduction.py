@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gridpeers.plant.dynamics import live_network, power_flow_at_rest
+from gridpeers.plant.dynamics import live_network, power_flow_at_rest, reduction
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK
-from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import Method, PlantSettings, SwitchEvent
@@ -24,7 +23,7 @@ def rows(
     monkeypatch: pytest.MonkeyPatch, most_dense: int, method: Method
 ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     """Return what is recorded of the microgrid feeder through its switchings, solved in one form."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     plant = Plant(Network(read_feeder("microgrid123")), PlantSettings(events=EVENTS, method=method), 0.02, 0.02)
     for _ in range(40):
         plant.advance()

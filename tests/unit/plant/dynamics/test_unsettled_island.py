@@ -7,10 +7,9 @@ import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
-from gridpeers.plant.dynamics import Circuit, Dynamics
+from gridpeers.plant.dynamics import Circuit, Dynamics, reduction
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.live_network import unsettled_island
-from gridpeers.plant.dynamics.reduction import reduce_network
 from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 3
@@ -41,7 +40,7 @@ def test_the_island_with_more_load_than_it_can_carry_is_found(
     monkeypatch: pytest.MonkeyPatch, most_dense: int, island: int, load: float, I_max: float
 ) -> None:
     """Among three live islands it is the one whose load has no solution, by its voltages or by its current limit."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     dynamics = lone_islands(I_max)
     net, here = dynamics.network.net, dynamics.network.net.branch_island == island
     assert here.any()

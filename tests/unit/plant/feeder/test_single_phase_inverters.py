@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics import reduction
 from gridpeers.plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
@@ -99,7 +99,7 @@ def test_both_forms_of_the_network_give_the_same_run(monkeypatch: pytest.MonkeyP
     settings = PlantSettings(events=tuple(SwitchEvent(t=t, switch=s, action=a) for s, a, t in events), method=method)  # type: ignore[arg-type]
     runs = []
     for most_dense in (0, 10_000):
-        monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+        monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
         p = Plant(Network(table), settings, T_C, T_C)
         run(p, 0.8)
         runs.append(np.array(p.take_rows()))
@@ -176,7 +176,7 @@ def test_three_legs_of_a_bus_feed_the_island_that_the_grid_leaves() -> None:
 @pytest.mark.parametrize("most_dense", [0, 10_000])
 def test_alone_on_three_phases_it_feeds_its_own(monkeypatch: pytest.MonkeyPatch, most_dense: int) -> None:
     """A leg of phase B left with a three-phase section feeds phase B; constant power on the others has no solution."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     islanding = SwitchEvent(t=0.1, switch="grid", action="open")
     table = small(unit("leg", "GFM", "5", "B", 300e3))
     impedances = replace(table, loads=tuple(replace(load, model="Z") for load in table.loads))

@@ -7,8 +7,7 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
-from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.reduction import reduce_network
+from gridpeers.plant.dynamics import Dynamics, reduction
 from gridpeers.plant.equipment import InverterRow
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
@@ -30,7 +29,7 @@ def test_the_inner_loop_has_gridlabds_voltages_where_z12_is_not_z21(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_dense: int
 ) -> None:
     """At the start and 20 ms after a switch opens, GridLAB-D given the inverters' powers as loads."""
-    monkeypatch.setattr(reduce_network, "MOST_DENSE", most_dense)
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
     rows = [
         InverterRow(name=bus, kind=kind, bus=bus, microgrid="1", P_rated=2e5, V_nom=V, m_p=0.01, m_q=0.05)  # type: ignore[arg-type]
         for bus, (kind, V) in PLACES.items()
