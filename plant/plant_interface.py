@@ -12,21 +12,21 @@ class ReadingLike(Protocol):
     """Sensor readings of one inverter; units as in `gridpeers.wire.messages.Measurement`."""
 
     @property
-    def P(self) -> float: ...  # noqa: D102
+    def P(self) -> float: ...
     @property
-    def Q(self) -> float: ...  # noqa: D102
+    def Q(self) -> float: ...
     @property
-    def V(self) -> float: ...  # noqa: D102
+    def V(self) -> float: ...
     @property
-    def f(self) -> float: ...  # noqa: D102
+    def f(self) -> float: ...
     @property
-    def P_set(self) -> float: ...  # noqa: D102
+    def P_set(self) -> float: ...
     @property
-    def V_set(self) -> float: ...  # noqa: D102
+    def V_set(self) -> float: ...
     @property
-    def grid_connected(self) -> bool: ...  # noqa: D102
+    def grid_connected(self) -> bool: ...
     @property
-    def island(self) -> str: ...  # noqa: D102
+    def island(self) -> str: ...
 
 
 class PlantLike(Protocol):

@@ -23,14 +23,14 @@ class GroupedNode(Core, Protocol):
     session_broken: bool
 
     @property
-    def name(self) -> str: ...  # noqa: D102
+    def name(self) -> str: ...
     @property
-    def token(self) -> str: ...  # noqa: D102
+    def token(self) -> str: ...
     @property
-    def nameplate(self) -> tuple[str, bytes]: ...  # noqa: D102
+    def nameplate(self) -> tuple[str, bytes]: ...
     @property
-    def publications(self) -> tuple[str, ...]: ...  # noqa: D102
-    def note_siblings(self, names: frozenset[str]) -> None: ...  # noqa: D102
+    def publications(self) -> tuple[str, ...]: ...
+    def note_siblings(self, names: frozenset[str]) -> None: ...
 
 
 class _Query(NamedTuple):
