@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
+from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.chaos import schedule_search
 from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign

@@ -50,7 +50,7 @@ def test_a_feeder_says_its_own_nominal_frequency(tmp_path: Path) -> None:
     """`feeder.toml` of the feeder's folder; the scenario need not repeat it, and may override it."""
     import shutil
 
-    from gridpeers.plant.imports.gridlabd.glm_classes import DATA
+    from gridpeers.plant.tables.read import DATA
 
     folder = tmp_path / "european"
     shutil.copytree(DATA / "microgrid123", folder)

@@ -93,7 +93,8 @@ def test_a_clock_of_the_day_is_found_under_any_name(source: str, clock: str) -> 
 
 def test_the_processes_of_a_run_ask_only_a_clock_that_never_jumps() -> None:
     """Deadlines, ages, ticks and leases count on `monotonic`; who asks for the time of the day is listed here."""
-    files = [path for part in ("wire", "agents", "plant", "netem", "scenarios") for path in (ROOT / part).rglob("*.py")]
+    rooms = ("wire", "agents", "plant", "netem", "scenarios", "viewer")
+    files = [path for room in rooms for path in (ROOT / room).rglob("*.py")]
     asking = {str(path.relative_to(ROOT)) for path in files if asked_for(path.read_text())}
 
     assert asking == set(ALLOWED)

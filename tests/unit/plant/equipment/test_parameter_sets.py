@@ -11,8 +11,8 @@ import gridpeers as gp
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import Bus, Source
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters, OwnParameters
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.predict.inverter_group import inverter_group_of
 from gridpeers.scenarios.predict.response import response

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.tables import FeederError, read_feeder
+from gridpeers.plant.tables.read import DATA
 
 
 @pytest.fixture

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.tables import FeederError, feeders, read_feeder
+from gridpeers.plant.tables.read import DATA
 
 
 @pytest.fixture

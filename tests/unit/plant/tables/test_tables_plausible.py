@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError, feeders, read_feeder
+from gridpeers.plant.tables.read import DATA
 
 
 @pytest.fixture

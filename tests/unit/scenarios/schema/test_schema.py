@@ -8,8 +8,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.plant_config import GfmParameters, SwitchEvent, SyncCheck
+from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import catalogue, load_scenario
 from gridpeers.scenarios.schema.configs import configs

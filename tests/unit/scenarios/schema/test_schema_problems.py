@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
+from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
 from tests.scenario_files import problems, written

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import gridpeers as gp
-from gridpeers.plant.imports.gridlabd.glm_classes import DATA
 from gridpeers.plant.plant_config import LoadEvent
+from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.results.plots.drawing import happening
 from gridpeers.scenarios.schema import load_scenario
