@@ -59,21 +59,7 @@ class FieldDoc(NamedTuple):
 
 
 def field_docs(cls: type) -> tuple[FieldDoc, ...]:
-    """Return the fields of a class with their docstrings, those of its base classes first.
-
-    Parameters
-    ----------
-    cls : type
-        A class whose source is at hand; of one without source there is none.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.plant_config import SwitchEvent
-    >>> [doc.name for doc in field_docs(SwitchEvent)]
-    ['t', 'switch', 'action', 'synchronised']
-    >>> field_docs(SwitchEvent)[0].text
-    'Time (s), a multiple of h.'
-    """
+    """Return the fields of a class with their docstrings, those of its base classes first; none without source."""
     written: dict[str, FieldDoc] = {}
     for base in reversed(cls.__mro__):
         if base not in (object, msgspec.Struct):
@@ -104,14 +90,7 @@ def markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> 
 
 
 def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
-    """Return names and docstrings of the annotated types that a module defines for its fields.
-
-    Examples
-    --------
-    >>> from gridpeers.wire import bounds
-    >>> dict(alias_docs(bounds))["Rating"]
-    'Rating (W): positive, at most a gigawatt.'
-    """
+    """Return names and docstrings of the annotated types that a module defines for its fields."""
     body = ast.parse(inspect.getsource(module)).body
     return tuple(
         (ast.unparse(statement.targets[0]), _one_line(after.value.value))
@@ -212,13 +191,7 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
 
 
 def page(topic: str) -> str:
-    """Return markdown of one page.
-
-    Parameters
-    ----------
-    topic : str
-        One of `TOPICS`.
-    """
+    """Return markdown of the page of one of `TOPICS`."""
     makers = {"keys": _keys, "messages": _messages, "scenario": _scenario, "feeder": _feeder}
     lines = makers[topic]() if topic in makers else _registry(topic)
     return "\n".join(lines) + "\n"

@@ -39,10 +39,8 @@ if TYPE_CHECKING:
 def run(request: Request, progress: Progress) -> RunReport:
     """Run all cases and write the whole folder.
 
-    Raises
-    ------
-    BrokenRunError
-        If a case broke. What came until then stays in the folder, and `status.txt` tells that it is not whole.
+    BrokenRunError if a case broke. What came until then stays in the folder, and `status.txt` tells that it is not
+    whole.
     """
     request = dataclasses.replace(request, folder=request.folder.absolute())  # a law or metric may go elsewhere
     with broken_if_ended(request.folder):

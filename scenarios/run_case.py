@@ -51,19 +51,9 @@ def run_case(
     progress: Progress,
     plant_at_rest: Callable[[PlantConfig], PlantLike] | None = None,
 ) -> tuple[Recorded, Outcome]:
-    """Run one case by the driver asked for, and record it.
+    """Run one case by the driver asked for, and record it, with the scenario as run (TOML).
 
-    Parameters
-    ----------
-    toml : str
-        The scenario as run, for its record.
-    plant_at_rest : Callable[[PlantConfig], PlantLike], optional
-        In one process: gives the plant at t = 0 instead of building it.
-
-    Raises
-    ------
-    BrokenRunError
-        If the case broke.
+    In one process `plant_at_rest` gives the plant at t = 0 instead of building it. BrokenRunError if the case broke.
     """
     time = request.scenario.time
     plant, agents = _configs(request, case)

@@ -14,15 +14,7 @@ def in_order(names: Iterable[str]) -> list[str]:
 
 
 def short(names: tuple[str, ...] | list[str]) -> str:
-    """Names of one stem and running numbers in few characters; "-" for none.
-
-    Examples
-    --------
-    >>> short(["inv1", "inv3", "inv4", "inv5", "north"])
-    'inv1,3-5 north'
-    >>> short([])
-    '-'
-    """
+    """Return names of one stem and running numbers in few characters, as "inv1,3-5 north"; "-" for none."""
     parts = [re.fullmatch(r"(.*?)(\d*)", name, re.DOTALL) for name in names]
     split = [(match[1], match[2]) for match in parts if match is not None]
     words = []
@@ -46,13 +38,7 @@ _UNITS = ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (math.inf, 86_
 
 
 def duration(seconds: float) -> str:
-    """A length of time (s) in words, of two digits: more would promise too much.
-
-    Examples
-    --------
-    >>> duration(45), duration(112), duration(600), duration(20_000), duration(400_000)
-    ('45 s', '110 s', '10 min', '5.6 h', '4.6 days')
-    """
+    """Return a length of time (s) in words, of two digits: more would promise too much."""
     unit, name = next((unit, name) for bound, unit, name in _UNITS if seconds < bound)
     return f"{float(f'{seconds / unit:.2g}'):g} {name}"
 

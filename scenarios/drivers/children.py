@@ -39,22 +39,10 @@ HEAD_START = 2.0
 
 
 class Child:
-    """One started process.
+    """A started process, named after its inverter, or "plant"; its configuration goes to it as one line of JSON.
 
-    Parameters
-    ----------
-    name : str
-        Name of the inverter, or "plant".
-    command : list[str]
-        What to run, without the interpreter.
-    config : msgspec.Struct or tuple of these
-        Configuration, sent as one line of JSON.
-    on_exit : Callable[[Child], None]
-        Called from another thread when it has ended.
-    on_word : Callable[[str], None], optional
-        Called from another thread with every line of its standard output.
-    server : ForkServer or None, optional
-        Forks it, instead of a new interpreter; then the command is `-m` and a module.
+    `on_exit`, and `on_word` for every line of its standard output, are called from another thread. With a server, whose
+    command is `-m` and a module, it is forked instead of started as a new interpreter.
     """
 
     def __init__(

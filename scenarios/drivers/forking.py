@@ -32,21 +32,10 @@ class ForkServerError(RuntimeError):
 
 
 class ForkServer:
-    """Fork processes of this one, from a server that has imported their modules.
+    """Fork processes of this one, from a server that has imported modules, or called the functions `module:function`.
 
-    Use it as a context; what it has forked goes on.
-
-    Parameters
-    ----------
-    preload : Sequence[str]
-        Modules to import, or `module:function` to call.
-    environment : Mapping[str, str], optional
-        Variables beside, or instead of, those of this process; what is forked has them too.
-
-    Raises
-    ------
-    ForkServerError
-        If this process cannot become the parent of what the server forks.
+    What it has forked goes on when it is closed, and has its environment too. ForkServerError if this process cannot
+    become the parent of what the server forks.
     """
 
     def __init__(self, preload: Sequence[str], environment: Mapping[str, str] = MappingProxyType({})) -> None:
@@ -71,17 +60,9 @@ class ForkServer:
         return self._server.poll() is None
 
     def fork(self, words: Sequence[str], log: IO[bytes], *, speaks: bool) -> ForkedProcess:
-        """Run a module in a new process.
+        """Run a module in a new process, which writes to `log`, or on its standard output to this process if it speaks.
 
-        Parameters
-        ----------
-        log : IO[bytes]
-            File for its standard error, and for its standard output unless it speaks to this process.
-
-        Raises
-        ------
-        ForkServerError
-            If the server cannot fork, or is gone.
+        ForkServerError if the server cannot fork, or is gone.
         """
         reading, writing = os.pipe()
         spoken = os.pipe() if speaks else None

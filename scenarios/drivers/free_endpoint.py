@@ -66,15 +66,8 @@ def local_endpoint(port: int) -> str:
 def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> str:
     """Return an endpoint where a process of this host will be able to listen; port 0 becomes a free port.
 
-    Parameters
-    ----------
-    option : str, optional
-        The option or key that gives it, for the error.
-
-    Raises
-    ------
-    ListenError
-        If the port is in use, the address is not one of this host, or its loopback interface is down.
+    ListenError, which names the option, if the port is in use, the address is not one of this host, or its loopback
+    interface is down.
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:

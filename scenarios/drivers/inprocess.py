@@ -48,15 +48,7 @@ def run_direct(
     on_telemetry: Callable[[Telemetry], None],
     on_journal: Callable[[Journal], None] = lambda journal: None,
 ) -> DirectPlant:
-    """Run to the end; return the plant's core.
-
-    Parameters
-    ----------
-    plant : PlantLike
-        The plant at t = 0.
-    on_journal : Callable[[Journal], None], optional
-        Takes the journals, if the configurations ask for them.
-    """
+    """Run to the end from a plant at t = 0; return the plant's core."""
     core = DirectPlant(config, plant, on_telemetry, on_journal)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
@@ -83,12 +75,7 @@ _Node = LockstepPlant | LockstepAgent
 class InprocessBus:
     """Deliver the messages of the nodes, in the order of publication.
 
-    Parameters
-    ----------
-    agents : Iterable[LockstepAgent]
-        The agents' cores, in the order in which they start.
-    newcomer : Callable[[str], LockstepAgent]
-        Makes the core of an agent that the plant awaits while the run goes on.
+    `newcomer` makes the core of an agent that the plant awaits while the run goes on.
     """
 
     def __init__(
@@ -207,27 +194,11 @@ def run_inprocess(
     plant: PlantLike | None = None,
     messages: bool = False,
 ) -> Outcome:
-    """Run a scenario in this process and this thread.
+    """Run a scenario in this process and this thread; agents start in their order, those that join later included.
 
-    Parameters
-    ----------
-    plant_config : PlantConfig
-        The plant; its endpoints and recorders do not matter here.
-    agent_configs : Iterable[AgentConfig]
-        The agents, in the order in which they start; also those that join later.
-    on_telemetry : Callable[[Telemetry], None]
-        Called with every telemetry message as it comes; the first at t = 0.
-    on_journal : Callable[[Journal], None], optional
-        Called with every part of a node's journal, if the configurations ask for journals.
-    plant : PlantLike, optional
-        A plant at t = 0 to use instead of building the configuration's.
-    messages : bool, optional
-        Whether plant and agents exchange messages even where these decide nothing.
-
-    Returns
-    -------
-    Outcome
-        How it ended. A plant without solution is an outcome; a bad feeder or name is an exception, before the start.
+    The first telemetry is that of t = 0. A given `plant` is used instead of building the configuration's. With
+    `messages`, plant and agents exchange them even where these decide nothing. A plant without solution is an outcome;
+    a bad feeder or name is an exception, before the start.
     """
     began = perf_counter()
     started = began

@@ -56,45 +56,14 @@ def run_processes(
     shared: int = 0,
     star: bool = True,
 ) -> Outcome:
-    """Run a scenario with a plant process and processes of agents, in simulated or in wall-clock time.
+    """Run a scenario with a plant process and processes of agents, in simulated or in real time.
 
-    In wall-clock time the plant ends the run after end / speed, the death of an agent is only an event, and the
-    scenario's kills and pauses are real signals. An agent that joins, or joins again, is started when the plant awaits
-    it.
-
-    Parameters
-    ----------
-    plant_config : PlantConfig
-        The plant. Its `listen` is used if it names a port other than 0, else a free port is chosen.
-    agent_configs : Iterable[AgentConfig]
-        The agents, also those that join later; where they connect is filled in.
-    log_dir : Path
-        Folder for `plant.log`, `inv1.log`, ...; made if it does not exist.
-    on_telemetry : Callable[[Telemetry], None]
-        Called with every telemetry message as it comes; the first at t = 0.
-    start_order : Sequence[str], optional
-        Names in the order of their start; the plant, named "plant", first unless said otherwise.
-    on_start : Callable[[Children], None], optional
-        Called once all processes are started; tests inject faults here.
-    on_journal : Callable[[Journal | LinkRequest], None], optional
-        Called with every part of a node's journal, if the configurations ask for journals, and every link command.
-    plant_command : Sequence[str], optional
-        Arguments of the interpreter for another plant than the usual one; tests have smaller ones.
-    shared : int, optional
-        Number of processes that agents share; 0 gives each agent its own.
-    star : bool, optional
-        In simulated time: whether all processes link to the plant alone, which relays; if not, they link to each
-        other, as they do in wall-clock time. docs/protocol.md, "One link each", compares the two.
-
-    Returns
-    -------
-    Outcome
-        How it ended.
-
-    Raises
-    ------
-    ListenError, SessionError
-        If the port is in use, or Zenoh is missing; nothing has been started then.
+    In real time the plant ends the run after end / speed, the death of an agent is only an event, and the scenario's
+    kills and pauses are real signals. Agents that join, or join again, start when the plant awaits them. The plant
+    listens at its `listen`, or at a free port, and the agents' `connect` is filled in. `on_start` is called once all
+    processes are started, in the `start_order`, the plant first unless said otherwise. `shared` is the number of
+    processes that agents share, 0 for one each. `star` lets all processes link to the plant alone in simulated time
+    (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use or Zenoh is missing.
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"

@@ -23,17 +23,8 @@ def secured(
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...], tuple[str, ...]]:
     """Return configurations with certificates, and a note on each that ends soon.
 
-    Parameters
-    ----------
-    started : Collection[str]
-        Names of the agents that start from here: their keys must be in the folder.
-    inverters : Sequence[str]
-        All inverters of the feeder: access rules name their agents, which may get their certificates during the run.
-
-    Raises
-    ------
-    KeysError
-        If anything about a certificate is wrong: every problem, a line each.
+    The keys of the agents that are `started` from here must be in the folder; access rules name the agents of all
+    `inverters`. KeysError has every problem of a certificate, a line each.
     """
     every = tuple(inverters)
     problems: list[str] = []

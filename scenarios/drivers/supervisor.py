@@ -44,14 +44,9 @@ def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
 
 
 class FaultInjector:
-    """Inject the process faults of a scenario into the children of a run; telemetry gives the run's time.
+    """Inject the process faults in the tree `links` of the plant's configuration; telemetry gives the run's time.
 
-    Parameters
-    ----------
-    links : Mapping[str, Any]
-        The tree `links` of the plant's configuration.
-    speed : float
-        Run time per wall time (s/s).
+    The speed is run time per real time (s/s).
     """
 
     def __init__(self, links: Mapping[str, Any], speed: float) -> None:
@@ -70,10 +65,7 @@ class FaultInjector:
         return {fault.name for fault in self._due}
 
     def note_time(self, t: float, at: float) -> None:
-        """Note that the run had reached t (s) at a time of `monotonic` (s).
-
-        The latest value counts: a plant that falls behind postpones its schedule.
-        """
+        """Note that the run had reached t (s) at a time of `monotonic` (s); the latest counts, as a plant may lag."""
         self._offset = t - at * self._speed
 
     @property
@@ -107,21 +99,9 @@ class FaultInjector:
 class Supervisor:
     """Start the plant and its agents, inject the process faults of the scenario, and end every process.
 
-    Use it as a context: leaving it ends all processes. One thread owns it; `on_exit` and `on_word` come from others.
-
-    Parameters
-    ----------
-    agents : Iterable[AgentConfig]
-        All agents, also those that join later, with their endpoints.
-    log_dir : Path
-        Folder for `plant.log`, `inv1.log`, ...; the second life of inv1 writes `inv1-2.log`.
-    on_word : Callable[[str], None], optional
-        Called with "listening", "compiling", "ready" as the plant comes up.
-    plant_command : Sequence[str], optional
-        Arguments of the interpreter for another plant than the usual one.
-    shared : int, optional
-        Number of processes that agents share; 0 gives each agent its own. An agent that the scenario starts, stops,
-        kills or pauses has its own in any case.
+    Use it as a context: leaving it ends all processes. One thread owns it; `on_exit`, and `on_word` with the words of
+    the starting plant, are called from others. The second life of inv1 logs to `inv1-2.log`. Agents share `shared`
+    processes, 0 gives each its own; one that the scenario starts, stops, kills or pauses has its own in any case.
     """
 
     def __init__(

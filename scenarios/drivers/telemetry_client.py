@@ -28,29 +28,18 @@ LOOK = 0.5
 def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
     """Return a plant with the recorder of its driver.
 
-    Parameters
-    ----------
-    waits : bool, optional
-        Whether it waits for the recorder even if it waits for no agent, as in a live run that is recorded.
+    With `waits` it waits for the recorder even if it waits for no agent, as in a live run that is recorded.
     """
     wait = max(RECORDER_WAIT, config.wait_for_agents) if waits else config.wait_for_agents
     return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
 
 class TelemetryClient:
-    """Pass on each message that the plant publishes for recorders, and keep the state of the run.
+    """Pass on each message that the plant publishes for recorders, in its order, and keep the state of the run.
 
     It asks again for missing messages, e.g. after this process stood still for longer than Zenoh's lease, and opens a
     new session when the old one brings nothing any more. In simulated time the plant waits for its acknowledgements.
-
-    Parameters
-    ----------
-    name : str
-        The recorder's name; the plant waits for it before the start.
-    on_message : Callable[[Recordable], None]
-        Called with each message, in the order in which the plant published them.
-    credentials : Credentials or None, optional
-        Own certificate and members of the site; None if links are open.
+    The plant waits for a recorder of its name before the start.
     """
 
     def __init__(
@@ -97,13 +86,7 @@ class TelemetryClient:
         self.inbox.put(("word", word, b""))
 
     def take(self, timeout: float | None) -> list[str]:
-        """Wait for messages, pass them on, and return the words of other threads.
-
-        Parameters
-        ----------
-        timeout : float or None
-            Longest wait (s); None for no end. It may return with nothing before.
-        """
+        """Wait for messages, for `timeout` (s) at most, pass them on, and return the words of other threads."""
         timeout = LOOK if timeout is None else min(timeout, LOOK)
         words: list[str] = []
         for kind, key, payload, _ in self._session.take(1, timeout):

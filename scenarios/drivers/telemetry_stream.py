@@ -37,15 +37,7 @@ Recordable = Telemetry | LinkReport | Journal | LinkRequest
 class TelemetryStream:
     """Let messages through in the order in which the plant published them, each once.
 
-    Parameters
-    ----------
-    acknowledges : bool, optional
-        Whether the plant waits for acknowledgements, as in simulated time.
-
-    Attributes
-    ----------
-    lost : bool
-        Whether messages are lost, as the plant did not have them any more.
+    In simulated time it acknowledges. `lost` says that messages are lost, as the plant did not have them any more.
     """
 
     def __init__(self, *, acknowledges: bool = False) -> None:

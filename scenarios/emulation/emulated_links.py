@@ -36,13 +36,7 @@ class _Interval(NamedTuple):
 
 
 class EmulatedLinks:
-    """All links into one receiver, as `gridpeers.wire.links.Links` describes them, with the faults of their nodes.
-
-    Parameters
-    ----------
-    name : str
-        The receiver: an inverter, or the plant.
-    """
+    """All links (`gridpeers.wire.links.Links`) into one inverter or the plant, with the faults of their nodes."""
 
     def __init__(self, name: str, config: EmulationConfig) -> None:
         self._name, self._microgrids, self._config = name, config.microgrids, config
@@ -100,10 +94,7 @@ class EmulatedLinks:
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Change what the links do to messages sent at t (s of run time) or later.
 
-        Raises
-        ------
-        ValueError
-            If the tree is no command to links, or its values are wrong; nothing has changed then.
+        ValueError, with nothing changed, if the tree is no command to links, or its values are wrong.
         """
         command = LinkCommand.of_tree(tree)
         problems = command.problems(self._microgrids)

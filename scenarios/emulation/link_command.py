@@ -22,22 +22,8 @@ from gridpeers.wire.wording import first_of, printable
 def words(kind: str, model: Any) -> str:
     """Return a fault in words: plain if it has one or two numbers, else the profile that has it, or its keys.
 
-    Parameters
-    ----------
-    kind : str
-        Of `gridpeers.netem.schema.fault.KINDS`, or "partition".
-    model : Any
-        The struct of `gridpeers.netem.models`.
-
-    Examples
-    --------
-    >>> words("delay", Uniform(low_s=0.08, high_s=0.12))
-    'delay 0.08 to 0.12 s'
-    >>> from gridpeers.netem.models.delay import Normal
-    >>> words("delay", Normal(mean_s=0.05, std_s=0.02, correlation=0.5))
-    'delay normal (correlation 0.5, mean_s 0.05, std_s 0.02)'
-    >>> words("loss", PROFILES["lte"].loss)
-    'loss of lte'
+    The kind is one of `gridpeers.netem.schema.fault.KINDS`, or "partition"; the model a struct of
+    `gridpeers.netem.models`.
     """
     match model:
         case Plugin(parameters=parameters):

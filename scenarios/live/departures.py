@@ -37,13 +37,7 @@ _AGAIN = re.compile(r"\S+ (is heard again|hears .* again)")
 
 
 class ExpectedSilence:
-    """Recognise events of silence (`gridpeers.plant.realtime.silence_detector`) that the scenario itself causes.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        With its one case.
-    """
+    """Recognise silences (`gridpeers.plant.realtime.silence_detector`) that the scenario's one case causes itself."""
 
     def __init__(self, scenario: ScenarioModel, feeder: Feeder) -> None:
         (case,) = scenario.cases
@@ -103,13 +97,7 @@ class LiveWindows:
 
 
 def live_events(done: Iterable[PlantEvent]) -> tuple[tuple[str, float], ...]:
-    """Return label and time (s) of each event that people made on switches and loads; those of one step are one event.
-
-    Examples
-    --------
-    >>> live_events([PlantEvent(t=2.5, kind="switch", subject="67s-67", text="switch sw1_2 (67s-67) opened")])
-    (('live at 2.5 s', 2.5),)
-    """
+    """Return label and time (s) of each event that people made on switches and loads; those of one step are one."""
     return tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in done))
 
 
@@ -120,20 +108,11 @@ def live_windows(
     ended: float,
     missing: Sequence[tuple[float, float]] = (),
 ) -> LiveWindows:
-    """Return the windows of a live run.
+    """Return the windows of a live run that ended at a time (s), given label and time (s) of its live events in order.
 
     A live event opens a window as the scenario's events do, and ends the one before it. Its own window lasts to the
-    next event or to the end of the run, whatever the scenario says of its end. A switch operated at the moment of an
-    event of the scenario belongs to the window of that event.
-
-    Parameters
-    ----------
-    live : Sequence[tuple[str, float]]
-        Label and time (s) of the live events, in the order of time.
-    ended : float
-        Time (s) of the last row.
-    missing : Sequence[tuple[float, float]], optional
-        Times (s) of the rows before and after each interval without rows.
+    next event or to the end of the run. A switch operated at the moment of an event of the scenario belongs to the
+    window of that event. `missing` has the times (s) of the rows before and after each interval without rows.
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     scripted = windows(as_they_came(scenario, events), scenario.time.end_s)
@@ -226,16 +205,9 @@ def compare(
     ended: float,
     missing: Sequence[tuple[float, float]] = (),
 ) -> Departures:
-    """Compare a run with its scenario.
+    """Compare a run of one case, whose last row was at `ended` (s), with its scenario.
 
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run, with one case.
-    ended : float
-        Time (s) of the last row.
-    missing : Sequence[tuple[float, float]], optional
-        Times (s) of the rows before and after each interval without rows.
+    `missing` has the times (s) of the rows before and after each interval without rows.
     """
     meant = windows([(event.label, event.t_s) for event in scenario.events], scenario.time.end_s)
     switched = tuple(_switched(scenario, feeder, events))

@@ -37,16 +37,10 @@ write it takes as long as there are commands, of which an hour has hundreds."""
 
 
 class LinkLog:
-    """Keep the link commands of a run, and write the scenario that replays them.
+    """Keep the link commands of a run of one case, and write the scenario that replays them.
 
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        As run, with its one case.
-    replay : Path or None
-        File of the scenario that replays the run's links: written at the end in any case, and now and then before.
-    replay_if_changed : Path or None
-        The same, but only written once there is a link command.
+    The file `replay` is written at the end in any case, and now and then before; `replay_if_changed` only once there is
+    a link command.
     """
 
     def __init__(
@@ -63,12 +57,7 @@ class LinkLog:
     def claimed(self) -> Iterator[None]:
         """Make the file of `--record` for a run, so that no other takes it; remove it again if the run does not begin.
 
-        It is a scenario from the beginning, for a run that is killed.
-
-        Raises
-        ------
-        UsageError
-            If it is there meanwhile, or cannot be made.
+        It is a scenario from the beginning, for a run that is killed. UsageError if it exists, or cannot be made.
         """
         file, begun = self._replay, False
         if file is None:
@@ -111,17 +100,10 @@ class LinkLog:
 
 
 def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> Iterator[str]:
-    """Yield the lines of the scenario whose links change by schedule as they did by command.
+    """Yield the lines of the scenario whose links change by schedule as they did by command until t (s).
 
     It leaves out agents that the scenario lacks. An age that the live run had by default is written out, as there is no
     such default in simulated time.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        As run, with its one case.
-    t : float
-        How far the run came (s): the scenario ends there, if it does not end later anyway.
     """
     ((name, case),) = scenario.cases.items()
     microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}

@@ -62,13 +62,7 @@ class LinkCommandResult:
 
 
 def links_of_run(client: RunClient) -> tuple[EmulationConfig, AgentConfig]:
-    """Return the emulated links of a run, and the configuration of one of its agents.
-
-    Raises
-    ------
-    NobodyError
-        If the run has no links that can be changed.
-    """
+    """Return the emulated links of a run, and the configuration of one agent; NobodyError if none can be changed."""
     for config in configurations(client).values():
         if config.links:
             return EmulationConfig.of_tree(config.links), config
@@ -125,15 +119,7 @@ _HEAD = ("link", "sent", "delivered", "dropped", "now")
 
 
 def links_text(run: str, t: float, stands: Mapping[tuple[str, str], LinkStatus]) -> str:
-    """One line for each link that is impaired now, one for all that once were.
-
-    Parameters
-    ----------
-    t : float
-        Run time (s).
-    stands : Mapping
-        How links stand, by sender and receiver.
-    """
+    """Return one line for each link that is impaired at t (s), one for all that once were; by sender and receiver."""
     names = in_order({name for link in stands for name in link} - {PLANT})
     order = {name: i for i, name in enumerate([*names, PLANT])}
     now = {link: stands[link] for link in sorted(stands, key=lambda ends: (order[ends[0]], order[ends[1]]))}

@@ -30,16 +30,9 @@ from gridpeers.wire.timing import rounded_up
 
 
 def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:
-    """Return the scenario of a live run with its true end, and sentences on that for the head of its file.
+    """Return the scenario of a live run of one case with its true end (s), and sentences for the head of its file.
 
     What would come at or after the end is left out, as no scenario may have it: events, and faults of links and nodes.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        As the run began, with its one case.
-    ended : float
-        Run time of the last row (s).
     """
     begun = scenario.time.end_s
     end = min(rounded_up(ended, scenario.time.T_c_s), LONGEST_RUN)
@@ -117,10 +110,7 @@ AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, 
 def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     """Make the folders of a run, as `--out` says.
 
-    Raises
-    ------
-    FolderError
-        If the folder has something in it, is a file, or cannot be made or written.
+    FolderError if the folder has something in it, is a file, or cannot be made or written.
     """
     if out is None:
         with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:

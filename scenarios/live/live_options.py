@@ -42,19 +42,8 @@ LOOKING = 1.5
 def endpoint_for_run(listen: str, credentials: Credentials | None = None, access: Access | None = None) -> str:
     """Return the endpoint where a plant will be able to listen, a free port for port 0.
 
-    Parameters
-    ----------
-    credentials : Credentials or None, optional
-        The plant's, to ask another run that is there for its name.
-    access : Access or None, optional
-        The options that gave them, for the commands that the error names.
-
-    Raises
-    ------
-    UsageError
-        If it is no endpoint, or another run is there, which the message names.
-    ListenError
-        If it cannot be listened on.
+    UsageError if it is no endpoint, or another run is there, which is asked with these credentials and named with the
+    commands of this access; ListenError if it cannot be listened on.
     """
     try:
         return free_endpoint(check_endpoint("--listen", listen), option="--listen")
@@ -84,15 +73,7 @@ def runs_at(endpoint: str, credentials: Credentials | None = None) -> list[str]:
 def check_alone(
     run: str, beyond: tuple[str, ...], credentials: Credentials | None = None, access: Access | None = None
 ) -> None:
-    """Raise UsageError if a plant of this run is there already, beyond the own endpoint.
-
-    Parameters
-    ----------
-    beyond : tuple[str, ...]
-        Endpoints that the plant will connect to; without any, it cannot meet another plant.
-    access : Access or None, optional
-        The options that gave them, for the command that the error names.
-    """
+    """Raise UsageError if a plant of this run is at an endpoint `beyond` the own, to which the plant will connect."""
     if not beyond:
         return
     there = RunAddress(run=run, connect=beyond, credentials=credentials, access=access or Access())
@@ -126,13 +107,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def chosen_case(scenario: ScenarioModel, case: str) -> str:
-    """Return the case to run: the one asked for, or the scenario's last, which in the paper is full coordination.
-
-    Raises
-    ------
-    UsageError
-        If there is no such case.
-    """
+    """Return the case asked for, or the last, in the paper full coordination; UsageError if there is no such case."""
     if case and case not in scenario.cases:
         raise UsageError(f'--case: no case "{case}"; {suggestion(case, scenario.cases, "cases")}')
     return case or list(scenario.cases)[-1]
@@ -141,19 +116,9 @@ def chosen_case(scenario: ScenarioModel, case: str) -> str:
 def configure(
     scenario: ScenarioModel, feeder: Feeder, options: LiveOptions, listen: str, beyond: tuple[str, ...] = ()
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Return the configurations of the plant and of all agents, spare ones last.
+    """Return the configurations of the plant and of all agents of a checked scenario, spare ones last.
 
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        A checked scenario.
-    beyond : tuple[str, ...], optional
-        What the plant connects to itself, e.g. a Zenoh router.
-
-    Raises
-    ------
-    UsageError
-        If an option cannot be used.
+    The plant connects to the endpoints `beyond` itself, e.g. a Zenoh router. UsageError if an option cannot be used.
     """
     _check(options)
     if scenario.plant.simulator != "gridpeers":
@@ -191,13 +156,7 @@ def configure(
 
 
 def manual_node_faults(scenario: ScenarioModel) -> str:
-    """Return a note on the process faults that people have to inject into agents of their own; "" if there are none.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        With its one case.
-    """
+    """Return a note on the faults that people have to inject into processes of their own; "" if there are none."""
     (case,) = scenario.cases
     nodes = [node for node in netem_of(scenario, case).nodes if node.kill or node.pause]
     if not nodes:

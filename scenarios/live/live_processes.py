@@ -88,27 +88,14 @@ def meaning(word: str, config: PlantConfig) -> str:
 
 
 def limited(text: str, limit: RateLimit, now: float) -> str:
-    """Return a sentence for a person, or "" of the many that a peer without access makes, which tries again for ever.
-
-    Examples
-    --------
-    >>> limit = RateLimit(burst=1)
-    >>> [limited(text, limit, 0.0) for text in ("a link was refused: 1 s", "", "a link was refused: 2 s")]
-    ['a link was refused: 1 s', '', '']
-    """
+    """Return a sentence for a person, or "" of the many that a peer without access makes, as it tries for ever."""
     return (limit.admit(text, now) or "") if text else ""
 
 
 def plant_here(
     config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo | None = None
 ) -> ProcessOutcome:
-    """Run the plant in this process until it is told to end.
-
-    Parameters
-    ----------
-    record : RecordInfo, optional
-        The run, for its record.
-    """
+    """Run the plant in this process until it is told to end."""
     requests = stop_at_signals(StoppedError)
     _log()
     config = with_recorder(config, waits=folder is not None)
@@ -144,15 +131,7 @@ def all_here(
     link_log: LinkLog,
     record: RecordInfo | None = None,
 ) -> ProcessOutcome:
-    """Run the plant and all its agents as processes of their own, until the run ends.
-
-    Parameters
-    ----------
-    agents : tuple[AgentConfig, ...]
-        All agents it knows; spare ones are not started.
-    record : RecordInfo, optional
-        The run, for its record.
-    """
+    """Run the plant and its agents, but for spare ones, as processes of their own, until the run ends."""
     requests = stop_at_signals(StoppedError)
     config = with_recorder(config, waits=folder is not None)
     endpoint, listen = loopback_of(config.listen[0]), return_path(config.listen)
@@ -201,27 +180,12 @@ def all_here(
 def agent_here(
     where: RunAddress, names: tuple[str, ...], listen: tuple[str, ...] | None, wait: float, *, trusts: bool = False
 ) -> ProcessOutcome:
-    """Run agents in this process, with the configurations that the plant hands out, until they leave.
+    """Run agents in this process, in one session, with the configurations that the plant hands out, until they leave.
 
-    Parameters
-    ----------
-    where : RunAddress
-        The run, and where to look for it.
-    names : tuple[str, ...]
-        Names of their inverters; several agents share a session.
-    listen : tuple[str, ...] or None
-        Where other agents can connect; None is for any free port, of all addresses if others can reach the plant.
-    wait : float
-        Longest wait (s) for a plant, and its answers.
-    trusts : bool, optional
-        Whether to run code that only the plant names, though the plant may be on another host.
-
-    Raises
-    ------
-    NobodyError
-        If there is no plant, no such inverter, or another agent of its name.
-    UsageError
-        If the plant names code that does not come with gridpeers, and is not trusted.
+    They wait for `wait` (s) for the plant and its answers. `listen` is where other agents connect; None takes any free
+    port, of all addresses if others can reach the plant. UsageError if the plant names code that does not come with
+    gridpeers, may be on another host, and is not trusted; NobodyError if there is no plant, no such inverter, or
+    another agent of it.
     """
     stop_at_signals(StoppedError)
     _log()

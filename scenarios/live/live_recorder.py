@@ -26,22 +26,10 @@ _ON = "; the run goes on without it"
 
 
 class LiveRecorder:
-    """Say the plant's events as they come, and feed the `Recorder` and the `LinkLog` of the run.
+    """Say the plant's events as they come, but for `silent` kinds, and feed the `Recorder` and `LinkLog` of the run.
 
     The plant waits for it before the start and at the end, so nothing of the run is missing. Use it as a context.
-
-    Parameters
-    ----------
-    folder : Path or None
-        Folder for the files of the record; None records nothing.
-    silent : Collection[str], optional
-        Kinds of events that it does not say.
-    link_log : LinkLog, optional
-        Takes the plant's messages on commands to links.
-    record : RecordInfo, optional
-        The run, for its record run.mcap in the folder; None writes none.
-    credentials : Credentials or None, optional
-        Own certificate and members of the site; None if links are open.
+    Without a folder nothing is recorded; without `record` the folder has no run.mcap.
     """
 
     def __init__(

@@ -38,13 +38,7 @@ PRESENT = {"opened": "opens", "closed": "closes", "joined": "joins", "left": "le
 def live_drawing(
     departures: Departures, scenario: ScenarioModel, feeder: Feeder, history: History, events: Sequence[PlantEvent]
 ) -> Drawing:
-    """Return the data to draw: all events by name, and a line at each departure from the scenario.
-
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run, with one case.
-    """
+    """Return the data to draw of a run of one case: all events by name, and a line at each departure."""
     (case,) = scenario.cases
     reached = tuple(event for event in scenario.events if event.t_s < history.t[-1])
     came = as_they_came(msgspec.structs.replace(scenario, events=reached), events)
@@ -75,19 +69,10 @@ def _in_short(event: PlantEvent) -> str:
 
 
 def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
-    """Measure the record of a live run; write metrics.json, report.txt and figures into its folder.
+    """Measure the record of a live run of one case; write metrics.json, report.txt and figures into its folder.
 
-    It judges no claim of the paper: a live run has one case, and people may have changed it.
-
-    Parameters
-    ----------
-    metrics : RunMetrics
-        The run: its scenario has one case, and its folder exists.
-
-    Raises
-    ------
-    StoppedError, KeyboardInterrupt
-        If a signal ends it. What checks were about to judge is not judged then, and the report says so.
+    It judges no claim of the paper, as people may have changed the run. StoppedError or KeyboardInterrupt if a signal
+    ends it: the report says then what checks did not judge.
     """
     scenario, feeder, (case,) = metrics.scenario, metrics.feeder, metrics.scenario.cases
     departures = compare(scenario, feeder, recorded.events, recorded.ended, recorded.missing)

@@ -51,13 +51,7 @@ def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
 
 
 def is_loopback_host(host: str) -> bool:
-    """Return whether an endpoint's host is this host's loopback.
-
-    Examples
-    --------
-    >>> [is_loopback_host(host) for host in ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")]
-    [True, True, True, False, False]
-    """
+    """Return whether an endpoint's host is this host's loopback."""
     try:
         return host == "localhost" or ip_address(host.strip("[]")).is_loopback
     except ValueError:  # a name that only begins like an address, as anybody may register it
@@ -65,13 +59,7 @@ def is_loopback_host(host: str) -> bool:
 
 
 def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
-    """Return the default endpoint as it is with certificates; any other endpoint as it was typed.
-
-    Examples
-    --------
-    >>> with_protocol("tcp/127.0.0.1:7447", keys=True, default="tcp/127.0.0.1:7447")
-    'tls/127.0.0.1:7447'
-    """
+    """Return the default endpoint as it is with certificates; any other endpoint as it was typed."""
     return endpoint.replace("tcp/", "tls/", 1) if keys and endpoint == default else endpoint
 
 
@@ -109,15 +97,7 @@ class RunAddress:
 
     @property
     def words(self) -> list[str]:
-        """The options by which a command on the same host finds this run, without those that have their defaults.
-
-        Examples
-        --------
-        >>> RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words
-        []
-        >>> RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words
-        ['--run', 'demo', '--connect', 'tcp/127.0.0.1:7500']
-        """
+        """The options by which a command on the same host finds this run, without those that have their defaults."""
         near = tuple(map(loopback_of, self.connect))
         default = with_protocol(ENDPOINT, keys=self.access.keys is not None, default=ENDPOINT)
         run = [] if self.run == RUN else ["--run", self.run]
@@ -130,18 +110,7 @@ class RunAddress:
 
 
 def address_of(run: str, connect: list[str] | None) -> RunAddress:
-    """Return the address that the options `--run` and `--connect` give.
-
-    Parameters
-    ----------
-    connect : list[str] or None
-        Endpoints; none stands for `ENDPOINT`.
-
-    Raises
-    ------
-    UsageError
-        If a name or an endpoint cannot be used.
-    """
+    """Return the address that the options `--run` and `--connect` give; UsageError if one of them cannot be used."""
     return RunAddress(
         run=check_name("--run", run), connect=tuple(check_endpoint("--connect", text) for text in connect or [ENDPOINT])
     )
@@ -157,15 +126,7 @@ def check_name(option: str, name: str) -> str:
 
 
 def check_inverters(names: Sequence[str]) -> None:
-    """Refuse a name that cannot be an inverter's, and one that is given twice.
-
-    Examples
-    --------
-    >>> check_inverters(["inv1", "inv2", "inv1"])
-    Traceback (most recent call last):
-        ...
-    gridpeers.scenarios.live.run_address.UsageError: INVERTER: inv1 is given twice; one agent controls an ...
-    """
+    """Raise UsageError for a name that cannot be an inverter's, and for one that is given twice."""
     for name in names:
         check_name("INVERTER", name)
     twice = [name for name, count in Counter(names).items() if count > 1]
@@ -174,13 +135,7 @@ def check_inverters(names: Sequence[str]) -> None:
 
 
 def check_wait(wait: float) -> float:
-    """Return a longest wait (s), if it is one; infinity waits for ever.
-
-    Examples
-    --------
-    >>> check_wait(2.5)
-    2.5
-    """
+    """Return a longest wait (s), if it is one; infinity waits for ever."""
     if not wait >= 0.0:
         raise UsageError(f"--wait: must be a time of at least 0 s, got {wait:g} s")
     return wait
@@ -193,19 +148,9 @@ def check_duration(seconds: float | None) -> None:
 
 
 def check_endpoint(option: str, text: str) -> str:
-    """Return an endpoint if it has the form of one.
+    """Return an endpoint if Zenoh can use it, else raise UsageError.
 
-    Parameters
-    ----------
-    option : str
-        Where it was typed. For "--listen" port 0 stands for any free one.
-    text : str
-        E.g. "tcp/192.168.1.10:7447".
-
-    Raises
-    ------
-    UsageError
-        If Zenoh could make nothing of it.
+    For the option "--listen" port 0 stands for any free one.
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:
@@ -221,10 +166,7 @@ def check_endpoint(option: str, text: str) -> str:
 
 
 def accepting(connect: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the endpoints that accept a TCP connection, whether or not anything is said on it.
-
-    The system accepts connections to a stopped process in its stead.
-    """
+    """Return the endpoints that accept a TCP connection; the system accepts those to a stopped process in its stead."""
     return tuple(text for text in connect if _accepts(text))
 
 
@@ -249,13 +191,7 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def is_loopback(connect: tuple[str, ...]) -> bool:
-    """Return whether all endpoints are on this host's loopback.
-
-    Examples
-    --------
-    >>> is_loopback(("tcp/127.0.0.1:7447",)), is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
-    (True, False)
-    """
+    """Return whether all endpoints are on this host's loopback."""
     return all(map(is_loopback_host, _hosts(connect)))
 
 
@@ -264,24 +200,12 @@ def _hosts(connect: tuple[str, ...]) -> list[str]:
 
 
 def loopback_of(listen: str) -> str:
-    """Return where a process of this host connects to one that listens there.
-
-    Examples
-    --------
-    >>> loopback_of("tcp/0.0.0.0:7447"), loopback_of("tcp/[::]:7447"), loopback_of("tcp/10.0.0.1:7447")
-    ('tcp/127.0.0.1:7447', 'tcp/[::1]:7447', 'tcp/10.0.0.1:7447')
-    """
+    """Return where a process of this host connects to one that listens there."""
     return listen.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
 
 
 def next_port(listen: str) -> str:
-    """Return the same endpoint at the port beside.
-
-    Examples
-    --------
-    >>> next_port("tcp/127.0.0.1:7447"), next_port("tcp/[::1]:65535")
-    ('tcp/127.0.0.1:7448', 'tcp/[::1]:65534')
-    """
+    """Return the same endpoint at the port beside."""
     endpoint = parse_endpoint(listen)
     assert endpoint is not None
     return str(endpoint._replace(port=endpoint.port + 1 if endpoint.port < 65535 else endpoint.port - 1, rest=""))

@@ -33,13 +33,7 @@ class PlantSearch:
         return "\n".join(refusals) if all(refusals) else ""
 
     def news(self, runs: Collection[str]) -> list[str]:
-        """Return what is wrong with links that are there, each sentence once.
-
-        Parameters
-        ----------
-        runs : Collection[str]
-            Names of the runs whose plants have been heard of.
-        """
+        """Return what is wrong with links that are there, each sentence once; `runs` are those that were heard of."""
         lines = [line for line in self._faults(runs) if line not in self._told]
         self._told.update(lines)
         return lines
@@ -61,14 +55,9 @@ class PlantSearch:
         ]
 
     def failure(self, wait: float, runs: Collection[str], others: Collection[str]) -> str:
-        """Return why no plant was found.
+        """Return why no plant was found within a wait (s).
 
-        Parameters
-        ----------
-        wait : float
-            How long the search took (s).
-        runs, others : Collection[str]
-            Names of the runs whose plants have been heard of, and those of them that were not sought.
+        `runs` are those whose plants have been heard of, and `others` those of them that were not sought.
         """
         if not self._session.peers():
             return self.refused() or self._no_link(wait)
@@ -143,12 +132,8 @@ class NobodyError(ValueError):
 class RunClient:
     """A session at a run.
 
-    Parameters
-    ----------
-    meet_agents : bool, optional
-        Whether to connect to the agents too, to hear what they publish; the plant alone is enough to ask it.
-    listen : tuple[str, ...], optional
-        Where agents can connect to this client, as they do after a cut.
+    It meets the agents too, to hear what they publish, if so wished; they connect to `listen` after a cut. The plant
+    alone is enough to ask it.
     """
 
     def __init__(self, where: RunAddress, *, meet_agents: bool = False, listen: tuple[str, ...] = ()) -> None:
@@ -277,20 +262,11 @@ class RunClient:
         return True
 
     def find_plant(self, wait: float, tell: Callable[[str], None] | None = None) -> None:
-        """Wait for the plant of the run.
+        """Wait for the plant of the run, for `wait` (s) at most.
 
-        Parameters
-        ----------
-        wait : float
-            Longest wait (s).
-        tell : Callable[[str], None], optional
-            Told for what one waits: now and then, ever more rarely, and at once if plants of other runs are there, or
-            if the plant takes the link and lets nothing pass on it.
-
-        Raises
-        ------
-        NobodyError
-            If there is none in time; at once if nobody there accepts the other's certificate.
+        `tell` hears for what one waits: ever more rarely, and at once if plants of other runs are there, or if the
+        plant takes the link and lets nothing pass on it. NobodyError if there is none in time; at once if nobody there
+        accepts the other's certificate.
         """
         began = monotonic()
         look, reminder = began + FIRST_LOOK, REMINDER

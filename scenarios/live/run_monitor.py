@@ -114,15 +114,7 @@ class Snapshot:
 
 
 def line_of(event: PlantEvent) -> str:
-    """Return an event as a line; its time comes first and only there.
-
-    Examples
-    --------
-    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.5 s"))
-    '    1.50 s  inv2 joined'
-    >>> line_of(PlantEvent(t=1.5, kind="roster", subject="inv2", text="inv2 joined, at t = 1.50 s"))
-    '    1.50 s  inv2 joined'
-    """
+    """Return an event as a line; its time comes first and only there."""
     return f"{event.t:8.2f} s  {re.sub(r', at t = [0-9.e+]+ s$', '', event.text)}"
 
 
@@ -224,15 +216,7 @@ class RunMonitor:
         self._status[message.sender] = (message, now)
 
     def snapshot(self, present: Collection[str], now: float, *, current: bool = True) -> Snapshot:
-        """Return a snapshot.
-
-        Parameters
-        ----------
-        now : float
-            The client's clock (s).
-        current : bool, optional
-            Whether the plant's values are of now; it is decided here too.
-        """
+        """Return a snapshot at a time (s) of the client's clock, without the plant's values if they are not current."""
         pace = self._pace()
         if self._end is not None:
             pace, current = "the run has ended" + (f": {self._end}" if self._end else ""), False

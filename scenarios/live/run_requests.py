@@ -51,15 +51,7 @@ class RefusedError(ValueError):
 
 
 def ask(client: RunClient, verb: Verb, argument: str = "", load: LoadSetting | None = None) -> str:
-    """Give the plant a command and return its answer.
-
-    Raises
-    ------
-    RefusedError
-        If the plant refuses.
-    NobodyError
-        If it does not answer.
-    """
+    """Give the plant a command and return its answer; RefusedError if it refuses, NobodyError if it does not answer."""
     answer, _ = request(client, lambda answer: set(), verb=verb, argument=argument, load=load)
     return answer.text
 
@@ -122,12 +114,9 @@ def plant_status(client: RunClient, wait: float = ANSWER) -> PlantStatus:
 
 
 def data_of(client: RunClient, answer: Answer, kind: type[T]) -> T:
-    """Return the data of an answer.
+    """Return the data of an answer; NobodyError if they are something else.
 
-    Raises
-    ------
-    NobodyError
-        If they are something else: anybody may answer as a plant on open links, and one of another version may.
+    Anybody may answer as a plant on open links, and one of another version may.
     """
     try:
         return msgspec.convert(answer.data, kind)
@@ -154,12 +143,9 @@ def has_ended(client: RunClient) -> bool:
 
 
 def configuration(client: RunClient, name: str, wait: float = ANSWER) -> AgentConfig:
-    """Return the configuration that the plant hands out to the agent of an inverter.
+    """Return the configuration that the plant hands out to the agent of an inverter within `wait` (s).
 
-    Raises
-    ------
-    NobodyError
-        If the plant says that there is no such inverter, or does not answer within `wait` (s).
+    NobodyError if the plant says that there is no such inverter, or does not answer.
     """
     end = monotonic() + wait
     inverters = plant_status(client, wait).inverters
@@ -173,11 +159,7 @@ def configurations(client: RunClient, name: str = "", wait: float = ANSWER) -> d
     """Return configurations of agents by name: all that came until that of `name`, or any, was there.
 
     With the certificate of an agent it asks for that of `name` alone: access rules let an agent ask for no other.
-
-    Raises
-    ------
-    NobodyError
-        If it does not come within `wait` (s), asked for again and again.
+    NobodyError if it does not come within `wait` (s).
     """
     known: dict[str, AgentConfig] = {}
     credentials = client.where.credentials
@@ -245,22 +227,9 @@ MOST = 1e8
 
 
 def load_setting(factor: float | None, P_kW: float | None, Q_kvar: float | None) -> LoadSetting:
-    """Return the power of a load in the units of messages.
+    """Return the power of a load, given in kW and kvar at nominal voltage, in the units of messages.
 
-    Parameters
-    ----------
-    P_kW, Q_kvar
-        Real (kW) and reactive power (kvar) at nominal voltage.
-
-    Raises
-    ------
-    UsageError
-        If nothing is given, too much, or no number.
-
-    Examples
-    --------
-    >>> load_setting(None, 210.0, None)
-    LoadSetting(factor=None, P=210000.0, Q=None)
+    UsageError if nothing is given, too much, or no number.
     """
     for option, value in (("--factor", factor), ("--P", P_kW), ("--Q", Q_kvar)):
         if value is not None and not (isfinite(value) and abs(value) <= MOST):

@@ -165,13 +165,7 @@ def leave_out(key: str, payload: bytes) -> None:
 
 
 class RunSubscriber:
-    """Feed the messages of a run into a monitor.
-
-    Parameters
-    ----------
-    on_other : Callable[[str, bytes], None], optional
-        Called with key and payload of every other message.
-    """
+    """Feed the messages of a run into a monitor; `on_other` takes key and payload of every other message."""
 
     def __init__(
         self, client: RunClient, monitor: TakesMessages, on_other: Callable[[str, bytes], None] = leave_out
@@ -271,15 +265,7 @@ def look(client: RunClient) -> Snapshot:
 
 
 def watch(client: RunClient, console: Console, seconds: float | None) -> None:
-    """Show a run until the user quits, or for a time.
-
-    Parameters
-    ----------
-    client : RunClient
-        At the run, with its agents met.
-    seconds : float or None
-        Time (s) after which it ends; None until q or Ctrl-C.
-    """
+    """Show a run, whose agents the client meets, until the user quits, or for a time (s)."""
     monitor = RunMonitor(client.where.run)
     monitor.plant_status(plant_status(client))
     subscriber = RunSubscriber(client, monitor)

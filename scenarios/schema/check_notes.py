@@ -66,7 +66,7 @@ def _absences(name: str, events: Iterable[AgentEvent], *, at_start: bool) -> Ite
 
 
 def liar_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
-    """Yield a sentence for each agent that lies, with the cases in which it does, and why it cannot if it is away."""
+    """Yield a sentence for each agent that lies, with the cases in which it does."""
     there = {row.name for row in inverters_of(scenario, feeder) if not row.spare}
     events = [AgentEvent(event.t_s, event.leave, event.join) for event in scenario.events]
     cases: dict[str, list[str]] = {}
@@ -84,15 +84,7 @@ def liar_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
 
 
 def security_notes(scenario: ScenarioModel, feeder: Feeder, file: str) -> Iterator[str]:
-    """Yield how to run a scenario with `security = "mtls"`: which certificates it needs, and the commands.
-
-    Parameters
-    ----------
-    scenario, feeder
-        Checked.
-    file : str
-        As the scenario was named on the command line.
-    """
+    """Yield how to run a scenario with `security = "mtls"`, which the command line named as `file`."""
     if scenario.security != "mtls":
         return
     lone = frozenset.intersection(*(without_agent(scenario, case) for case in scenario.cases))

@@ -23,18 +23,10 @@ from gridpeers.scenarios.schema.supply import load_events
 def configs(
     scenario: ScenarioModel, feeder: Feeder, case: str, endpoint: str = "", *, real_nodes: bool = False
 ) -> tuple[PlantConfig, tuple[AgentConfig, ...]]:
-    """Configurations of the plant and of every agent for one case, those that join later last.
+    """Return the configurations of the plant and of every agent for one case of a checked scenario, later joiners last.
 
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        A checked scenario.
-    feeder : Feeder
-        Its feeder; it gives the agents their nameplates.
-    endpoint : str, optional
-        Where the plant listens and agents connect, e.g. "tcp/127.0.0.1:7447"; the in-process driver needs none.
-    real_nodes : bool, optional
-        Whether processes really are killed and paused, as the driver of wall-clock time does; else it is emulated.
+    `endpoint` is where the plant listens; the in-process driver needs none. With `real_nodes` processes really are
+    killed and paused, as in real time; else that is emulated.
     """
     run = f"{scenario.name}-{case}"
     endpoints = (endpoint,) if endpoint else ()

@@ -53,40 +53,14 @@ def catalogue() -> tuple[str, ...]:
 
 
 def find_scenario(name: str) -> Path:
-    """Path of a scenario named as in the catalogue or given as a path.
-
-    Raises
-    ------
-    ScenarioError
-        If there is neither.
-    """
+    """Return the path of a scenario named as in the catalogue or given as a path; ScenarioError if there is neither."""
     return find_file(name, CATALOGUE, "scenario")
 
 
 def find_file(name: str, folder: Path, what: str) -> Path:
-    """Return the path of a file that is named as in a catalogue, or given as a path.
+    """Return the path of a file named as in a catalogue, or given as a path; `what` names its kind in messages.
 
-    Parameters
-    ----------
-    name : str
-        Name or path, as the user gave it.
-    what : str
-        What its files are, for the message.
-
-    Raises
-    ------
-    ScenarioError
-        If there is neither, or the system does not let one look.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.catalogue_files import CATALOGUE, SWEEPS
-    >>> find_file("islanding", CATALOGUE, "scenario").name
-    'islanding.toml'
-    >>> find_file("gain", SWEEPS, "sweep")  # doctest: +ELLIPSIS
-    Traceback (most recent call last):
-        ...
-    gridpeers.scenarios.schema.scenario_errors.ScenarioError: no sweep "gain"; did you mean "gains"? ...
+    ScenarioError if there is neither, or the system does not let one look.
     """
     names = names_in(folder)
     if name in names:
@@ -107,17 +81,9 @@ def find_file(name: str, folder: Path, what: str) -> Path:
 
 
 def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
-    """Read and check a scenario and its feeder before anything is started.
+    """Read and check a scenario of the catalogue or a file, and its feeder, before anything starts.
 
-    Parameters
-    ----------
-    name : str or Path
-        A scenario of the catalogue, or the path of a file.
-
-    Raises
-    ------
-    ScenarioError
-        With every problem of the file and of its feeder.
+    ScenarioError has every problem of both.
     """
     path = find_scenario(str(name))
     text, data = read_toml(path)
@@ -129,13 +95,7 @@ def load_scenario(name: str | Path) -> tuple[ScenarioModel, Feeder]:
 
 
 def read_toml(path: Path) -> tuple[str, dict[str, Any]]:
-    """Text and tables of a file.
-
-    Raises
-    ------
-    ScenarioError
-        If it cannot be read or is no TOML.
-    """
+    """Return text and tables of a file; ScenarioError if it cannot be read or is no TOML."""
     text = _text_of(path)
     try:
         return text, tomllib.loads(text)
@@ -153,16 +113,10 @@ def read_tables(data: Mapping[str, Any], problems: Problems) -> ScenarioModel:
 def check_tables(
     data: Mapping[str, Any], path: Path, problems: Problems, read_feeder: ReadFeeder = read_feeder
 ) -> tuple[ScenarioModel, Feeder | None]:
-    """Read the tables of a scenario and note every problem in them.
+    """Read the tables of a scenario and note every problem; the scenario is of use only if there is none.
 
-    Parameters
-    ----------
-    path : Path
-        Its file: a relative path of a feeder starts there, and a scenario without a name has its name, by `name_of`.
-    problems : Problems
-        Takes the problems; the scenario is of use only when it stays empty.
-    read_feeder : Callable[[str, str], Feeder], optional
-        Reads a feeder by name or path and load set; who checks many scenarios keeps what was read.
+    Relative paths start at the folder of `path`, whose name is that of a scenario without one. Who checks many
+    scenarios gives a `read_feeder` that keeps what it has read.
     """
     scenario = read_tables(data, problems)
     if not scenario.name:

@@ -234,14 +234,9 @@ def check_graphs(scenario: ScenarioModel, feeder: Feeder | None, problems: Probl
 
 
 def check_portable(scenario: ScenarioModel, *, measures: bool = False) -> list[str]:
-    """Return a sentence for everything in a scenario's cases that no other process could import.
+    """Return a sentence for everything in a checked scenario's cases that no other process could import.
 
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        Checked.
-    measures : bool, optional
-        Whether other processes measure, too, as those of a sweep do; those of a run do not.
+    With `measures`, processes measure too, as those of a sweep do; those of a run do not.
     """
     found = []
     for name, case in scenario.cases.items():
@@ -296,13 +291,7 @@ def _rosters(scenario: ScenarioModel, feeder: Feeder, case: str) -> Iterator[dic
 
 
 def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
-    """Return a checked scenario as it is written into a file that can be moved together with what stands beside it.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        Checked, so with absolute folders of what is its own: laws, graphs, metrics, claims, checks, faults, feeder.
-    """
+    """Return a checked scenario as it is written into a file that moves together with what stands beside it."""
     here = folder.resolve()
 
     def change(key: PluginKey, registry: Registry[Any]) -> PluginKey:
@@ -314,15 +303,7 @@ def with_relative_folders(scenario: ScenarioModel, folder: Path) -> ScenarioMode
 
 
 def relative(place: str, here: Path) -> str:
-    """Return a folder as it is named from another one; the same where they have nothing but the root in common.
-
-    Examples
-    --------
-    >>> relative("/home/eva/study", Path("/home/eva/found/failures")), relative("/opt/laws", Path("/home/eva/found"))
-    ('../../study', '/opt/laws')
-    >>> relative("microgrid123", Path("/home/eva"))
-    'microgrid123'
-    """
+    """Return a folder as it is named from another one; the same where they have nothing but the root in common."""
     if not Path(place).is_absolute() or os.path.commonpath([place, here]) == os.sep:
         return place
     return os.path.relpath(place, here)

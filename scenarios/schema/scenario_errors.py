@@ -20,13 +20,10 @@ _KEY = re.compile(r"""^\s*([A-Za-z0-9_\-."'\[\] ]+?)\s*=""")
 
 
 class ScenarioError(ValueError):
-    """A scenario that cannot be run, with everything that is wrong with it.
+    """A scenario that cannot be run.
 
-    Attributes
-    ----------
-    problems : tuple[str, ...]
-        One sentence each, with file, line, key, value and what would be right; what a file has that cannot be printed
-        is spelt out.
+    `problems` has a sentence each, with file, line, key, value and what would be right; what cannot be printed is spelt
+    out.
     """
 
     def __init__(self, problems: Iterable[str]) -> None:
@@ -35,17 +32,10 @@ class ScenarioError(ValueError):
 
 
 class Problems:
-    """Collects what is wrong with one file while it is read.
+    """Collect the problems of one file, whose text gives the lines of its keys.
 
-    Parameters
-    ----------
-    file : str
-        Name of the file as the user gave it.
-    text : str
-        Its text, to find the lines of the keys.
-    changed : Collection[str], optional
-        Keys that were changed since, in Python; a problem in or below one of them has no line, nor has one in a table
-        around it that the file does not write.
+    A problem in or below a key that was `changed` since, in Python, has no line, nor has one in a table around it that
+    the file does not write.
     """
 
     def __init__(self, file: str, text: str = "", changed: Collection[str] = ()) -> None:
@@ -122,31 +112,15 @@ class Problems:
 
 
 def multiple(path: str, value: float, of: str, step: float, rule: str, problems: Problems) -> None:
-    """Note a time (s) that is no whole multiple of a step (s).
-
-    Parameters
-    ----------
-    path, of : str
-        Keys of the time and of the step; where a problem is noted at one of them, nothing is said.
-    value, step : float
-        Both (s).
-    rule : str
-        What takes place at such times, as an end of the sentence.
-    """
+    """Note a time (s) that is no whole multiple of a step (s); `rule` says what takes place at such times."""
     if not problems.touch(path, of) and (text := MultipleOf(of).objection(value, step, of.rpartition(".")[2], rule)):
         problems.add(path, text)
 
 
 def lines_of_keys(text: str) -> dict[str, int]:
-    r"""Line number of each key and table of a TOML text, by path; `event[1].t_s` is in the second `[[event]]`.
+    """Return the line of each key and table of a TOML text, by path; `event[1].t_s` is in the second `[[event]]`.
 
-    It reads the usual layout, one key a line. A key inside an inline table gets no line of its own, which costs the
-    reader of a problem a moment and nothing else: `tomllib` alone decides what the text means.
-
-    Examples
-    --------
-    >>> lines_of_keys("seed = 1\n[time]\nT_c_s = 0.02\n[[event]]\nt_s = 1\n[[event]]\nt_s = 4")
-    {'seed': 1, 'time': 2, 'time.T_c_s': 3, 'event[0]': 4, 'event[0].t_s': 5, 'event[1]': 6, 'event[1].t_s': 7}
+    It reads the usual layout, one key a line; a key inside an inline table has no line of its own.
     """
     found: dict[str, int] = {}
     entries: dict[str, int] = {}

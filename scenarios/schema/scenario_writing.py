@@ -17,21 +17,10 @@ from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherK
 def to_toml(
     scenario: ScenarioModel, as_run: Mapping[str, Any], remarks: Iterable[str] = (), *, terse: bool = False
 ) -> str:
-    """Every key of a scenario, defaults included, and a table about the run; or what differs from the defaults alone.
+    """Return every key of a scenario, defaults included, and the table `[as_run]`; if `terse`, what is no default.
 
-    Defaults are written out because they may differ in a later version; the text can be run again as it is, and the
-    table `[as_run]` is read over then.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        As run, so with the seed and the cases of the command line.
-    as_run : Mapping[str, Any]
-        Driver, versions and the like.
-    remarks : Iterable[str], optional
-        Sentences on what the scenario does not say of the run, for the head of the file.
-    terse : bool, optional
-        Whether values that are defaults, and the table about the run, are left out.
+    Defaults are written out because they may differ in a later version; the text can be run again as it is. The remarks
+    become comments at its head.
     """
     return "".join(toml_lines(scenario, as_run, remarks, terse=terse))
 
@@ -44,13 +33,7 @@ def toml_lines(
     terse: bool = False,
     links: Iterable[Fault] = (),
 ) -> Iterator[str]:
-    """Yield the lines of `to_toml`, which has the other parameters.
-
-    Parameters
-    ----------
-    links : Iterable[Fault], optional
-        Further entries `[[link]]`. There may be thousands: each is taken when it is written.
-    """
+    """Yield the lines of `to_toml`, with further entries `[[link]]`, of which there may be thousands."""
     keys, tables = _lines(scenario, "", scenario, terse=terse)
     if terse:
         head, foot = [f"# {remark}".rstrip() for remark in remarks], []
@@ -119,13 +102,7 @@ def _key(name: str) -> str:
 
 
 def inline(value: Any) -> str:
-    """Write a value that may be a table or a list of them on one line.
-
-    Examples
-    --------
-    >>> inline({"48": {"factor": 1.5}, "a.b": [True, "c"]})
-    '{ 48 = { factor = 1.5 }, "a.b" = [true, "c"] }'
-    """
+    """Write a value that may be a table or a list of them on one line."""
     if isinstance(value, dict):
         return "{ " + ", ".join(f"{_key(key)} = {inline(below)}" for key, below in value.items()) + " }"
     if isinstance(value, tuple | list):

@@ -26,17 +26,9 @@ TRIES = 200
 
 
 def connected_graphs(n: int, links: int, count: int, seed: int) -> tuple[Edges, ...]:
-    """Different connected graphs of n nodes, drawn one after the other, each number with its own stream.
+    """Return different connected graphs of n nodes, drawn one after the other, each number with its own stream.
 
-    So the first graphs stay the same when more are asked for. There are fewer than `count` where so many do not exist:
-    with all links, one.
-
-    Parameters
-    ----------
-    n : int
-        Nodes, at least 2.
-    links : int
-        From n - 1 to n (n - 1) / 2.
+    So the first graphs stay the same when more are asked for. There are fewer than `count` where so many do not exist.
     """
     most = 1 if links == n * (n - 1) // 2 else count
     found: dict[Edges, None] = {}
@@ -108,13 +100,7 @@ def samples(settings: Iterable[Sequence[Setting]]) -> Iterator[Setting]:
 
 
 def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
-    """Return the points of keys that go together, first values with first.
-
-    Examples
-    --------
-    >>> [dict(setting.put) for setting in of_values({"gains.k_p": [1, 2], "gains.k_q": [3, 4]})]
-    [{'gains.k_p': 1, 'gains.k_q': 3}, {'gains.k_p': 2, 'gains.k_q': 4}]
-    """
+    """Return the points of keys that go together, first values with first."""
     rows = [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
     return [Setting(row, row) for row in rows]
 
@@ -229,14 +215,7 @@ class Distribution:
     """Bounds, or the choices."""
 
     def at(self, u: float) -> Any:
-        """Return the quantile at a number u from [0, 1).
-
-        Examples
-        --------
-        >>> uniform, loguniform = Distribution("uniform", [1.0, 3.0]), Distribution("loguniform", [0.01, 1.0])
-        >>> uniform.at(0.5), loguniform.at(0.5), Distribution("choice", "ab").at(0.6)
-        (2.0, 0.1, 'b')
-        """
+        """Return the quantile at a number u from [0, 1)."""
         if self.name == "choice":
             return self.of[int(u * len(self.of))]
         low, high = self.of
@@ -266,14 +245,7 @@ def random_axes(axis: RandomAxis, problems: Problems) -> list[Axis]:
 
 
 def draw(axis: RandomAxis, keys: Mapping[str, Distribution]) -> Sequence[Setting]:
-    """Draw the samples: `scipy.stats.qmc.LatinHypercube`, or independent uniform numbers.
-
-    Examples
-    --------
-    >>> drawn = draw(RandomAxis(samples=4), {"gains.alpha": Distribution("uniform", [0.0, 4.0])})
-    >>> sorted(int(setting.put["gains.alpha"]) for setting in drawn)
-    [0, 1, 2, 3]
-    """
+    """Draw the samples: `scipy.stats.qmc.LatinHypercube`, or independent uniform numbers."""
     if axis.method == "latin-hypercube":
         from scipy.stats import qmc  # takes longer to import than a run takes
 

@@ -24,13 +24,7 @@ class PathError(ValueError):
 
 
 def steps(path: str) -> list[str | int]:
-    """Return the steps of a path through tables (by name) and lists (by number).
-
-    Raises
-    ------
-    PathError
-        If it is no path.
-    """
+    """Return the steps of a path through tables (by name) and lists (by number); PathError if it is none."""
     if not _PATH.fullmatch(path):
         raise PathError("is no path of a key; write it as gains.k_p, case.IV.graph or event[0].t_s")
     return [int(number) if number else name for number, name in re.findall(r"\[(\d+)\]|([^.\[\]]+)", path)]
@@ -39,10 +33,7 @@ def steps(path: str) -> list[str | int]:
 def put(tree: Tree, path: str, value: Any) -> None:
     """Set a key in the tables of a scenario, making a table that is left to its defaults.
 
-    Raises
-    ------
-    PathError
-        If a list has no such entry, or a table that the user names (a case) is not there and is not given whole.
+    PathError if a list has no such entry, or a table that the user names (a case) is not there and is not given whole.
     """
     way = steps(path)
     node, last = _parent(tree, way, whole=isinstance(value, Mapping)), way[-1]
@@ -52,10 +43,7 @@ def put(tree: Tree, path: str, value: Any) -> None:
 def remove(tree: Tree, path: str) -> None:
     """Take a key, a table or an entry out of the tables of a scenario; a key that is not written stays so.
 
-    Raises
-    ------
-    PathError
-        If a list has no such entry, or a table that the user names (a case) is not there.
+    PathError if a list has no such entry, or a table that the user names (a case) is not there.
     """
     way = steps(path)
     node, last = _parent(tree, way, whole=False), way[-1]
@@ -99,13 +87,7 @@ def _no_leaf(_: Any) -> bool:
 def flatten(
     table: Mapping[str, Any], is_leaf: Callable[[Any], bool] = _no_leaf, path: str = ""
 ) -> Iterator[tuple[str, Any]]:
-    """Return keys with their values, whether the path was written in quotes or is nested tables of TOML.
-
-    Examples
-    --------
-    >>> list(flatten({"gains.k_p": [1], "time": {"T_c_s": [2]}}, lambda value: isinstance(value, list)))
-    [('gains.k_p', [1]), ('time.T_c_s', [2])]
-    """
+    """Return keys with their values, whether the path was written in quotes or is nested tables of TOML."""
     for key, value in table.items():
         below = f"{path}.{key}" if path else key
         if isinstance(value, Mapping) and value and not is_leaf(value):

@@ -39,17 +39,9 @@ def folder_of(out: Path | None, name: str) -> Path:
 
 
 class SweepFolder:
-    """The folder of one sweep, locked while it is open.
+    """The folder of one sweep, locked while it is open: new, empty, or this sweep's from before.
 
-    Parameters
-    ----------
-    folder : Path
-        New, empty, or this sweep's from before.
-
-    Raises
-    ------
-    FolderError
-        If it belongs to something else, was begun with other versions, or is in use. Nothing is changed then.
+    FolderError, with nothing changed, if it belongs to something else, was begun with other versions, or is in use.
     """
 
     def __init__(self, folder: Path, plan: Plan) -> None:
@@ -172,16 +164,8 @@ class Summary:
 def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int, dask: str = "") -> Summary:
     """Do the runs of a sweep that are not done yet, and write its results.
 
-    Parameters
-    ----------
-    folder : SweepFolder
-        Its folder, with the rows of runs that are done.
-    tell : Callable[[int], None]
-        Is called with the number of runs that are done, those from before included.
-    jobs : int
-        Processes on this machine; of no meaning with Dask.
-    dask : str, optional
-        Address of a Dask scheduler to use instead.
+    `tell` is called with the number of runs that are done, those from before included. `jobs` processes of this machine
+    do them, or the workers of the Dask scheduler at an address.
     """
     before = len(folder.done)
     tell(before)

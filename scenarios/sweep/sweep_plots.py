@@ -76,14 +76,9 @@ def values_of(frame: pd.DataFrame, column: str) -> pd.Series:
 
 
 def spread_of(at: pd.Series, values: pd.Series) -> pd.DataFrame:
-    """Return `low`, `median` and `high` of values by their parameter, and how many `never` came to be.
+    """Return `low`, `median` and `high` of values by their parameter, and how many `never` came to be (infinite).
 
-    Parameters
-    ----------
-    at : Series
-        Parameter of each run. One that was drawn at random is cut into groups, each with its median as index.
-    values : Series
-        Index of each run: infinite where it never came to be, not a number where it says nothing.
+    A parameter that was drawn at random is cut into groups, each with its median as index.
     """
     by = at.to_numpy()
     if is_drawn(at):
@@ -106,13 +101,7 @@ _NEVER = "#b0b0b0"
 
 
 def draw_all(frame: pd.DataFrame, folder: Path) -> tuple[Path, ...]:
-    """Draw every figure of a sweep into a folder.
-
-    Returns
-    -------
-    tuple of Path
-        The files; none when no run reached its end, or nothing but seeds is varied.
-    """
+    """Draw every figure of a sweep into a folder; none when no run reached its end, or nothing but seeds is varied."""
     drawn = []
     with mpl.rc_context(PAGE):
         for window, axes in product(indexes_of(frame), figures_of(frame)):

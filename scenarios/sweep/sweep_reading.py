@@ -129,14 +129,7 @@ def checked_runs(
 ) -> tuple[list[Run], Sequence[Feeder]]:
     """Check every sample, and return its runs and all feeders; both are of use only when no problem is noted.
 
-    Parameters
-    ----------
-    fixed : Mapping[str, Any]
-        Keys that are set in every sample, by path.
-    origin : Mapping[str, str]
-        Key of the sweep file by key of the scenario.
-    problems : Problems
-        Takes the problems, each at the key of the sweep file that it comes from.
+    Each problem is noted at the key of the sweep file that it comes from: `origin`, by key of the scenario.
     """
     runs: list[Run] = []
     feeders: dict[tuple[str, str], Feeder] = {}
@@ -196,10 +189,7 @@ def sweeps() -> tuple[str, ...]:
 def read_sweep(name: str | Path) -> Plan:
     """Read a sweep and check every sample's scenario before anything is started.
 
-    Raises
-    ------
-    ScenarioError
-        With every problem of the sweep file, of its scenario and of its samples.
+    ScenarioError has every problem of the sweep file, of its scenario and of its samples.
     """
     path = find_file(str(name), SWEEPS, "sweep")
     text, data = read_toml(path)
@@ -211,13 +201,7 @@ def read_sweep(name: str | Path) -> Plan:
 
 
 def plan_of(sweep: Sweep, base: BaseScenario) -> Plan:
-    """Check a sweep that is made in Python.
-
-    Raises
-    ------
-    ScenarioError
-        With every problem of the sweep and of its samples.
-    """
+    """Check a sweep that is made in Python; ScenarioError has every problem of it and of its samples."""
     problems = Problems("sweep")
     return _plan(sweep, "", _own_axes(sweep, problems), base, problems)
 

@@ -42,10 +42,7 @@ def cores() -> int:
 def on_workers(runs: Calls, jobs: int, task: Task[T], dask: str = "") -> Generator[T, None, None]:
     """Do the runs on the Dask cluster of a scheduler, if its address is given, else in `jobs` processes here.
 
-    Raises
-    ------
-    WorkersError
-        If there is no scheduler at the address, or it has no worker.
+    WorkersError if there is no scheduler at the address, or it has no worker.
     """
     return on_dask(runs, dask, task) if dask else on_this_machine(runs, jobs, task)
 
@@ -70,13 +67,7 @@ def on_this_machine(runs: Calls, jobs: int, task: Task[T]) -> Generator[T, None,
 
 
 def on_dask(runs: Calls, address: str, task: Task[T]) -> Generator[T, None, None]:
-    """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders.
-
-    Raises
-    ------
-    WorkersError
-        If there is no scheduler at the address, or it has no worker.
-    """
+    """Do the runs on a Dask cluster, whose workers need the same gridpeers and the feeders' folders."""
     from distributed import Client
     from joblib import parallel_config
 

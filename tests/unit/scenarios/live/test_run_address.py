@@ -12,7 +12,12 @@ from gridpeers.scenarios.live.run_address import (
     accepting,
     address_of,
     check_endpoint,
+    is_loopback,
+    is_loopback_host,
+    loopback_of,
+    next_port,
     return_path,
+    with_protocol,
 )
 
 
@@ -98,3 +103,27 @@ def test_the_options_that_find_a_run_say_what_is_not_the_default(endpoint: str, 
     address = RunAddress(run="gridpeers", connect=(endpoint,), access=Access(keys=Path("lab")))
 
     assert address.words == words
+
+
+def test_only_an_address_of_the_loopback_counts_as_one() -> None:
+    """Anybody may register a name that begins like an address."""
+    hosts = ("127.0.0.1", "[::1]", "localhost", "0.0.0.0", "127.lab.example")
+
+    assert [is_loopback_host(host) for host in hosts] == [True, True, True, False, False]
+    assert not is_loopback(("tcp/127.0.0.1:7447", "tcp/192.168.1.10:7447"))
+
+
+def test_endpoints_as_other_commands_need_them() -> None:
+    """On the same host, at the next port, and with certificates."""
+    listens = ("tcp/0.0.0.0:7447", "tcp/[::]:7447", "tcp/10.0.0.1:7447")
+
+    assert [*map(loopback_of, listens)] == ["tcp/127.0.0.1:7447", "tcp/[::1]:7447", "tcp/10.0.0.1:7447"]
+    assert [*map(next_port, ("tcp/127.0.0.1:7447", "tcp/[::1]:65535"))] == ["tcp/127.0.0.1:7448", "tcp/[::1]:65534"]
+    assert with_protocol("tcp/lab:7447", keys=True, default="tcp/lab:7447") == "tls/lab:7447"
+    assert RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)).words == []
+    assert RunAddress(run="demo", connect=("tcp/0.0.0.0:7500",)).words == [
+        "--run",
+        "demo",
+        "--connect",
+        "tcp/127.0.0.1:7500",
+    ]
