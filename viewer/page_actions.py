@@ -12,11 +12,10 @@ from gridpeers.netem.models.delay import Constant
 from gridpeers.netem.models.loss import Bernoulli
 from gridpeers.netem.models.medium import Cut
 from gridpeers.netem.schema.fault import Fault
-from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from gridpeers.scenarios.live.link_requests import check_link_command, command_links, links_of_run
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_name
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
-from gridpeers.scenarios.live.run_requests import ask, load_setting
+from gridpeers.scenarios.live.run_requests import ask, check_link_command, command_links, links_of_run, load_setting
 from gridpeers.wire.bounds import Text
 from gridpeers.wire.driver.command_line import command_line as typed_command
 

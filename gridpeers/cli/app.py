@@ -73,7 +73,7 @@ def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:
     """Start the servers of a run; where that fails, the run starts them when it needs them, and says what is wrong."""
     with suppress(OSError):
         if driver == "processes":
-            from gridpeers.scenarios.drivers.warm_servers import prepare
+            from gridpeers.scenarios.drivers.forking import prepare
 
             prepare()
         elif driver == "inprocess":

@@ -21,8 +21,7 @@ from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
 from gridpeers.scenarios.chaos.feasible_supply import FeasibleSupply
 from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
-from gridpeers.scenarios.schema.netem_tables import check_netem, netem_of
-from gridpeers.scenarios.schema.participants import check_agentless, check_schedule
+from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, netem_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml

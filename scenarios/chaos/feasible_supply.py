@@ -9,8 +9,7 @@ from typing import NamedTuple
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import Connectivity
 from gridpeers.plant.equipment.named_loads import named_loads
-from gridpeers.scenarios.schema.netem_tables import netem_of
-from gridpeers.scenarios.schema.participants import inverters_of, without_agent
+from gridpeers.scenarios.schema.participants import inverters_of, netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import Event, ScenarioModel
 from gridpeers.scenarios.schema.supply import powers_after
 

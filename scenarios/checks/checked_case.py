@@ -16,8 +16,7 @@ from gridpeers.scenarios.results.event_windows import CaseRecord, Window
 from gridpeers.scenarios.results.history import Flags, History, Nameplates, read_only
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of, switch_events
 from gridpeers.scenarios.schema.configs import limits_of
-from gridpeers.scenarios.schema.netem_tables import netem_of
-from gridpeers.scenarios.schema.participants import without_agent
+from gridpeers.scenarios.schema.participants import netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
 

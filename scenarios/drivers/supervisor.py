@@ -17,7 +17,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.children import Child, Children
-from gridpeers.scenarios.drivers.warm_servers import agent_server, plant_server
+from gridpeers.scenarios.drivers.forking import agent_server, plant_server
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.wire.messages import PLANT
 

@@ -19,7 +19,7 @@ from gridpeers.scenarios.results.event_windows import Window, as_they_came, wind
 from gridpeers.scenarios.results.island_membership import is_closed
 from gridpeers.scenarios.results.steadiness import STEADY
 from gridpeers.scenarios.schema import ScenarioModel
-from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.wire.messages import PLANT, PlantEvent
 
 _NOTICED = 1.0

@@ -28,7 +28,7 @@ from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.run_request import SPEEDS
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import as_in, configs
-from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_model import NEEDS_KEYS
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.journal import RecordLevel

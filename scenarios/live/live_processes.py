@@ -20,11 +20,11 @@ from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.scenarios.drivers.children import Child
+from gridpeers.scenarios.drivers.forking import release
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
-from gridpeers.scenarios.drivers.warm_servers import release
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.live.link_log import LinkLog
+from gridpeers.scenarios.live.live_files import LinkLog
 from gridpeers.scenarios.live.live_recorder import LiveRecorder
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, is_loopback, loopback_of, return_path
 from gridpeers.scenarios.live.run_client import RunClient

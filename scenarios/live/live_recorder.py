@@ -11,7 +11,7 @@ from time import monotonic
 
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from gridpeers.scenarios.drivers.telemetry_stream import Recordable
-from gridpeers.scenarios.live.link_log import LinkLog
+from gridpeers.scenarios.live.live_files import LinkLog
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError

@@ -14,7 +14,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
-from gridpeers.scenarios.live.live_folders import Folders
+from gridpeers.scenarios.live.live_files import Folders
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, late_moves

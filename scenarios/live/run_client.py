@@ -7,7 +7,7 @@ from time import monotonic
 
 from gridpeers.scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
 from gridpeers.scenarios.live.run_address import PROBE, RunAddress, accepting, is_loopback_host
-from gridpeers.scenarios.live.run_tokens import RunTokens
+from gridpeers.scenarios.live.run_monitor import RunTokens
 from gridpeers.wire.codec import RejectedError, decode
 from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.session import Session

@@ -13,7 +13,7 @@ from gridpeers.scenarios.predict.load_steps import IslandStep, load_steps
 from gridpeers.scenarios.predict.times import Times, predicted_times
 from gridpeers.scenarios.predict.var_response import VarResponse, var_response
 from gridpeers.scenarios.schema import ScenarioModel
-from gridpeers.scenarios.schema.netem_tables import is_calm, netem_of
+from gridpeers.scenarios.schema.participants import is_calm, netem_of
 
 KINDS: tuple[DelayKind, ...] = ("neighbours", "disagreement", "local loop")
 """Delays with a limit."""

@@ -12,7 +12,7 @@ from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.replay.changed_faults import lossless
 from gridpeers.scenarios.replay.changes import ChangedRule

@@ -25,7 +25,7 @@ from gridpeers.scenarios.replay.recorded_process import require_arrivals
 from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.loading import check_tables
-from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml

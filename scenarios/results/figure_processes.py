@@ -14,8 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gridpeers.scenarios.drivers.forking import ForkedProcess, ForkServerError
-from gridpeers.scenarios.drivers.warm_servers import figure_server
+from gridpeers.scenarios.drivers.forking import ForkedProcess, ForkServerError, figure_server
 from gridpeers.wire.driver.machine import usable_cores
 
 if TYPE_CHECKING:

@@ -14,8 +14,7 @@ from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.results.run_files import FolderError, shown
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
-from gridpeers.scenarios.schema.participants import inverters_of, with_agent
+from gridpeers.scenarios.schema.participants import inverters_of, netem_of, setup_of, with_agent
 from gridpeers.wire.messages import PLANT
 
 NUMBER = 18

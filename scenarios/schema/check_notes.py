@@ -11,8 +11,7 @@ from gridpeers.plant.build import plant_at_rest
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.schema.configs import configs
-from gridpeers.scenarios.schema.netem_tables import netem_of
-from gridpeers.scenarios.schema.participants import inverters_of, without_agent
+from gridpeers.scenarios.schema.participants import inverters_of, netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.driver.command_line import command_line
 

@@ -13,8 +13,15 @@ from gridpeers.plant.plant_config import (
     PowerLimit,
     SwitchEvent,
 )
-from gridpeers.scenarios.schema.netem_tables import deaths_of, is_calm, netem_of, setup_of
-from gridpeers.scenarios.schema.participants import inverters_of, schedule_of, with_agent
+from gridpeers.scenarios.schema.participants import (
+    deaths_of,
+    inverters_of,
+    is_calm,
+    netem_of,
+    schedule_of,
+    setup_of,
+    with_agent,
+)
 from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of
 from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
 from gridpeers.scenarios.schema.supply import load_events

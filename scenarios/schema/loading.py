@@ -28,8 +28,14 @@ from gridpeers.scenarios.schema.checks import (
 )
 from gridpeers.scenarios.schema.configs import as_in
 from gridpeers.scenarios.schema.gridlabd_checks import check_gridlabd
-from gridpeers.scenarios.schema.netem_tables import check_netem, with_delays
-from gridpeers.scenarios.schema.participants import check_agentless, check_schedule, check_simulator, inverters_of
+from gridpeers.scenarios.schema.participants import (
+    check_agentless,
+    check_netem,
+    check_schedule,
+    check_simulator,
+    inverters_of,
+    with_delays,
+)
 from gridpeers.scenarios.schema.plugin_keys import (
     check_benchmark,
     check_graphs,

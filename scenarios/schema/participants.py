@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
+from pathlib import Path
 
+import msgspec
+
+from gridpeers.netem.schema.netem import Netem, NodeFault
+from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
 from gridpeers.plant.helics.helics_settings import settings_problems
 from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.schema.table_schema import NO_KEY, Problem, fields_of
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
@@ -134,3 +143,118 @@ def _check_names(path: str, given: Sequence[str], known: Sequence[str], problems
     for i, name in enumerate(given):
         if not problems.unknown(path, "inverter", name, known) and name in given[:i]:
             problems.add(path, f'"{name}" is named twice; name it once')
+
+
+LISTS = tuple(field for field in fields_of(Netem) if NO_KEY not in field.marks)
+"""Fields of the lists of entries: `[[link]]`, `[[partition]]`, `[[node]]`."""
+
+_KEPT_OUT = 'certificates keep it out, and this scenario has security = "mtls"; leave one of them out'
+
+
+def netem_of(scenario: ScenarioModel, case: str) -> Netem:
+    """Return the entries of a case, the scenario's first and then its own, with the scenario's seed."""
+    tables = scenario.netem, scenario.cases[case].netem
+    entries = {list_.name: tuple(it for netem in tables for it in getattr(netem, list_.name)) for list_ in LISTS}
+    return Netem(seed=scenario.seed, **entries)
+
+
+def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Feeder, *, real_nodes: bool) -> EmulationConfig:
+    """Return a case's faults as the processes take them: islands resolved, as the scenario's switches make them."""
+    if any(partition.by == "island" for partition in netem.partitions):
+        netem = netem.over(_islands_over_time(scenario, feeder))
+    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
+    return EmulationConfig(netem=netem, microgrids=microgrids, real_nodes=real_nodes)
+
+
+def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
+    """Return the agents that die on schedule."""
+    return tuple(ScheduledAction(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
+
+
+def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
+    """Return from when on (s) each inverter stands in which island."""
+    times = [0.0, *(event.t_s for event in scenario.events)]
+    operations: list[SwitchOperations] = [((), ()), *((event.open, event.close) for event in scenario.events)]
+    timeline = []
+    for t_s, islands in zip(times, islands_after(feeder, operations), strict=True):
+        rows = (*feeder.inverters, *feeder.spares)
+        of = {row.name: next(f"island{i}" for i, island in enumerate(islands) if row.bus in island) for row in rows}
+        timeline.append((t_s, of))
+    return timeline
+
+
+def is_calm(netem: Netem) -> bool:
+    """Return whether there is no entry at all."""
+    return not any(getattr(netem, list_.name) for list_ in LISTS)
+
+
+def with_delays(scenario: ScenarioModel, folder: Path, problems: Problems) -> ScenarioModel:
+    """Return the scenario with the delays of its trace files, whose paths start in its folder."""
+
+    def read(netem: Netem, path: str) -> Netem:
+        netem, wrong = with_traces(netem, folder)
+        problems.extend(wrong, path)
+        return netem
+
+    cases = {
+        name: msgspec.structs.replace(case, netem=read(case.netem, f"case.{name}."))
+        for name, case in scenario.cases.items()
+    }
+    return msgspec.structs.replace(scenario, netem=read(scenario.netem, ""), cases=cases)
+
+
+def check_netem(scenario: ScenarioModel, feeder: Feeder | None, problems: Problems) -> None:
+    """Note unknown links, groups and agents, values that are not plausible, and entries that contradict each other.
+
+    Without a feeder, which could not be read, no name is known, and the rest is checked.
+    """
+    rows = inverters_of(scenario, feeder) if feeder else ()
+    names = tuple(row.name for row in rows) if feeder else None
+    microgrids = {row.name: row.microgrid for row in rows}
+    T_c = scenario.time.T_c_s
+    end_s = inf if problems.touch("time.end_s", "time") else scenario.time.end_s
+
+    def wrong_in(netem: Netem, noted: set[str]) -> list[Problem]:
+        nodes = [problem for i, node in enumerate(netem.nodes) for problem in _wrong_node(f"node[{i}]", node, T_c)]
+        if scenario.security == "mtls":
+            nodes += [
+                Problem(f"node[{i}].lies.in_name_of", _KEPT_OUT)
+                for i, node in enumerate(netem.nodes)
+                if node.lies is not None and node.lies.in_name_of
+            ]
+        return netem.problems(names, microgrids, end_s, noted) + [it for it in nodes if it.path not in noted]
+
+    problems.extend(wrong_in(scenario.netem, _noted("", problems)))
+    for name, case in scenario.cases.items():
+        path = f"case.{name}."
+        problems.extend(wrong_in(case.netem, _noted(path, problems)), path)
+        if not (_noted("", problems) or _noted(path, problems) or is_calm(case.netem)):
+            for problem in wrong_in(netem_of(scenario, name), set()):
+                problems.add(_place(problem.path, scenario.netem, path), problem.text)
+
+
+def _wrong_node(path: str, node: NodeFault, T_c: float) -> list[Problem]:
+    """Return where an entry does not suit the ticks and the clock of a run."""
+    found = []
+    ticks = node.from_s / T_c
+    if node.kill and (ticks < 0.5 or abs(ticks - round(ticks)) > 1e-6):
+        near = max(1, round(ticks)) * T_c
+        text = f"{node.from_s:g} s is no multiple of T_c_s = {T_c:g} s after 0: agents die at ticks; write {near:g}"
+        found.append(Problem(f"{path}.from_s", text))
+    if node.skew is not None and (node.from_s or node.to_s is not None):
+        found.append(Problem(f"{path}.skew", "a clock is skewed for the whole run; leave out from_s and to_s"))
+    return found
+
+
+def _noted(prefix: str, problems: Problems) -> set[str]:
+    """Return the keys of entries with a problem, seen from a table."""
+    entries = tuple(f"{prefix}{list_.key}[" for list_ in LISTS)
+    return {path.removeprefix(prefix) for path in problems.paths if path.startswith(entries)}
+
+
+def _place(path: str, common: Netem, case: str) -> str:
+    """Return where an entry is written that stands at a path among all entries of a case."""
+    kind, _, rest = path.partition("[")
+    index, _, rest = rest.partition("]")
+    before = next(len(getattr(common, list_.name)) for list_ in LISTS if list_.key == kind)
+    return f"{case}{kind}[{int(index) - before}]{rest}" if int(index) >= before else path

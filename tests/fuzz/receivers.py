@@ -26,9 +26,9 @@ from gridpeers.scenarios.drivers.telemetry_stream import TelemetryEndpoint, Tele
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig, data_of, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
-from gridpeers.scenarios.live.link_requests import links_text
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import PlantStatus
+from gridpeers.scenarios.live.run_requests import links_text
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.results.record import Recorder, RecordError
 from gridpeers.viewer.run_view import Cursor, RunView

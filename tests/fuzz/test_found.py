@@ -11,8 +11,7 @@ import msgspec
 import pytest
 
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.emulation.link_command import LinkCommand
-from gridpeers.scenarios.emulation.link_data import data_of, decode_statuses
+from gridpeers.scenarios.emulation.link_data import LinkCommand, data_of, decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_requests import read_config
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of

@@ -27,7 +27,7 @@ ALLOWED = {
     "wire/trust/key_folder.py": "ends of certificates are dates",
     "wire/trust/site_authority.py": "the same",
     "scenarios/run_case.py": "the record says when a run began",
-    "scenarios/live/live_folders.py": "names of folders, and the same",
+    "scenarios/live/live_files.py": "names of folders, and the same",
     "viewer/recorded/recorded_run.py": "how long ago a file was written, which only says whether to look again",
 }
 """Files that may ask for the time of the day, and what for."""

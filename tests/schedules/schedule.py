@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.models.delay import Uniform
 from gridpeers.netem.schema.fault import Fault
-from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 
 BEGIN = 2.0
 """Run time (s) of the earliest fault: the feeder has islanded at 1 s."""

@@ -12,8 +12,7 @@ import msgspec
 from gridpeers.netem.fault_schedule import Change, FaultSchedule, schedule_of
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.netem.schema.pattern import Link, links_among
-from gridpeers.scenarios.emulation.link_command import LinkCommand, words
-from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkStatus, data_of
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand, LinkStatus, data_of, words
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.messages import LinkReport, LinkRequest
 

@@ -13,7 +13,7 @@ from gridpeers.scenarios.live.run_address import Access
 
 if TYPE_CHECKING:
     from gridpeers.agents.agent_config import AgentConfig
-    from gridpeers.scenarios.emulation.link_command import LinkCommand
+    from gridpeers.scenarios.emulation.link_data import LinkCommand
 
 link = typer.Typer(
     cls=Commands,
@@ -148,7 +148,7 @@ def show(
     Example:  gridpeers link show
     """
     with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
-        from gridpeers.scenarios.live.link_requests import link_states, links_text
+        from gridpeers.scenarios.live.run_requests import link_states, links_text
 
         t, states, silent = link_states(client)
         typer.echo(links_text(run, t, states), nl=False)
@@ -175,7 +175,7 @@ def _delay(delay: float | None, jitter: float | None) -> dict[str, Any]:
 
 
 def _pattern(links: list[str], arrow: str) -> str:
-    from gridpeers.scenarios.emulation.link_command import EVERYTHING
+    from gridpeers.scenarios.emulation.link_data import EVERYTHING
     from gridpeers.scenarios.live.run_address import UsageError
 
     if not links:
@@ -206,9 +206,9 @@ def _give(
     from gridpeers.netem.fault_schedule import Heal
     from gridpeers.netem.schema.fault import Fault
     from gridpeers.netem.schema.pattern import objections
-    from gridpeers.scenarios.emulation.link_command import LinkCommand
-    from gridpeers.scenarios.live.link_requests import check_link_command, command_links, links_of_run
+    from gridpeers.scenarios.emulation.link_data import LinkCommand
     from gridpeers.scenarios.live.run_address import UsageError
+    from gridpeers.scenarios.live.run_requests import check_link_command, command_links, links_of_run
 
     on = _pattern(links, arrow)
     if wrong := objections(on, None, {}):

@@ -93,7 +93,7 @@ def run(
     Example:  gridpeers run islanding --case IV --driver inprocess
     """
     if driver == "processes":
-        from gridpeers.scenarios.drivers.warm_servers import prepare
+        from gridpeers.scenarios.drivers.forking import prepare
 
         prepare()
     from gridpeers.runs.choices import Pace

@@ -97,8 +97,7 @@ def _start(
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
     with usage_errors():
-        from gridpeers.scenarios.live.link_log import LinkLog, check_new
-        from gridpeers.scenarios.live.live_folders import folders, live_record
+        from gridpeers.scenarios.live.live_files import LinkLog, check_new, folders, live_record
         from gridpeers.scenarios.live.live_options import LiveOptions, chosen_case, configure, manual_node_faults
         from gridpeers.scenarios.live.live_processes import all_here, plant_here, say
         from gridpeers.scenarios.live.live_report import conclude

@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.scenarios.drivers.forking import AVAILABLE
-from gridpeers.scenarios.drivers.warm_servers import figure_server, release
+from gridpeers.scenarios.drivers.forking import AVAILABLE, figure_server, release
 from gridpeers.scenarios.results import figure_processes
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores, prepare_figures
 from gridpeers.scenarios.results.plots import run_figures

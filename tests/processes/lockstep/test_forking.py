@@ -13,8 +13,14 @@ from time import monotonic
 import pytest
 
 from gridpeers.scenarios.drivers.children import Child
-from gridpeers.scenarios.drivers.forking import AVAILABLE, ForkServer, ForkServerError
-from gridpeers.scenarios.drivers.warm_servers import agent_server, plant_server, release
+from gridpeers.scenarios.drivers.forking import (
+    AVAILABLE,
+    ForkServer,
+    ForkServerError,
+    agent_server,
+    plant_server,
+    release,
+)
 from gridpeers.wire.driver.process import BAD_CONFIG, IN_ORDER
 from tests.toy.toy_configs import agent_config
 
@@ -149,7 +155,7 @@ def test_a_forked_plant_has_loaded_its_step_and_no_thread(tmp_path: Path) -> Non
 def test_servers_go_with_a_process_that_is_killed(tmp_path: Path) -> None:
     """Nobody can end them then: they leave because nobody can ask them any more."""
     code = """
-from gridpeers.scenarios.drivers.warm_servers import agent_server
+from gridpeers.scenarios.drivers.forking import agent_server
 with open("log", "wb") as log:
     agent_server().fork(["gridpeers.agents"], log, speaks=False)  # so the server has imported, and serves
     print(agent_server()._server.pid, flush=True)

@@ -18,8 +18,7 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.emulation.link_command import LinkCommand
-from gridpeers.scenarios.emulation.link_data import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.schema import load_scenario
 from tests.processes.terminals import Desk

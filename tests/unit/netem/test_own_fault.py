@@ -14,8 +14,7 @@ from gridpeers.netem.receiver import Receiver
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link
-from gridpeers.scenarios.emulation.link_command import LinkCommand
-from gridpeers.scenarios.emulation.link_data import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from gridpeers.wire.plugins.registry import PluginError
 from gridpeers.wire.schema.table_reading import read_table

@@ -14,8 +14,7 @@ import msgspec
 import pytest
 
 from gridpeers.netem.schema.netem import Netem
-from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from gridpeers.scenarios.emulation.link_data import EmulationConfig
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
 from gridpeers.viewer.own_agents import OwnAgents
 from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, command_line

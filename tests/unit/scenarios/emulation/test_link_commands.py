@@ -20,8 +20,7 @@ from gridpeers.netem.schema.pattern import links_among
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.scenarios.emulation.emulated_links import EmulatedLinks
-from gridpeers.scenarios.emulation.link_command import EVERYTHING, LinkCommand
-from gridpeers.scenarios.emulation.link_data import EmulationConfig, decode_statuses
+from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand, decode_statuses
 from gridpeers.wire.codec import decode
 from gridpeers.wire.links import CommandEffect
 from gridpeers.wire.messages import LinkAcknowledgement, LinkRequest, Measurement, State

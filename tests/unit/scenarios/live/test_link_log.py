@@ -15,11 +15,11 @@ from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import Link, links_among
-from gridpeers.scenarios.emulation.link_command import LinkCommand
-from gridpeers.scenarios.live.link_log import LinkLog, check_new, replay_lines
+from gridpeers.scenarios.emulation.link_data import LinkCommand
+from gridpeers.scenarios.live.live_files import LinkLog, check_new, replay_lines
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.schema import find_scenario, load_scenario
-from gridpeers.scenarios.schema.netem_tables import netem_of, setup_of
+from gridpeers.scenarios.schema.participants import netem_of, setup_of
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import PLANT, LinkRequest
 

@@ -11,10 +11,17 @@ import msgspec
 import pytest
 
 from gridpeers.scenarios.live import run_requests
-from gridpeers.scenarios.live.link_requests import link_states, links_of_run
 from gridpeers.scenarios.live.run_address import RUN, Access, RunAddress
 from gridpeers.scenarios.live.run_client import NobodyError, RunClient
-from gridpeers.scenarios.live.run_requests import ask, configuration, configurations, plant_status, request
+from gridpeers.scenarios.live.run_requests import (
+    ask,
+    configuration,
+    configurations,
+    link_states,
+    links_of_run,
+    plant_status,
+    request,
+)
 from gridpeers.wire.codec import decode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, AnyMessage, Command, LinkAcknowledgement

@@ -11,8 +11,7 @@ import pytest
 from gridpeers.scenarios.live import run_client as client
 from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import RunClient
-from gridpeers.scenarios.live.run_monitor import RunMonitor
-from gridpeers.scenarios.live.run_tokens import RunTokens
+from gridpeers.scenarios.live.run_monitor import RunMonitor, RunTokens
 from gridpeers.scenarios.live.watching import RunSubscriber
 from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
 from gridpeers.wire.bounds import MOST_INVERTERS

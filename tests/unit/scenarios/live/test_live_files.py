@@ -14,7 +14,7 @@ from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.live import live_report
-from gridpeers.scenarios.live.live_folders import ended_scenario, folders
+from gridpeers.scenarios.live.live_files import ended_scenario, folders
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded

@@ -1,0 +1,289 @@
+"""Folders of a live run: a run folder on request, with the scenario as long as the run was, else a temporary one."""
+
+from __future__ import annotations
+
+import os
+import platform
+import tempfile
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import msgspec
+from msgspec.structs import replace
+
+from gridpeers.agents.agent_config import MAX_AGE, AgentConfig
+from gridpeers.netem.fault_schedule import Change, replayed
+from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.emulation.link_data import LinkCommand
+from gridpeers.scenarios.live.run_address import UsageError
+from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
+from gridpeers.scenarios.results.run_files import (
+    FolderError,
+    new_folder,
+    refusal,
+    set_broken,
+    set_complete,
+    shown,
+    write_whole,
+)
+from gridpeers.scenarios.schema.participants import inverters_of, netem_of
+from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
+from gridpeers.scenarios.schema.scenario_writing import to_toml, toml_lines
+from gridpeers.scenarios.versions import versions
+from gridpeers.wire.driver.command_line import command_line
+from gridpeers.wire.messages import LinkRequest
+from gridpeers.wire.timing import rounded_up
+
+
+def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel, tuple[str, ...]]:
+    """Return the scenario of a live run of one case with its true end (s), and sentences for the head of its file.
+
+    What would come at or after the end is left out, as no scenario may have it: events, and faults of links and nodes.
+    """
+    begun = scenario.time.end_s
+    end = min(rounded_up(ended, scenario.time.T_c_s), LONGEST_RUN)
+    reached = tuple(event for event in scenario.events if event.t_s < end)
+    missed = [f'"{event.label}" at {event.t_s:g} s' for event in scenario.events[len(reached) :]]
+    labels = {event.label for event in reached}
+    cases = {name: _case(case, end, labels) for name, case in scenario.cases.items()}
+    changed = replace(
+        scenario,
+        time=replace(scenario.time, end_s=end),
+        events=reached,
+        netem=_netem(scenario.netem, end),
+        cases=cases,
+    )
+    remarks = [f"A live run: what people did in it is in events.csv and run.mcap. It lasted {ended:.2f} s."]
+    if end != begun:
+        remarks.append(f"So end_s is {end:g}, where the scenario it began with had {begun:g}.")
+    if ended > LONGEST_RUN:
+        remarks.append(f"No scenario may be longer than {LONGEST_RUN:g} s.")
+    if missed:
+        remarks.append(f"Events that it did not reach are left out: {', '.join(missed)}.")
+    if changed.netem != scenario.netem or any(cases[name].netem != case.netem for name, case in scenario.cases.items()):
+        remarks.append("Faults of links and nodes that it did not reach are left out.")
+    return changed, tuple(remarks)
+
+
+def _case(case: Case, end: float, labels: set[str]) -> Case:
+    """Return a case without what its scenario's events that are left out, and late faults, need."""
+    available = {label: powers for label, powers in case.P_max_kW.items() if label in labels}
+    return replace(case, P_max_kW=available, netem=_netem(case.netem, end))
+
+
+def _netem(netem: Netem, end: float) -> Netem:
+    """Return the entries that begin before the end (s)."""
+    return replace(
+        netem,
+        links=tuple(each for each in netem.links if each.from_s < end),
+        partitions=tuple(each for each in netem.partitions if each.from_s < end),
+        nodes=tuple(each for each in netem.nodes if each.from_s < end),
+    )
+
+
+@dataclass(frozen=True)
+class Folders:
+    """Folders of a live run."""
+
+    logs: Path
+    """For the logs of processes."""
+    record: Path | None = None
+    """For the files of the record, a folder in the run folder; None if nothing is recorded."""
+    whole: Path | None = None
+    """The run folder; None if there is none."""
+
+    def complete(self, *missing: str) -> None:
+        """Write to status.txt that the folder is complete, and sentences on what is missing beside."""
+        if self.whole is not None:
+            set_complete(self.whole, filter(None, missing))
+
+    def write_end(self, scenario: ScenarioModel, ended: float) -> None:
+        """Write the scenario anew, as long as the run was, which ended at a run time (s)."""
+        if self.whole is not None:
+            _write_scenario(self.whole, *ended_scenario(scenario, ended))
+
+    def broken(self, why: str) -> None:
+        """Write to status.txt why the folder is not complete."""
+        if self.whole is not None:
+            set_broken(self.whole, why)
+
+
+AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
+"""For the head of its scenario, until it has ended."""
+
+
+@contextmanager
+def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
+    """Make the folders of a run, as `--out` says.
+
+    FolderError if the folder has something in it, is a file, or cannot be made or written.
+    """
+    if out is None:
+        with tempfile.TemporaryDirectory(prefix="gridpeers-") as logs:
+            yield Folders(Path(logs))
+        return
+    whole = new_folder(out, scenario.name, datetime.now().astimezone())
+    try:
+        _write_scenario(whole, scenario, [AS_BEGUN])
+        (whole / "log").mkdir()
+    except OSError as error:
+        why = refusal(whole, error)
+        set_broken(whole, why)
+        raise FolderError(why) from None
+    (case,) = scenario.cases
+    yield Folders(whole / "log", whole / case, whole)
+
+
+def _write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]) -> None:
+    write_whole(folder / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), remarks))
+
+
+def live_record(
+    scenario: ScenarioModel, plant: PlantConfig, agents: tuple[AgentConfig, ...], inverters: tuple[str, ...]
+) -> RecordInfo:
+    """Return what the record of a live run says about it; the scenario has the one case that runs."""
+    (case,) = scenario.cases
+    return RecordInfo(
+        level=plant.record,
+        scenario=scenario.name,
+        case=case,
+        toml=to_toml(scenario, {"driver": LIVE} | versions()),
+        seed=scenario.seed,
+        driver=LIVE,
+        versions=versions(),
+        inverters=inverters,
+        plant=replace(plant, agent_configs={}),
+        agents=agents,
+        started=datetime.now().astimezone().isoformat(timespec="milliseconds"),
+    )
+
+
+LINKS_ALONE = (
+    "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
+)
+"""For the head of the file."""
+
+COMMANDS_PER_NEW_ONE = 10
+"""The file is written anew once a new command has come for every ten that it has, so after each of the first twenty: to
+write it takes as long as there are commands, of which an hour has hundreds."""
+
+
+class LinkLog:
+    """Keep the link commands of a run of one case, and write the scenario that replays them.
+
+    The file `replay` is written at the end in any case, and now and then before; `replay_if_changed` only once there is
+    a link command.
+    """
+
+    def __init__(
+        self, *, scenario: ScenarioModel, feeder: Feeder, replay: Path | None, replay_if_changed: Path | None
+    ) -> None:
+        self._scenario, self._feeder = scenario, feeder
+        self._replay, self._replay_if_changed = replay, replay_if_changed
+        self._commands: dict[int, Change] = {}
+        self._due = 1
+        """Number of commands with which the file is next written."""
+        self._closed = False
+
+    @contextmanager
+    def claimed(self) -> Iterator[None]:
+        """Make the file of `--record` for a run, so that no other takes it; remove it again if the run does not begin.
+
+        It is a scenario from the beginning, for a run that is killed. UsageError if it exists, or cannot be made.
+        """
+        file, begun = self._replay, False
+        if file is None:
+            yield
+            return
+        try:
+            with _writable(file):
+                file.touch(exist_ok=False)
+                begun = True
+                self._write_replay(0.0)
+            yield
+        except BaseException:
+            if begun and not (self._closed or self._commands):
+                file.unlink(missing_ok=True)
+            raise
+
+    @property
+    def changes(self) -> tuple[Change, ...]:
+        """Changes by commands, in their order."""
+        return tuple(change for _, change in sorted(self._commands.items()))
+
+    def __call__(self, message: LinkRequest) -> None:
+        """Take a command to links."""
+        self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
+        count = len(self._commands)
+        if count >= self._due:
+            self._due = count + max(1, count // COMMANDS_PER_NEW_ONE)
+            self._write_replay(message.t)
+
+    def close(self, t: float) -> list[str]:
+        """Write the scenario at the end of a run that reached t (s); return lines for the terminal."""
+        self._write_replay(t)
+        self._closed = True
+        file = self._replay or (self._replay_if_changed if self._commands else None)
+        return [] if file is None else [f"the links as they were: {command_line('run', shown(file))}"]
+
+    def _write_replay(self, t: float) -> None:
+        for file in filter(None, [self._replay, self._replay_if_changed if self._commands else None]):
+            write_whole(file, replay_lines(self._scenario, self._feeder, self.changes, t))
+
+
+def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Change], t: float) -> Iterator[str]:
+    """Yield the lines of the scenario whose links change by schedule as they did by command until t (s).
+
+    It leaves out agents that the scenario lacks. An age that the live run had by default is written out, as there is no
+    such default in simulated time.
+    """
+    ((name, case),) = scenario.cases.items()
+    microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
+    ages = case.degraded_communication
+    ages = msgspec.structs.replace(ages, max_age=ages.max_age or MAX_AGE)
+    T_c = scenario.time.T_c_s
+    needed = max([t, *(change.from_s + T_c for change in changes)])
+    end = max(scenario.time.end_s, rounded_up(needed, T_c))
+    netem = netem_of(scenario, name)
+    by_island = tuple(part for part in netem.partitions if part.by == "island")
+    replay = msgspec.structs.replace(
+        scenario,
+        name="",
+        paper="",
+        time=msgspec.structs.replace(scenario.time, end_s=end),
+        netem=msgspec.structs.replace(netem, links=(), partitions=by_island),
+        cases={name: msgspec.structs.replace(case, netem=Netem(), degraded_communication=ages)},
+    )
+    as_run = {"driver": LIVE, "python": platform.python_version()}
+    return toml_lines(replay, as_run, [LINKS_ALONE], links=replayed(netem, changes, microgrids))
+
+
+def check_new(file: Path | None) -> None:
+    """Raise UsageError if the file of `--record` is there already, or cannot be made where it is to be."""
+    if file is None:
+        return
+    with _writable(file):
+        if os.path.lexists(file):
+            raise FileExistsError
+        if not file.absolute().parent.is_dir():
+            raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
+        with suppress(FileExistsError):  # what another run was killed at
+            trial = file.with_name(f"{file.name}.partial")
+            trial.touch(exist_ok=False)
+            trial.unlink()
+
+
+@contextmanager
+def _writable(file: Path) -> Iterator[None]:
+    """Raise UsageError for what the system says of a file that is to be made."""
+    try:
+        yield
+    except FileExistsError:
+        raise UsageError(f"--record {file}: is there already; move it, or give another name") from None
+    except OSError as error:
+        raise UsageError(f"--record {file}: cannot be written: {error.strerror}; give another name") from None
