@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Mapping
-from pathlib import Path
+from enum import Enum
+from pathlib import Path, PurePath
 from typing import TYPE_CHECKING, Any, overload
 
 from gridpeers.scenarios.schema import scenario_model as model
 from gridpeers.scenarios.schema.loading import check_tables, find_scenario, read_toml
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError
-from gridpeers.values import plain
+from gridpeers.wire.wording import counted
 
 if TYPE_CHECKING:
     from typing import Unpack
@@ -23,13 +24,7 @@ if TYPE_CHECKING:
 
 
 def as_scenario(it: Scenario | str | Path) -> Scenario:
-    """Return a scenario that may be given by its name or path.
-
-    Raises
-    ------
-    ScenarioError
-        If it is none, or has problems.
-    """
+    """Return a scenario that may be given by its name or path."""
     if isinstance(it, Scenario):
         return it
     if isinstance(it, str | Path):
@@ -38,20 +33,10 @@ def as_scenario(it: Scenario | str | Path) -> Scenario:
 
 
 def load(name_or_path: str | Path) -> Scenario:
-    """Read and check a scenario.
+    """Read and check a scenario of the catalogue (`gridpeers.catalogue()` names them), or of a file.
 
-    Parameters
-    ----------
-    name_or_path : str or Path
-        A scenario of the catalogue (`gridpeers.catalogue()` names them), or the path of a file.
+    ScenarioError has every problem of the file and of its feeder.
 
-    Raises
-    ------
-    ScenarioError
-        With every problem of the file and of its feeder.
-
-    Examples
-    --------
     >>> load("islanding")
     <Scenario islanding: cases I, II, III, IV; 2 events; 7 s; 9 inverters on 134 buses>
     """
@@ -63,21 +48,9 @@ def load(name_or_path: str | Path) -> Scenario:
 class Scenario:
     """An experiment: a feeder, its inverters, what happens to them, and the cases of control that are compared.
 
-    A scenario is checked when it is made, so one in hand can be run; it never changes.
+    It is made of the tables of a scenario file (`gridpeers doc scenario`), with paths seen from the working directory.
+    It is checked when it is made, so one in hand can be run; it never changes.
 
-    Parameters
-    ----------
-    **tables
-        The keys and tables of a scenario file (`gridpeers doc scenario`): `time={"end_s": 7}`, `event=[{...}]`,
-        `case={"IV": {...}}`. Paths in them are seen from the working directory.
-
-    Raises
-    ------
-    ScenarioError
-        With every problem in them.
-
-    Examples
-    --------
     >>> Scenario(
     ...     name="mine",
     ...     time={"end_s": 2.0},
@@ -113,22 +86,11 @@ class Scenario:
         self._spec, self._feeder = spec, feeder
 
     def replace(self, changes: Mapping[str, Any]) -> Scenario:
-        """Return a scenario with some keys changed.
+        """Return a scenario with values changed by the dotted path of their keys, e.g. `gains.k_p`, `event[0].t_s`.
 
-        Parameters
-        ----------
-        changes : Mapping[str, Any]
-            Values by the dotted path of their keys, e.g. `gains.k_p`, `case.IV.graph`, `event[0].t_s`, `case.IV.link`.
-            A table replaces a whole table, and can make a new case: `{"case.V": {...}}`. None takes a key out, so that
-            its default holds. A class or a function becomes its reference `module:Name`.
+        A table replaces a whole table, and can make a new case: `{"case.V": {...}}`. None takes a key out, so that its
+        default holds. A class or a function becomes its reference `module:Name`.
 
-        Raises
-        ------
-        ScenarioError
-            With everything that is wrong with the changes, and with the scenario that they make.
-
-        Examples
-        --------
         >>> load("islanding").replace({"gains.k_p": 0.001, "case.IV.graph": "ring"}).cases["IV"].graph
         'ring'
         >>> load("islanding").replace({"gains.k_p": "much", "case.VI.graph": "ring"})
@@ -141,11 +103,7 @@ class Scenario:
             raise ScenarioError(
                 [f'replace: needs values by the path of their key, as {{"gains.k_p": 0.001}}, got {changes!r}']
             )
-        from gridpeers.scenarios.sweep.paths import (  # with numpy, which a run starts without
-            PathError,
-            put,
-            remove,
-        )
+        from gridpeers.scenarios.sweep.paths import PathError, put, remove  # with numpy, which a run starts without
 
         tree, changed = copy.deepcopy(self._tree), self._changed | frozenset(changes)
         problems = Problems(self._path.name if self._text else "Scenario(...)", self._text, changed=changed)
@@ -162,13 +120,7 @@ class Scenario:
         return new
 
     def check(self) -> tuple[str, ...]:
-        """Try whether the plant can start, and return notes on what the events de-energise or overload.
-
-        Raises
-        ------
-        ScenarioError
-            If the feeder has no operating point to start from.
-        """
+        """Return notes on what the events de-energise or overload; ScenarioError if the plant cannot start."""
         from gridpeers.scenarios.schema.check_notes import start_problem
         from gridpeers.scenarios.schema.supply import supply_notes
 
@@ -185,37 +137,29 @@ class Scenario:
     def run(
         self, case: str | list[str] | tuple[str, ...] | None = None, driver: Driver = "inprocess", **how: Unpack[How]
     ) -> Result | Results:
-        """Run a case, or several.
+        """Run a case, which gives a `Result`; several, or with None all, give `Results`.
 
         Parameters
         ----------
-        case : str or list of str, optional
-            Name of one case, which gives a `Result`; several names, or none for all, give `Results`.
         driver : {"inprocess", "processes"}
             All in this process, or a plant process and processes of agents over Zenoh. In simulated time both give the
             same bytes.
         keys : str or Path, optional
-            With the driver "processes": folder with the certificates of plant and agents (`gridpeers keys init`). Links
-            are then mutual TLS, and each process may send only what is its own. Without it links are open, on the
-            loopback.
+            With "processes": folder with certificates (`gridpeers keys init`), for mutual TLS. Without it links are
+            open, on the loopback.
         processes : int
-            With the driver "processes": number of processes that the agents share; 0 gives each agent its own. An
-            agent that the scenario starts, stops, kills or pauses has its own in any case.
+            With "processes": number of processes that the agents share; 0 gives each agent its own. An agent that the
+            scenario starts, stops, kills or pauses has its own in any case.
         clock : {"simulated", "wall"}
-            Lock-step, or real time, which needs the driver "processes".
+            Lock-step, or real time, which needs "processes".
         speed : float
             In real time: seconds of the run per second, from 0.1 to 50.
         strict : bool
-            In real time: whether the run breaks when it cannot keep pace.
+            In real time: break the run when it cannot keep pace.
         progress : Callable[[str, float, float], None], optional
-            Told the case, the time that it has reached (s) and its end (s).
+            Takes the case, the time that it has reached (s) and its end (s).
         folder : str or Path, optional
-            New or empty; takes the whole run folder with its figures, as `Result.save` writes it. When left out, the
-            files live as long as the results.
-
-        Returns
-        -------
-        Result or Results
+            New or empty; takes the run folder with its figures. Without it the files live as long as the results.
 
         Raises
         ------
@@ -293,6 +237,63 @@ class Scenario:
         cases, events, feeder = self._spec.cases, len(self._spec.events), self._feeder
         return (
             f"<Scenario {self.name}: case{'s' * (len(cases) != 1)} {', '.join(cases)}; "
-            f"{events} event{'s' * (events != 1)}; {self._spec.time.end_s:g} s; "
+            f"{counted(events, 'event')}; {self._spec.time.end_s:g} s; "
             f"{len(self.inverters)} inverters on {len(feeder.buses)} buses>"
         )
+
+
+_DEEPEST = 20
+"""Levels of tables and lists beyond which no scenario goes."""
+
+
+def plain(value: Any, depth: int = 0) -> Any:
+    """Return a value as TOML has it; ValueError with a sentence if a scenario file could not hold it.
+
+    numpy's scalars and arrays become numbers and lists, and a class or a function becomes its reference `module:Name`.
+
+    >>> import collections
+    >>> plain({"links": (("inv1", "inv4"),), "law": collections.Counter})
+    {'links': [['inv1', 'inv4']], 'law': 'collections:Counter'}
+    """
+    if depth > _DEEPEST:
+        raise ValueError(f"tables and lists are nested more than {_DEEPEST} levels deep; does one contain itself?")
+    if isinstance(value, Enum):
+        return plain(value.value, depth)
+    if isinstance(value, bool) or value is None:
+        return value
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, int | float):
+        return next(kind(value) for kind in (int, float) if isinstance(value, kind))
+    if isinstance(value, PurePath):
+        return str(value)
+    if isinstance(value, Mapping):
+        return {_text(str(key)): plain(below, depth + 1) for key, below in value.items()}
+    if isinstance(value, list | tuple | set | frozenset | range):
+        items = value if not isinstance(value, set | frozenset) else sorted(value, key=lambda it: (str(type(it)), it))
+        return [plain(item, depth + 1) for item in items]
+    if hasattr(value, "__qualname__") and hasattr(value, "__module__"):
+        return _reference(value)
+    if callable(getattr(value, "tolist", None)):  # numpy and pandas, which need not be imported for this
+        return plain(value.tolist(), depth + 1)
+    raise ValueError(
+        f"a value of type {type(value).__name__} is none of a scenario's; give a number, text, list or table"
+    )
+
+
+def _text(text: str) -> str:
+    """Return a text of Python's own type, if a file could hold it."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ValueError("has half a character in it, which no file can hold") from None
+    return str(text)
+
+
+def _reference(it: Any) -> str:
+    if "<" in it.__qualname__:
+        raise ValueError(
+            f"{it.__qualname__} is defined inside a function, where nobody can import it; define it at the top of a "
+            "module or of the notebook"
+        )
+    return f"{it.__module__}:{it.__qualname__}"

@@ -18,8 +18,6 @@ from gridpeers.scenarios.sweep.sweep_table import unit_of
 def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Return the metrics of a case, a row per window; nan where there is no steady value, with the reason in `reasons`.
 
-    Examples
-    --------
     >>> frame = metrics_frame({"event1": {"MPSI": None, "V_error": 0.5, "reasons": {"MPSI": "nothing shared"}}})
     >>> bool(frame["MPSI"].isna()["event1"]), frame["reasons"]["event1"]
     (True, 'MPSI: nothing shared')
@@ -41,8 +39,6 @@ def metrics_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
     """Return the metrics of each island, a row per (window, island), of the windows in which there are several.
 
-    Examples
-    --------
     >>> islands = {"inv1": {"MPSI": 0.1, "reasons": {}}, "inv4": {"MPSI": 0.2}}
     >>> islands_frame({"event1": {"MPSI": None, "islands": islands}, "event2": {"MPSI": 0.3}})["MPSI"].to_dict()
     {('event1', 'inv1'): 0.1, ('event1', 'inv4'): 0.2}
@@ -58,33 +54,20 @@ def islands_frame(windows: Mapping[str, Mapping[str, Any]]) -> pd.DataFrame:
 def checks_frame(verdicts: Iterable[CheckVerdict]) -> pd.DataFrame:
     """Return verdicts of checks, a row per check; value, unit and limit are those of its first violation.
 
-    Examples
-    --------
     >>> frame = checks_frame([CheckVerdict(check="heal", status="not judged", reason="no link was cut")])
     >>> frame["status"].to_dict(), frame["text"]["heal"]
     ({'heal': 'not judged'}, 'no link was cut')
     """
-    none = Violation(text="")
     rows = {}
     for verdict in verdicts:
-        first = verdict.violations[0] if verdict.violations else none
-        rows[verdict.check] = {
-            "status": verdict.status,
-            "violations": verdict.count,
-            "t": _nan(first.t),
-            "agent": first.agent,
-            "value": _nan(first.value),
-            "unit": first.unit,
-            "limit": _nan(first.limit),
-            "text": first.text or verdict.reason,
-        }
+        first = verdict.violations[0] if verdict.violations else Violation(text="")
+        of_first = {name: getattr(first, name) for name in ("t", "agent", "value", "unit", "limit")}
+        text = {"text": first.text or verdict.reason}
+        rows[verdict.check] = {"status": verdict.status, "violations": verdict.count} | of_first | text
     frame = pd.DataFrame.from_dict(rows, orient="index").rename_axis("check")
+    frame = frame.astype({name: float for name in ("t", "value", "limit") if rows})
     frame.attrs["units"] = {"t": "s"}
     return frame
-
-
-def _nan(value: float | None) -> float:
-    return float("nan") if value is None else value
 
 
 def windows_of(case: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Iterator, Mapping
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +17,6 @@ from gridpeers.plant.equipment import Feeder
 from gridpeers.rooms import ROOMS
 from gridpeers.runs import frames
 from gridpeers.runs.run_folder import RunFolder
-from gridpeers.runs.showing import draw
 from gridpeers.scenarios.checks import check_verdict
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
@@ -74,10 +75,7 @@ class _FromFolder:
 
 
 class Results(_FromFolder, Mapping[str, "Result"]):
-    """Results of several cases of one run, by case.
-
-    `Scenario.run()` and `gridpeers.read` make it.
-    """
+    """Results of several cases of one run, by case; made by `Scenario.run()` and `gridpeers.read`."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         super().__init__(folder, spec, feeder)
@@ -127,52 +125,22 @@ class Results(_FromFolder, Mapping[str, "Result"]):
         return {case: result.sha256 for case, result in self.items()}
 
     def plot(self, figure: str = "overview") -> Figure:
-        """Draw all cases in one figure.
+        """Draw all cases in one figure of the run folder; ValueError names those that there are.
 
-        Parameters
-        ----------
-        figure : str
-            Name of a figure of the run folder: "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage",
-            "power_GFM", "power_GFL", and those that belong to the events of this scenario.
-
-        Raises
-        ------
-        ValueError
-            If the run has no such figure.
+        "overview", "frequency", "MPSI", "V_error", "MQSI", "voltage", "power_GFM", "power_GFL", and those that belong
+        to the events of this scenario.
         """
         return draw(self.drawing(self._results), figure)
 
     def save(self, folder: str | Path) -> Path:
-        """Write the run folder as the command does, figures included.
-
-        Parameters
-        ----------
-        folder : str or Path
-            New or empty.
-
-        Returns
-        -------
-        Path
-            The folder.
-
-        Raises
-        ------
-        FolderError
-            If there is something in it, or it cannot be written.
-        """
+        """Write the run folder as the command does, figures included, into a new or empty folder; return its path."""
         from gridpeers.scenarios.results.plots.run_figures import draw_all
 
         return self._folder.save(folder, lambda plots: draw_all(self.drawing(self._results), plots))
 
     @cached_property
     def findings(self) -> Findings:
-        """The measures, as claims judge them (`gridpeers.benchmarks`); of a run that followed its scenario.
-
-        Raises
-        ------
-        ValueError
-            If it was a live run, whose windows people made.
-        """
+        """The measures as claims judge them; ValueError of a live run, whose windows people made."""
         if self.driver == LIVE:
             raise ValueError("this was a live run: its windows are those that people made, see metrics")
         return find(self._spec, self._feeder, {case: _case_record(result) for case, result in self.items()})
@@ -202,11 +170,7 @@ class Results(_FromFolder, Mapping[str, "Result"]):
 
 
 class Result(_FromFolder):
-    """Result of one case.
-
-    `Scenario.run(case)` and `gridpeers.read` make it. Its tables are read from the run folder when they are first asked
-    for.
-    """
+    """Result of one case; made by `Scenario.run(case)` and `gridpeers.read`. Tables are read when first asked for."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder, run: Results, case: str) -> None:
         super().__init__(folder, spec, feeder)
@@ -254,13 +218,7 @@ class Result(_FromFolder):
 
     @cached_property
     def run_record(self) -> RunRecord:
-        """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md).
-
-        Raises
-        ------
-        RecordFileError
-            If the run was not recorded, or the file cannot be read.
-        """
+        """The record of the case: messages, decisions with their inputs, process events (docs/recorder.md)."""
         from gridpeers.scenarios.record.record_reader import RunRecord
 
         return RunRecord.open(self.folder / self.case)
@@ -268,10 +226,7 @@ class Result(_FromFolder):
     def decision(self, agent: str, t: float) -> Explanation:
         """Explain the decision of an agent that was in force at a run time (s), as `gridpeers why` does.
 
-        Raises
-        ------
-        RecordFileError
-            If the run was not recorded, there was no such agent, or it had not decided by then.
+        RecordFileError if the run was not recorded, there was no such agent, or it had not decided by then.
         """
         found: Explanation = ROOMS.resolve("explain")(self.run_record, agent, t)
         return found
@@ -312,18 +267,7 @@ class Result(_FromFolder):
         return self._run.verdicts
 
     def plot(self, figure: str = "overview") -> Figure:
-        """Draw the case.
-
-        Parameters
-        ----------
-        figure : str
-            As in `Results.plot`.
-
-        Raises
-        ------
-        ValueError
-            If the run has no such figure.
-        """
+        """Draw the case, as `Results.plot`."""
         return draw(self.drawing(), figure)
 
     def drawing(self) -> Drawing:
@@ -355,3 +299,28 @@ def _case_record(result: Result) -> CaseRecord:
 def _plant_events(result: Result) -> list[PlantEvent]:
     rows = result.events.itertuples(index=False)
     return [PlantEvent(t=row.t, kind=row.kind, subject=row.subject, text=row.text) for row in rows]
+
+
+def draw(drawing: Drawing, name: str) -> Figure:
+    """Draw a figure of a run by its name, as a picture if it is the value of a notebook's cell."""
+    from gridpeers.scenarios.results.plots import run_figures  # imports matplotlib
+
+    shown_in_notebooks()
+    return run_figures.draw(drawing, name)
+
+
+def shown_in_notebooks() -> None:
+    """Have a notebook show a figure that is the value of a cell as a picture, also without pyplot."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if shell is None:
+        return
+    from matplotlib.figure import Figure
+
+    def png(figure: Figure) -> bytes:
+        file = BytesIO()
+        figure.savefig(file, format="png")
+        return file.getvalue()
+
+    formatter = shell.display_formatter.formatters["image/png"]
+    if formatter.for_type(Figure) is None:  # whoever has chosen another format keeps it
+        formatter.for_type(Figure, png)

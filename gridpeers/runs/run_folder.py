@@ -19,15 +19,7 @@ T = TypeVar("T")
 
 
 class RunFolder:
-    """A run folder; a temporary one is removed when nobody holds a result of it any more.
-
-    Parameters
-    ----------
-    path : Path
-        The folder.
-    temporary : bool
-        Whether it is to be removed.
-    """
+    """A run folder; a temporary one is removed when nobody holds a result of it any more."""
 
     def __init__(self, path: Path, *, temporary: bool = False) -> None:
         self.path = path
@@ -39,13 +31,7 @@ class RunFolder:
             self._removal.detach()
 
     def read(self, name: str, reader: Callable[[Path], T]) -> T:
-        """Read a file of the run, which somebody may have removed or changed since.
-
-        Raises
-        ------
-        FolderError
-            If it cannot be read.
-        """
+        """Read a file of the run, which somebody may have removed or changed since."""
         file = self.path / name
         try:
             return reader(file)
@@ -65,13 +51,7 @@ class RunFolder:
         return self.read("report.txt", lambda file: file.read_text(encoding="utf-8"))
 
     def save(self, folder: str | Path, draw: Callable[[Path], object]) -> Path:
-        """Copy it into a new or empty folder, and draw the figures there if it has none; return that folder.
-
-        Raises
-        ------
-        FolderError
-            If there is something in the folder, or it cannot be written.
-        """
+        """Copy it into a new or empty folder, and draw the figures there if it has none; return that folder."""
         new = new_home(folder)
         try:
             shutil.copytree(self.path, new, dirs_exist_ok=True)
@@ -84,29 +64,14 @@ class RunFolder:
         return new
 
 
-_ODD_BYTE = re.compile("[\udc80-\udcff]")
-"""A byte of a path that is no UTF-8, as Python has it: folders may have such names."""
-
-
 def as_folder(it: Any) -> Path:
-    """Return the path of a folder that somebody has named.
-
-    Raises
-    ------
-    FolderError
-        If it is no path.
-    """
-    if not isinstance(it, str | PathLike) or not str(it) or is_no_path(_ODD_BYTE.sub("?", str(it))):
+    """Return the path of a folder that somebody has named; FolderError if it can be none."""
+    text = re.sub("[\udc80-\udcff]", "?", str(it))  # bytes of a name that is not UTF-8, as Python has them
+    if not isinstance(it, str | PathLike) or not text or is_no_path(text):
         raise FolderError(f"needs the path of a folder, got {it!r:.60}")
     return Path(it)
 
 
 def new_home(it: str | Path) -> Path:
-    """Make a folder for results, and return its absolute path: the reader of the results may change directories.
-
-    Raises
-    ------
-    FolderError
-        If it is no path, there is something in it, or it cannot be made.
-    """
+    """Make a new or empty folder for results, and return its absolute path: the reader may change directories."""
     return empty_folder(as_folder(it)).absolute()

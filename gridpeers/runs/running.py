@@ -67,16 +67,10 @@ def run(
             raise FolderError(text) from error
     else:
         home = RunFolder(new_home(folder))
-    request = Request(
-        scenario=spec,
-        feeder=scenario.feeder,
-        driver=driver,
-        folder=home.path,
-        lasting=folder is not None,
-        **pace,
-    )
+    lasting = folder is not None
+    request = Request(scenario=spec, feeder=scenario.feeder, driver=driver, folder=home.path, lasting=lasting, **pace)
     try:
-        report = run_request(request, progress or _silent)
+        report = run_request(request, progress or (lambda case, t, end: None))
     except BrokenRunError as error:
         home.keep()
         raise type(error)(f"{error}; what came until then is in {home.path}") from error
@@ -91,22 +85,10 @@ def warn_of_laws(failed: Mapping[str, str], depth: int) -> None:
         warnings.warn(f"a law failed, {lines[0]}{more}", RuntimeWarning, stacklevel=depth + 2)
 
 
-def _silent(case: str, t: float, end: float) -> None:
-    """Show no progress."""
-
-
 def read(folder: str | Path) -> Result | Results:
     """Open the folder of a run, whoever made it: `Result.save`, `gridpeers run` or `gridpeers up`.
 
-    Returns
-    -------
-    Result or Results
-        A `Result` if the run has one case, else `Results`.
-
-    Raises
-    ------
-    FolderError
-        If it is no folder of a run, or of one that did not come to its end.
+    It gives a `Result` if the run has one case. FolderError if it is no folder of a run that came to its end.
     """
     path = as_folder(folder)
     if not (path / "status.txt").is_file():

@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from gridpeers.runs.result import Result, Results
+from gridpeers.runs.result import Result, Results, shown_in_notebooks
 from gridpeers.runs.running import read
-from gridpeers.runs.showing import shown_in_notebooks
 from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS
 from gridpeers.scenarios.schema.scenario_errors import ScenarioError
 from gridpeers.scenarios.schema.scenario_writing import to_toml

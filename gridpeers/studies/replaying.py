@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
-from gridpeers.runs.result import Result
+from gridpeers.runs.result import Result, shown_in_notebooks
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
-from gridpeers.runs.showing import shown_in_notebooks
+from gridpeers.scenario import plain
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.replay.changes import ChangedRule, Changes, changed_rule
 from gridpeers.scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
@@ -21,7 +21,6 @@ from gridpeers.scenarios.replay.replay import Replay
 from gridpeers.scenarios.replay.replay import replay as replay_record
 from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.studies.comparison import Comparison
-from gridpeers.values import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

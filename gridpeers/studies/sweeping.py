@@ -11,7 +11,7 @@ from typing import Any
 import pandas as pd
 
 from gridpeers.runs.running import warn_of_laws
-from gridpeers.scenario import Scenario, as_scenario
+from gridpeers.scenario import Scenario, as_scenario, plain
 from gridpeers.scenarios.results.evaluation.metric import METRICS
 from gridpeers.scenarios.results.history import History
 from gridpeers.scenarios.schema import ScenarioModel
@@ -22,7 +22,6 @@ from gridpeers.scenarios.sweep.sweep_model import Sweep
 from gridpeers.scenarios.sweep.sweep_reading import BaseScenario, Plan, plan_of
 from gridpeers.scenarios.sweep.sweep_table import results_frame, unit_of
 from gridpeers.scenarios.sweep.workers import cores, on_workers
-from gridpeers.values import plain
 from gridpeers.wire.wording import suggestion
 
 Values = Mapping[str, Iterable[Any]]
