@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, require
+from gridpeers.cli.usage import BAD_INPUT, fail, interruptible, require
 
 if TYPE_CHECKING:
     import socket
@@ -39,7 +39,6 @@ def page_socket(port: int | None) -> socket.socket:
 @contextmanager
 def page_beside(folder: Path, listening: socket.socket, name: str) -> Iterator[None]:
     """Open the page of a run folder on a socket; after a run that ended well wait for Ctrl-C."""
-    from gridpeers.cli.interruption import interruptible
     from gridpeers.viewer.page_address import url_of
     from gridpeers.viewer.recorded.page_process import PageProcess
 

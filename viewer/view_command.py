@@ -10,9 +10,8 @@ from urllib.parse import quote
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import RUN, LiveRun, of_live_run, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, INTERRUPTED, TERMINATED, fail, require
-from gridpeers.scenarios.live.run_address import Access
 from gridpeers.viewer.page_beside import HERE, PORT, require_page
 from gridpeers.wire.driver.ending import watch_readers
 
@@ -23,7 +22,9 @@ Line = Callable[[str], str]
 """Makes the line that a command prints, from the address of its page."""
 
 
+@of_live_run
 def view(
+    live: LiveRun,
     record: Annotated[
         Path | None,
         typer.Argument(
@@ -33,9 +34,6 @@ def view(
         ),
     ] = None,
     case: Annotated[str, typer.Option(metavar="NAME", help="Case of the RECORD, if it has several.")] = "",
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
     control: Annotated[
         bool, typer.Option("--control", help="Let the page act: switches, loads, agents, links.")
     ] = False,
@@ -46,9 +44,6 @@ def view(
     token: Annotated[
         str, typer.Option("--token", metavar="TEXT", help="What a page must know; made up for other addresses.")
     ] = "",
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """Show a run in the browser: feeder, links, strips and agents.
 
@@ -63,19 +58,17 @@ def view(
     if record is None:
         if case:
             fail(["--case: goes with a RECORD; a live run has one case"], BAD_INPUT)
-        _serve(lambda: _live(run, connect, wait, Access(keys, name, insecure), control=control), address, port, token)
-    if control or connect or keys or run != RUN:
-        option = "--control" if control else "--connect" if connect else "--keys" if keys else "--run"
+        _serve(lambda: _live(live, control=control), address, port, token)
+    if control or live.connect or live.keys or live.run != RUN:
+        option = "--control" if control else "--connect" if live.connect else "--keys" if live.keys else "--run"
         fail([f"{option}: goes with a live run; nothing can be done to a record"], BAD_INPUT)
     _serve(lambda: _recorded(record, case), address, port, token)
 
 
 @contextmanager
-def _live(
-    run: str, connect: list[str] | None, wait: float, access: Access, *, control: bool
-) -> Iterator[tuple[Pages, Line]]:
+def _live(live: LiveRun, *, control: bool) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a live run, and the line that tells their address."""
-    with run_client(run, connect, wait, access, meet_agents=True, acts=control) as client:
+    with live.client(meet_agents=True, acts=control) as client:
         from gridpeers.viewer.live_pages import LivePages
         from gridpeers.viewer.page_rights import looks_only
         from gridpeers.viewer.run_follower import RunFollower
@@ -84,7 +77,7 @@ def _live(
         with RunFollower(client) as follower:
             yield (
                 LivePages(follower, client.where, control=control),
-                lambda url: f"run {run}: open {url} in a browser{rights}; Ctrl-C ends the page, not the run",
+                lambda url: f"run {live.run}: open {url} in a browser{rights}; Ctrl-C ends the page, not the run",
             )
 
 

@@ -1,16 +1,27 @@
-"""Show the progress of a run: a bar per case on a terminal, a line per finished case elsewhere."""
+"""Show the progress of a run, or of many runs together: bars on a terminal, lines elsewhere."""
 
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from time import monotonic
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
-from gridpeers.scenarios.run_request import Progress as Tell
+from gridpeers.scenarios.run_request import Progress as TellCase
+from gridpeers.scenarios.short_texts import duration
+
+TellPart = Callable[[str, float], None]
+"""Takes the present work, with its part behind a comma, and the amount of all that is done."""
 
 PATIENCE = 4.0
 """A start that takes longer than this (s) is explained; usually it takes about 1 s."""
@@ -28,59 +39,38 @@ RESTING = (
     "operating point before that, which takes some 10 seconds ..."
 )
 
-
-@contextmanager
-def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[Tell]:
-    """Yield the function that takes the progress of each case; its first call for a case, at t = 0, is the start.
-
-    Parameters
-    ----------
-    console : Console
-        Where to.
-    cases : tuple[str, ...]
-        Names of the cases, in the order in which they run.
-    explanation : str, optional
-        Why a start may take long.
-    """
-    with explained(lambda: console.print(explanation, soft_wrap=True)) as started:
-        if console.is_terminal:
-            with _bars(console, cases) as tell:
-                yield _both(started, tell)
-        else:
-            yield _both(started, _lines(console))
+MEMORY = 300.0
+"""Window of a bar's estimate of the time left (s); runs differ in how long they take."""
 
 
 @contextmanager
-def explained(explain: Callable[[], None]) -> Iterator[Tell]:
-    """Explain a start that takes long; it ends when time moves, as the plant's first step is compiled last."""
+def explained(explain: Callable[[], None]) -> Iterator[Callable[[], None]]:
+    """Explain the work within the context if it takes long; yield the function that calls the explanation off."""
     timer = threading.Timer(PATIENCE, explain)
     timer.daemon = True
-    begun = False
-
-    def tell(case: str, t: float, end: float) -> None:
-        nonlocal begun
-        if not begun:
-            begun = True
-            timer.start()
-        elif t > 0.0:
-            timer.cancel()
-
+    timer.start()
     try:
-        yield tell
+        yield timer.cancel
     finally:
         timer.cancel()
 
 
 @contextmanager
-def explained_work(explain: Callable[[], None]) -> Iterator[None]:
-    """Explain the work within the context if it takes long."""
-    with explained(explain) as tell:
-        tell("", 0.0, 1.0)
-        yield
+def progress(console: Console, cases: tuple[str, ...], explanation: str = COMPILING) -> Iterator[TellCase]:
+    """Yield the function that takes the progress of each case; an `explanation` comes if t = 0 lasts long."""
+    shown = _bars(console, cases) if console.is_terminal else _lines(console)
+    with explained(lambda: console.print(explanation, soft_wrap=True)) as begun, shown as show:
+
+        def tell(case: str, t: float, end: float) -> None:
+            if t > 0.0:  # the plant's first step is compiled last
+                begun()
+            show(case, t, end)
+
+        yield tell
 
 
 @contextmanager
-def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
+def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[TellCase]:
     columns = (
         TextColumn("case {task.fields[case]:4}", markup=False),
         BarColumn(bar_width=40),
@@ -98,23 +88,66 @@ def _bars(console: Console, cases: tuple[str, ...]) -> Iterator[Tell]:
         yield tell
 
 
-def _lines(console: Console) -> Tell:
+@contextmanager
+def _lines(console: Console) -> Iterator[TellCase]:
     began: dict[str, float] = {}
     done: set[str] = set()
 
     def tell(case: str, t: float, end: float) -> None:
-        began.setdefault(case, time.monotonic())
+        began.setdefault(case, monotonic())
         if t >= end and case not in done:
             done.add(case)
-            took = time.monotonic() - began[case]
-            console.print(f"case {case}: {end:g} s simulated in {took:.1f} s")
+            console.print(f"case {case}: {end:g} s simulated in {monotonic() - began[case]:.1f} s")
 
-    return tell
+    yield tell
 
 
-def _both(first: Tell, second: Tell) -> Tell:
-    def tell(case: str, t: float, end: float) -> None:
-        first(case, t, end)
-        second(case, t, end)
+@contextmanager
+def remaining(console: Console, total: float) -> Iterator[TellPart]:
+    """Yield the function that takes the progress of a total in any unit: runs, seconds simulated.
+
+    Its first call gives the amount that was done before; the time left counts from it.
+    """
+    if not console.is_terminal:
+        yield _part_lines(console, total)
+        return
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TaskProgressColumn(),
+        TextColumn("left"),
+        TimeRemainingColumn(),
+        TextColumn("after"),
+        TimeElapsedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=MEMORY) as bars:
+        task = bars.add_task("starting", total=total)
+        begun = False
+
+        def tell(what: str, done: float) -> None:
+            nonlocal begun
+            if not begun:
+                bars.reset(task, description=what, completed=round(done))
+            bars.update(task, description=what, completed=done)
+            begun = True
+
+        yield tell
+
+
+def _part_lines(console: Console, total: float) -> TellPart:
+    """Print a line for each piece of work that begins, and for each tenth of all."""
+    latest: tuple[str, int] | None = None
+    began: tuple[float, float] | None = None
+
+    def tell(what: str, done: float) -> None:
+        nonlocal latest, began
+        since, before = began = began or (monotonic(), done)
+        now = what.partition(",")[0], int(10.0 * done / total)
+        if now == latest:
+            return
+        latest = now
+        left = (monotonic() - since) / (done - before) * (total - done) if done > before else 0.0
+        words = f", about {duration(round(left))} left" if left else ""
+        console.print(f"{what}: {100.0 * done / total:.0f} % done{words}", soft_wrap=True)
 
     return tell

@@ -1,11 +1,13 @@
-"""Shared parts of all commands: exit codes, a scenario by its name, and the one way to end with an error."""
+"""Shared parts of all commands: exit codes, a scenario by its name, and how a command ends by an error or a signal."""
 
 from __future__ import annotations
 
 import os
 import re
+import signal
 import sys
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -139,3 +141,42 @@ def fail(lines: list[str], code: int) -> NoReturn:
     for line in lines:
         print("gridpeers: " + "\n".join(map(printable, line.split("\n"))), file=sys.stderr)
     raise SystemExit(code)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Have SIGTERM, and a terminal that goes away, end what is inside as Ctrl-C does: by `KeyboardInterrupt`.
+
+    Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
+    """
+    from gridpeers.scenarios.results.run_files import TerminatedError
+    from gridpeers.wire.driver.ending import StopSignal, ctrl_c_or
+
+    terminate, numbers = StopSignal(ctrl_c_or(TerminatedError)), [signal.SIGTERM]
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
+        numbers.append(signal.SIGINT)
+    if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal
+        numbers.append(signal.SIGHUP)
+    before = {number: signal.signal(number, terminate) for number in numbers}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def exit_code(error: KeyboardInterrupt) -> int:
+    """Return the exit code of a command that a signal ended."""
+    from gridpeers.scenarios.results.run_files import TerminatedError
+
+    return TERMINATED if isinstance(error, TerminatedError) else INTERRUPTED
+
+
+@contextmanager
+def ended_by_signals(left: str) -> Iterator[None]:
+    """Do the work of a command; a signal ends it with its exit code, and a line on what is left of the work."""
+    try:
+        with interruptible():
+            yield
+    except KeyboardInterrupt as error:
+        fail([f"interrupted; {left}"], exit_code(error))

@@ -191,13 +191,13 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     """Say what begins; end with a line for each check that the scenario violates by itself."""
-    from gridpeers.cli.progress import TRYING, explained_work
+    from gridpeers.cli.progress import TRYING, explained
     from gridpeers.scenarios.chaos.campaign import undisturbed
     from gridpeers.scenarios.checks.check_registry import ALWAYS
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
-    with explained_work(lambda: console.print(TRYING, soft_wrap=True)):
+    with explained(lambda: console.print(TRYING, soft_wrap=True)):
         row = undisturbed(campaign)
     if row.violated:
         off = ", ".join(f'{{ use = "{check}", off = true }}' for check in row.violated if check in ALWAYS)
@@ -233,7 +233,7 @@ def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenar
 @contextmanager
 def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
     """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
-    from gridpeers.cli.interruption import exit_code, interruptible
+    from gridpeers.cli.usage import exit_code, interruptible
     from gridpeers.scenarios.chaos.machine_error import MachineError, machine_lack
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
@@ -263,7 +263,7 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
 @contextmanager
 def _stages(console: Console) -> Iterator[Tell]:
     """Yield the function that takes a campaign's progress: each stage is estimated by itself."""
-    from gridpeers.cli.remaining import BASIS_RUNS, remaining
+    from gridpeers.cli.progress import remaining
 
     with ExitStack() as shown:
         stages: dict[str, Callable[[str, float], None]] = {}
@@ -272,7 +272,7 @@ def _stages(console: Console) -> Iterator[Tell]:
             stage = what.partition(",")[0]
             if stage not in stages:
                 shown.close()  # the bar of the stage before
-                stages[stage] = shown.enter_context(remaining(console, of, BASIS_RUNS))
+                stages[stage] = shown.enter_context(remaining(console, of))
             stages[stage](what, done)
 
         yield tell

@@ -239,7 +239,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
     import msgspec
 
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
-    from gridpeers.cli.progress import TRYING, explained_work
+    from gridpeers.cli.progress import TRYING, explained
     from gridpeers.plant.equipment.neutrals import returns_in_words
     from gridpeers.scenarios.proposal.proposal_errors import NoProposalError
     from gridpeers.scenarios.run_request import BrokenRunError
@@ -272,7 +272,7 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
         return load_scenario(str(file))
 
     problem = ""
-    with explained_work(lambda: typer.echo(TRYING)):
+    with explained(lambda: typer.echo(TRYING)):
         for part in PARTS:
             found = start_problem(*(project := written(part)))
             if not found:

@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
 from gridpeers.cli.suggestions import Commands
 from gridpeers.cli.usage import BROKEN, fail
-from gridpeers.scenarios.live.run_address import Access
 
 if TYPE_CHECKING:
     from gridpeers.agents.agent_config import AgentConfig
@@ -35,8 +34,10 @@ _For = Annotated[
 
 
 @link.command("set")
+@of_live_run
 def set_(
     links: _Ends,
+    live: LiveRun,
     delay: Annotated[float | None, typer.Option(metavar="SECONDS", help="Delay of every message.")] = None,
     jitter: Annotated[
         float | None, typer.Option(metavar="SECONDS", help="Delays are uniform, --delay plus or minus this.")
@@ -47,12 +48,6 @@ def set_(
     rate: Annotated[float | None, typer.Option(metavar="BYTES", help="Bytes per second that the link sends.")] = None,
     profile: Annotated[str, typer.Option(metavar="NAME", help="A named link, e.g. lte; see docs/netem.md.")] = "",
     duration: _For = None,
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """Give links faults. What is set takes the place of what the link had of the same kind.
 
@@ -68,23 +63,19 @@ def set_(
 
             options = "--delay, --jitter (with --delay), --loss, --duplicate, --corrupt, --rate, --profile"
             raise UsageError(f"nothing is to be set; give one of {options}")
-        _give(links, "->", fault | {"profile": profile}, duration, run, connect, wait, Access(keys, name, insecure))
+        _give(links, "->", fault | {"profile": profile}, duration, live)
 
 
 @link.command()
+@of_live_run
 def cut(
     links: _Ends,
+    live: LiveRun,
     one_way: Annotated[bool, typer.Option("--one-way", help="With two names: only from the first.")] = False,
     hold: Annotated[
         bool, typer.Option("--hold", help="Keep messages and let them go when the link is healed.")
     ] = False,
     duration: _For = None,
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """Cut links, between two names both ways.
 
@@ -95,30 +86,17 @@ def cut(
     with usage_errors():
         from gridpeers.netem.models.medium import Cut
 
-        _give(
-            links,
-            "->" if one_way else "<->",
-            {"cut": Cut(hold=hold)},
-            duration,
-            run,
-            connect,
-            wait,
-            Access(keys, name, insecure),
-        )
+        _give(links, "->" if one_way else "<->", {"cut": Cut(hold=hold)}, duration, live)
 
 
 @link.command()
+@of_live_run
 def heal(
+    live: LiveRun,
     links: Annotated[
         list[str] | None,
         typer.Argument(metavar="[LINKS]", help="A pattern, or two names (both ways); all links if none."),
     ] = None,
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """End what holds on links.
 
@@ -129,29 +107,23 @@ def heal(
     Example:  gridpeers link heal inv4 inv7
     """
     with usage_errors():
-        _give(links or [], "<->", None, None, run, connect, wait, Access(keys, name, insecure))
+        _give(links or [], "<->", None, None, live)
 
 
 @link.command()
-def show(
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
-) -> None:
+@of_live_run
+def show(live: LiveRun) -> None:
     """Show every impaired link, and how its messages have fared.
 
     Exit code: 0 all have answered, 2 nobody there, 3 somebody has not answered.
 
     Example:  gridpeers link show
     """
-    with run_client(run, connect, wait, Access(keys, name, insecure)) as client:
+    with live.client() as client:
         from gridpeers.scenarios.live.run_requests import link_states, links_text
 
         t, states, silent = link_states(client)
-        typer.echo(links_text(run, t, states), nl=False)
+        typer.echo(links_text(live.run, t, states), nl=False)
         if silent:
             fail([f"has not answered: {', '.join(silent)}; what its links do is not shown"], BROKEN)
 
@@ -192,16 +164,7 @@ def _pattern(links: list[str], arrow: str) -> str:
     )
 
 
-def _give(
-    links: list[str],
-    arrow: str,
-    fault: dict[str, Any] | None,
-    duration: float | None,
-    run: str,
-    connect: list[str] | None,
-    wait: float,
-    access: Access,
-) -> None:
+def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: float | None, live: LiveRun) -> None:
     """Check a link command, give it, and print the receivers' answers."""
     from gridpeers.netem.fault_schedule import Heal
     from gridpeers.netem.schema.fault import Fault
@@ -219,7 +182,7 @@ def _give(
         for_s=duration,
     )
     check_link_command(command, None)
-    with run_client(run, connect, wait, access, acts=True) as client:
+    with live.client(acts=True) as client:
         setup, agent = links_of_run(client)
         check_link_command(command, setup)
         result = command_links(client, command)

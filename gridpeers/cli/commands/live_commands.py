@@ -6,39 +6,28 @@ from typing import Annotated, Literal
 
 import typer
 
-from gridpeers.cli.commands.options import RUN, As, Connect, Insecure, Keys, Run, Wait, run_client, usage_errors
+from gridpeers.cli.commands.options import LiveRun, of_live_run, usage_errors
 from gridpeers.cli.usage import BAD_INPUT, BROKEN, fail, terminal
-from gridpeers.scenarios.live.run_address import Access
 
 
-def status(
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
-) -> None:
+@of_live_run
+def status(live: LiveRun) -> None:
     """Look once at a run: time, pacing, agents, latest events.
 
     Example:  gridpeers status
     """
-    with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
+    with live.client(meet_agents=True) as client:
         from gridpeers.scenarios.live.watching import look, plain
 
         typer.echo(plain(look(client)), nl=False)
 
 
+@of_live_run
 def watch(
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
+    live: LiveRun,
     duration: Annotated[
         float | None, typer.Option("--for", metavar="SECONDS", help="Stop after so long; at q if left out.")
     ] = None,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """Watch a run as a live table; q quits. Where the output is no terminal, a text every second.
 
@@ -48,20 +37,16 @@ def watch(
         from gridpeers.scenarios.live.run_address import check_duration
 
         check_duration(duration)
-    with run_client(run, connect, wait, Access(keys, name, insecure), meet_agents=True) as client:
+    with live.client(meet_agents=True) as client:
         from gridpeers.scenarios.live.watching import watch as watch_run
 
         watch_run(client, terminal(), duration)
 
 
+@of_live_run
 def stop(
     inverter: Annotated[str, typer.Argument(metavar="INVERTER", help="Name of its inverter, e.g. inv2.")],
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
+    live: LiveRun,
 ) -> None:
     """Have an agent leave properly: its inverter is switched off.
 
@@ -71,7 +56,7 @@ def stop(
 
     Example:  gridpeers stop inv2
     """
-    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
+    with live.client(acts=True) as client:
         from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_left
 
         typer.echo(ask(client, "stop", inverter))
@@ -79,18 +64,14 @@ def stop(
             fail([f"{inverter} has not left within {LEAVING:g} s; is its process frozen?"], BROKEN)
 
 
+@of_live_run
 def event(
     action: Annotated[str, typer.Argument(metavar="open|close", help="What to do with the switch.")],
     switch: Annotated[str, typer.Argument(metavar="SWITCH", help='Its name, e.g. "13-152" or "sw1_2".')],
+    live: LiveRun,
     synchronised: Annotated[
         bool, typer.Option("--synchronised", help="Close only if both sides are in step (IEEE 1547, Table 5).")
     ] = False,
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
 ) -> None:
     """Open or close a switch of a running plant.
 
@@ -102,28 +83,53 @@ def event(
         fail([f'"{action}" cannot be done to a switch; write open or close'], BAD_INPUT)
     if synchronised and action == "open":
         fail(["--synchronised: only closing can wait for synchronism; leave it out to open a switch"], BAD_INPUT)
-    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
+    with live.client(acts=True) as client:
         from gridpeers.scenarios.live.run_requests import ask
 
         closing: Literal["close", "synchronise"] = "synchronise" if synchronised else "close"
         typer.echo(ask(client, "open" if action == "open" else closing, switch))
 
 
-def down(
-    run: Run = RUN,
-    connect: Connect = None,
-    wait: Wait = 5.0,
-    keys: Keys = None,
-    name: As = "",
-    insecure: Insecure = False,
+@of_live_run
+def load(
+    name: Annotated[
+        str,
+        typer.Argument(metavar="LOAD", help='Its bus, e.g. "48"; in an imported feeder its name.'),
+    ],
+    live: LiveRun,
+    factor: Annotated[
+        float | None,
+        typer.Option("--factor", metavar="X", help="Times the power of the feeder's table; 1 is as before."),
+    ] = None,
+    P: Annotated[float | None, typer.Option("--P", metavar="KW", help="Real power at nominal voltage.")] = None,
+    Q: Annotated[float | None, typer.Option("--Q", metavar="KVAR", help="Reactive power at nominal voltage.")] = None,
 ) -> None:
+    """Set a load of a running plant.
+
+    It takes the power from the next step on, in all its phases in proportion; of --P and --Q the one that is left out
+    stays as it is. In a scenario, load = { 48 = { factor = 1.5 } } in an [[event]] does the same at a time.
+
+    Exit code: 0 it was done, 2 there is no such load, or the number makes no sense.
+
+    Example:  gridpeers load 48 --factor 1.5
+    """
+    with usage_errors():
+        from gridpeers.scenarios.live.run_requests import ask, load_setting
+
+        setting = load_setting(factor, P, Q)
+    with live.client(acts=True) as client:
+        typer.echo(ask(client, "load", name, setting))
+
+
+@of_live_run
+def down(live: LiveRun) -> None:
     """End a run: its agents leave, its plant ends.
 
     Exit code: 0 all have gone, 2 there is no such run, 3 somebody has stayed.
 
     Example:  gridpeers down --run lab
     """
-    with run_client(run, connect, wait, Access(keys, name, insecure), acts=True) as client:
+    with live.client(acts=True) as client:
         from gridpeers.scenarios.live.run_requests import LEAVING, ask, has_ended
 
         typer.echo(ask(client, "down"))

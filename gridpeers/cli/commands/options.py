@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import inspect
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -38,59 +41,78 @@ Insecure = Annotated[
 ]
 
 
-@contextmanager
-def run_client(
-    run: str,
-    connect: list[str] | None,
-    wait: float,
-    access: Access,
-    *,
-    meet_agents: bool = False,
-    acts: bool = False,
-) -> Iterator[RunClient]:
-    """Yield a client to a run whose plant is there; any error ends the command with one line.
+@dataclass(frozen=True)
+class LiveRun:
+    """The options by which a command finds a run, as typed."""
 
-    Parameters
-    ----------
-    run, connect, wait
-        The options of these names.
-    access : Access
-        The options on certificates.
-    meet_agents : bool, optional
-        Whether to connect to the agents too.
-    acts : bool, optional
-        Whether the command changes something, which a viewer may not.
-    """
+    run: Run = RUN
+    connect: Connect = None
+    wait: Wait = 5.0
+    keys: Keys = None
+    member: As = ""
+    insecure: Insecure = False
+
+    def client(self, *, meet_agents: bool = False, acts: bool = False) -> AbstractContextManager[RunClient]:
+        """Yield a client to the run, whose plant is there; any error ends the command with one line.
+
+        A command that `acts` changes something, which a viewer may not.
+        """
+        return _client(self, meet_agents=meet_agents, acts=acts)
+
+
+def of_live_run(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options of `LiveRun` in place of its parameter `live`."""
+    own, options = (inspect.signature(it, eval_str=True).parameters for it in (command, LiveRun))
+
+    @wraps(command)
+    def called(**words: Any) -> None:
+        command(live=LiveRun(**{name: words.pop(name) for name in options}), **words)
+
+    with_options(called, [*(one for one in own.values() if one.name != "live"), *options.values()])
+    return called
+
+
+def with_options(command: Callable[..., None], parameters: list[inspect.Parameter]) -> None:
+    """Have typer read a command as one with these parameters."""
+    command.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    command.__annotations__ = {one.name: one.annotation for one in parameters}
+
+
+@contextmanager
+def _client(live: LiveRun, *, meet_agents: bool, acts: bool) -> Iterator[RunClient]:
     require({"zenoh": "the connection to a run"})
     with usage_errors():
-        from gridpeers.scenarios.live.run_address import check_wait
+        from gridpeers.scenarios.live.run_address import Access, check_wait
         from gridpeers.scenarios.live.run_client import RunClient
         from gridpeers.wire.trust.key_folder import COMMANDING
 
-        check_wait(wait)
-        where = address(run, connect, access, COMMANDING if acts else PEOPLE)
+        check_wait(live.wait)
+        roles: tuple[Role, ...] = COMMANDING if acts else ("operator", "viewer")
+        where = address(live.run, live.connect, Access(live.keys, live.member, live.insecure), roles)
         with RunClient(where, meet_agents=meet_agents) as client:
-            client.find_plant(wait)
+            client.find_plant(live.wait)
             yield client
-
-
-PEOPLE: tuple[Role, ...] = ("operator", "viewer")
-"""Roles of commands."""
 
 
 def address(run: str, connect: list[str] | None, access: Access, roles: tuple[Role, ...], name: str = "") -> RunAddress:
     """Return the address of a run, with the credentials for it; raise UsageError or KeysError if they do not fit."""
     from dataclasses import replace
 
-    from gridpeers.scenarios.live.run_address import UsageError, address_of, objection, with_protocol
+    from gridpeers.scenarios.live.run_address import address_of, with_protocol
 
     where = address_of(run, connect)
-    keys = access.keys is not None
-    endpoints = tuple(with_protocol(text, keys=keys, default=ENDPOINT) for text in where.connect)
+    endpoints = tuple(with_protocol(text, keys=access.keys is not None, default=ENDPOINT) for text in where.connect)
     for text in endpoints:
-        if wrong := objection("--connect", text, keys=keys, insecure=access.insecure):
-            raise UsageError(wrong)
+        check_open("--connect", text, access)
     return replace(where, connect=endpoints, credentials=opened(access, roles, name), access=access)
+
+
+def check_open(option: str, endpoint: str, access: Access) -> None:
+    """Raise UsageError if an endpoint cannot be used with or without certificates."""
+    from gridpeers.scenarios.live.run_address import UsageError, objection
+
+    if wrong := objection(option, endpoint, keys=access.keys is not None, insecure=access.insecure):
+        raise UsageError(wrong)
 
 
 def opened(access: Access, roles: tuple[Role, ...], name: str = "") -> Credentials | None:
@@ -122,16 +144,8 @@ def usage_errors() -> Iterator[None]:
     from gridpeers.wire.driver.session import SessionError
     from gridpeers.wire.trust.certificate_files import KeysError
 
+    bad_input = (ConfigurationError, ListenError, FolderError, KeysError, NobodyError, RefusedError, SessionError)
     try:
         yield
-    except (
-        ConfigurationError,
-        ListenError,
-        FolderError,
-        KeysError,
-        NobodyError,
-        RefusedError,
-        SessionError,
-        UsageError,
-    ) as error:
+    except (*bad_input, UsageError) as error:
         fail([str(error)], BAD_INPUT)

@@ -61,7 +61,7 @@ def replay(
     """
     require({"mcap": "the record of a run", "numba": "the plant"})
 
-    from gridpeers.cli.interruption import ended_by_signals
+    from gridpeers.cli.usage import ended_by_signals
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
     from gridpeers.scenarios.replay.changes import Changes
     from gridpeers.scenarios.replay.replay_error import ReplayError
@@ -109,12 +109,12 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         text = f"a replay without a change writes no folder; leave it out, or give {CHANGES}"
         fail([f"--out {out}: {text}"], BAD_INPUT)
 
-    from gridpeers.cli.progress import explained_work
+    from gridpeers.cli.progress import explained
     from gridpeers.scenarios.replay.replay import replay as replay_record
 
     typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
     span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
-    with explained_work(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
+    with explained(lambda: typer.echo(f"still at work: every call of {span} is made again ...")):
         done = replay_record(record)
     for part in done.parts:
         of = "rows" if part.name == "plant" else "states"
@@ -144,8 +144,8 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from datetime import datetime
 
-    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
+    from gridpeers.cli.usage import ended_by_signals
     from gridpeers.scenarios.replay.changes import changed_rule
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole

@@ -17,6 +17,7 @@ from gridpeers.cli.usage import (
     RUN,
     ScenarioName,
     chosen,
+    ended_by_signals,
     fail,
     load,
     refuse,
@@ -164,7 +165,6 @@ def carry_out(
     if federate:
         require_loadable("helics", "a HELICS federate")
 
-    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import COMPILING, RESTING, progress
     from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from gridpeers.scenarios.results.file_sizes import file_sizes, require_room

@@ -43,13 +43,13 @@ def check(
     spec, feeder = load(file)
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
-    from gridpeers.cli.progress import TRYING, explained_work
+    from gridpeers.cli.progress import TRYING, explained
     from gridpeers.scenarios.predict.robustness_notes import robustness_notes
     from gridpeers.scenarios.results.file_sizes import file_sizes
     from gridpeers.scenarios.schema.check_notes import liar_notes, security_notes, start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
 
-    with explained_work(lambda: typer.echo(TRYING)):
+    with explained(lambda: typer.echo(TRYING)):
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)

@@ -18,8 +18,10 @@ from gridpeers.cli.commands.options import (
     Run,
     Wait,
     address,
+    check_open,
     opened,
     usage_errors,
+    with_options,
 )
 from gridpeers.cli.usage import BROKEN, CLAIM_FAILED, INTERRUPTED, TERMINATED, ScenarioName, chosen, fail, load, require
 from gridpeers.scenarios.live.run_address import Access
@@ -76,14 +78,7 @@ def _start(
     require({"numba": "the plant", "zenoh": "the processes"} | ({} if out is None else {"matplotlib": "the figures"}))
     with usage_errors():
         from gridpeers.scenarios.live.live_options import check_alone, endpoint_for_run
-        from gridpeers.scenarios.live.run_address import (
-            RunAddress,
-            UsageError,
-            check_endpoint,
-            check_name,
-            objection,
-            with_protocol,
-        )
+        from gridpeers.scenarios.live.run_address import RunAddress, check_endpoint, check_name, with_protocol
 
         # first: reading a scenario takes seconds, and a forgotten run is reported at once
         check_name("--run", run)
@@ -91,8 +86,7 @@ def _start(
         beyond = tuple(check_endpoint("--connect", text) for text in connect or ())
         listen = with_protocol(check_endpoint("--listen", listen), keys=keys is not None, default=ENDPOINT)
         for option, text in (("--listen", listen), *(("--connect", text) for text in beyond)):
-            if wrong := objection(option, text, keys=keys is not None, insecure=insecure):
-                raise UsageError(wrong)
+            check_open(option, text, access)
         endpoint = endpoint_for_run(listen, credentials, access)
         check_alone(run, beyond, credentials, access)
     spec, feeder = load(scenario)
@@ -161,11 +155,9 @@ def _start(
 
 
 def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `_start` that a person chooses, as typer reads them."""
-    signature = inspect.signature(_start, eval_str=True)
-    chosen_by_people = [one for one in signature.parameters.values() if one.name != "agents"]
-    command.__signature__ = signature.replace(parameters=chosen_by_people)  # type: ignore[attr-defined]
-    command.__annotations__ = {one.name: one.annotation for one in chosen_by_people}
+    """Give a command the options of `_start` that a person chooses."""
+    options = inspect.signature(_start, eval_str=True).parameters.values()
+    with_options(command, [one for one in options if one.name != "agents"])
     return command
 
 
@@ -221,26 +213,17 @@ def agent(
     with usage_errors():
         from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
         from gridpeers.scenarios.live.live_processes import agent_here
-        from gridpeers.scenarios.live.run_address import (
-            UsageError,
-            check_endpoint,
-            check_inverters,
-            check_wait,
-            objection,
-        )
+        from gridpeers.scenarios.live.run_address import UsageError, check_endpoint, check_inverters, check_wait
 
         check_inverters(inverters)
         if keys is not None and len(inverters) > 1:
             raise UsageError(f"--keys: agents of one process have one certificate; start that of {inverters[1]} alone")
-        where = address(run, connect, Access(keys=keys, insecure=insecure), ("agent",), inverters[0])
+        where = address(run, connect, access := Access(keys=keys, insecure=insecure), ("agent",), inverters[0])
         for text in listen or ():
-            if wrong := objection(
-                "--listen", check_endpoint("--listen", text), keys=keys is not None, insecure=insecure
-            ):
-                raise UsageError(wrong)
+            check_open("--listen", check_endpoint("--listen", text), access)
         check_wait(wait)
         watch_readers(quits=False)
-        listening = tuple(free_endpoint(check_endpoint("--listen", text), option="--listen") for text in listen or ())
+        listening = tuple(free_endpoint(text, option="--listen") for text in listen or ())
         _finish(agent_here(where, tuple(inverters), listening or None, wait, trusts=own_code))
 
 

@@ -7,7 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, PASSED, Dask, fail, refuse, require, terminal
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    PASSED,
+    Dask,
+    exit_code,
+    fail,
+    interruptible,
+    refuse,
+    require,
+    terminal,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -81,8 +93,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
     again : sequence of str
         Words of the command that goes on with what was interrupted.
     """
-    from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.remaining import BASIS_RUNS, remaining
+    from gridpeers.cli.progress import remaining
     from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
     from gridpeers.scenarios.sweep.study import SweepFolder, study
     from gridpeers.scenarios.sweep.workers import WorkersError, cores
@@ -93,7 +104,7 @@ def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again
         with interruptible(), SweepFolder(path, plan) as folder:
             console.print(_size(file, plan, len(folder.done)), soft_wrap=True)
             try:
-                with remaining(console, size := len(plan.runs), BASIS_RUNS) as tell:
+                with remaining(console, size := len(plan.runs)) as tell:
 
                     def note(done: int) -> None:
                         tell(f"{plan.name}, {done} of {size} runs", done)

@@ -8,7 +8,18 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import gridpeers as gp
-from gridpeers.cli.usage import BAD_INPUT, BROKEN, CLAIM_FAILED, Dask, check_choice, fail, refuse, require, terminal
+from gridpeers.cli.usage import (
+    BAD_INPUT,
+    BROKEN,
+    CLAIM_FAILED,
+    Dask,
+    check_choice,
+    ended_by_signals,
+    fail,
+    refuse,
+    require,
+    terminal,
+)
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -89,7 +100,6 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, ag
 
 def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
     """Run every case of the scenario in this process, and draw."""
-    from gridpeers.cli.interruption import ended_by_signals
     from gridpeers.cli.progress import progress
     from gridpeers.output_folders import shown
     from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData

@@ -16,7 +16,9 @@ from gridpeers.cli.usage import (
     RUN,
     Dask,
     check_choice,
+    exit_code,
     fail,
+    interruptible,
     refuse,
     require,
     terminal,
@@ -65,8 +67,7 @@ def reproduce(
     require(packages | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
     from datetime import datetime
 
-    from gridpeers.cli.interruption import exit_code, interruptible
-    from gridpeers.cli.remaining import remaining
+    from gridpeers.cli.progress import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
     from gridpeers.papers.singhal2022.reproduce.report import write
     from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import gridpeers as gp
 from gridpeers.benchmarks import Findings, judge
-from gridpeers.cli.remaining import Tell
+from gridpeers.cli.progress import TellPart as Tell
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.papers.singhal2022.reproduce.parts import Part

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from gridpeers.cli import app
-from gridpeers.cli.interruption import ended_by_signals, exit_code, interruptible
+from gridpeers.cli.usage import ended_by_signals, exit_code, interruptible
 
 
 @pytest.fixture(autouse=True)

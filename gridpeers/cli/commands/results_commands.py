@@ -1,4 +1,4 @@
-"""The command `gridpeers compare`. What it needs is imported when it is used, so that help comes at once."""
+"""Commands on the folders of runs: `compare`, `metrics`. They import what they need when they are used."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require
+from gridpeers.cli.usage import BAD_INPUT, fail, refuse, require, terminal
 from gridpeers.wire.wording import printable
 
 _Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
@@ -54,7 +54,8 @@ def compare(
 def _names(first: Path, second: Path) -> tuple[str, str]:
     """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
     parts, others = ([printable(part) for part in path.resolve().parts] for path in (first, second))
-    if _is_time(parts[-1]) and _is_time(others[-1]) and parts[-2] != others[-2]:
+    of_runs = [re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", path[-1]) for path in (parts, others)]
+    if all(of_runs) and parts[-2] != others[-2]:
         return parts[-2], others[-2]
     for count in range(1, max(len(parts), len(others)) + 1):
         names = "/".join(parts[-count:]), "/".join(others[-count:])
@@ -63,6 +64,29 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
     return "first", "second"
 
 
-def _is_time(name: str) -> bool:
-    """Return whether a folder has the name of a run of `gridpeers run`: a time."""
-    return re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", name) is not None
+def metrics(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
+    ],
+    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")] = "",
+) -> None:
+    """Measure a run from its record, also one that was killed.
+
+    It shows what the report of a run shows, up to the end of the record, and says what is not measured. A run that came
+    to its end has the same numbers in its report.txt.
+
+    Exit code: 0 it was measured, 2 bad usage, no record, or nothing in it that can be measured.
+
+    Example:  gridpeers metrics runs/islanding/latest/IV
+    """
+    require({"mcap": "the record of a run"})
+
+    from gridpeers.scenarios.record.record_metrics import report_of
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.report import show
+
+    try:
+        report = report_of(RunRecord.open(run, case))
+    except RecordFileError as error:
+        fail([str(error)], BAD_INPUT)
+    show(report, terminal())
