@@ -56,11 +56,7 @@ def test_a_campaign_of_chaos_gives_the_runs_of_this_machine(scheduler: str, tmp_
     assert rows("there", scheduler) == rows("here", "")
 
 
-@pytest.mark.parametrize("words", [
-    ("experiment", "topology"),
-    ("reproduce", "--only", "topology", "--driver", "inprocess"),
-    ("chaos", "small.toml"),
-])  # fmt: skip
+@pytest.mark.parametrize("words", [("experiment", "topology"), ("chaos", "small.toml")])
 def test_no_scheduler_at_the_address_is_told(
     words: tuple[str, ...], elsewhere: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

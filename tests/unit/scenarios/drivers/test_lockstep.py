@@ -46,7 +46,7 @@ def test_a_run_goes_to_its_end() -> None:
     assert rows[-1][1] == pytest.approx(60.0, abs=1e-3)
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(SEEDS, st.sampled_from(["full", "none", "GFM-only", "clustered", "ring"]))
 def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     """The rows are the same to the last bit in any order of delivery, and nothing stalls."""
@@ -59,7 +59,7 @@ def test_who_is_faster_changes_nothing(seed: int, graph: GraphRule) -> None:
     assert not run.plant.rejects.counts
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(SEEDS, st.integers(0, 19), st.sampled_from(["full", "ring", "clustered"]))
 def test_the_run_survives_any_death_at_any_moment(seed: int, steps: int, graph: GraphRule) -> None:
     """An agent that dies once ticks have begun is taken off the roster, which is said; the others go on to the end."""
