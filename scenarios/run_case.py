@@ -28,20 +28,12 @@ if TYPE_CHECKING:
     from gridpeers.plant.plant_interface import PlantLike
 
 _AFTER_RUN = (
-    *(
-        "gridpeers.scenarios.results.event_windows",
-        "gridpeers.scenarios.results.findings",
-        "gridpeers.scenarios.results.evaluation.claims",
-    ),
-    *(
-        "gridpeers.scenarios.results.report",
-        "gridpeers.scenarios.results.plots.drawing",
-        "gridpeers.scenarios.checks.judging",
-    ),
-    *("gridpeers.scenarios.checks.physics.balance_check", "gridpeers.scenarios.checks.communication.record_content"),
+    *("results.event_windows", "results.findings", "results.evaluation.claims", "results.report"),
+    *("results.plots.drawing", "checks.judging", "checks.physics.balance_check"),
+    "checks.communication.record_content",
 )
-"""Modules that are used after a run, with numpy and scipy, and imported while it goes on: this process has little to do
-then."""
+"""Modules of `gridpeers.scenarios` that are used after a run, with numpy and scipy, and imported while it goes on: this
+process has little to do then."""
 
 
 def run_case(
@@ -67,7 +59,7 @@ def run_case(
                 ahead = False
                 prepare_figures()
                 for module in _AFTER_RUN:
-                    import_module(module)
+                    import_module(f"gridpeers.scenarios.{module}")
             recorder(telemetry)
             progress(case, recorder.ended, time.end_s)
 
@@ -77,19 +69,12 @@ def run_case(
                 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 
                 ready = None if plant_at_rest is None else plant_at_rest(plant)
-                outcome = run_inprocess(plant, agents, note, on_links=recorder, on_journal=recorder, plant=ready)
+                outcome = run_inprocess(plant, agents, note, on_other=recorder, plant=ready)
             else:
                 from gridpeers.scenarios.drivers.process_driver import run_processes
 
-                outcome = run_processes(
-                    plant,
-                    agents,
-                    request.folder / "log" / case,
-                    note,
-                    on_links=recorder,
-                    on_journal=recorder,
-                    shared=request.processes,
-                )
+                logs = request.folder / "log" / case
+                outcome = run_processes(plant, agents, logs, note, on_other=recorder, shared=request.processes)
             if outcome.broke:
                 stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
                 raise (LawStopError if stopped else BrokenRunError)(f"case {case}: {outcome.broke}")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from gridpeers.scenarios.results.metrics_file import RunMetrics
-from gridpeers.wire.messages import Pacing, PlantEvent
+from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Pacing, PlantEvent
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -16,7 +16,7 @@ class Outcome:
     """The outcome of a run. Its rows went to the callback as they came."""
 
     broke: str
-    """Why the run broke, with the last log lines of the process that broke it; "" if it reached its end."""
+    """With the last log lines of the process that broke it; "" if the run reached its end."""
     reproducible: bool
     """False once something unscripted (a dead agent) has entered the run."""
     events: tuple[PlantEvent, ...]
@@ -36,6 +36,9 @@ class Outcome:
 SPEEDS = (0.1, 50.0)
 """Least and greatest useful speed (s of run time per s of wall time), of a live run or of a scenario."""
 
+
+Other = LinkReport | Journal | LinkRequest
+"""What a driver gives its recorder beside telemetry, if the configurations ask for it."""
 
 Driver = Literal["processes", "inprocess"]
 """Driver of a case: one process per agent over Zenoh, or all in this process."""

@@ -28,7 +28,7 @@ from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
 from gridpeers.scenarios.emulation.emulated_links import links_of
-from gridpeers.scenarios.run_request import Outcome
+from gridpeers.scenarios.run_request import Other, Outcome
 from gridpeers.wire.codec import decode
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, Nameplate, PlantEvent, Telemetry
 from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish
@@ -46,17 +46,17 @@ def run_direct(
     laws: Sequence[Law],
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
-    on_journal: Callable[[Journal], None] = lambda journal: None,
+    on_other: Callable[[Other], None],
 ) -> DirectPlant:
     """Run to the end from a plant at t = 0; return the plant's core."""
-    core = DirectPlant(config, plant, on_telemetry, on_journal)
+    core = DirectPlant(config, plant, on_telemetry, on_other)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
     group = AgentGroup([agents[i] for i in order], [laws[i] for i in order])
     while not core.finished:
         core.end_tick(group.tick(core.begin_tick()))
         for journal in group.take_journals():
-            on_journal(journal)
+            on_other(journal)
         core.take_actions()  # words to agents, who are not there to hear them
     return core
 
@@ -83,15 +83,14 @@ class InprocessBus:
         plant: LockstepPlant,
         agents: Iterable[LockstepAgent],
         on_telemetry: Callable[[Telemetry], None],
-        on_links: Callable[[LinkReport], None],
-        on_journal: Callable[[Journal], None],
+        on_other: Callable[[Other], None],
         newcomer: Callable[[str], LockstepAgent],
         known: KnownAgents,
     ) -> None:
         self._plant, self._agents = plant, list(agents)
         self._newcomer, self._known = newcomer, known
         self._awaited: list[str] = []
-        self._on_telemetry, self._on_links, self._on_journal = on_telemetry, on_links, on_journal
+        self._on_telemetry, self._on_other = on_telemetry, on_other
         self._subscribers: defaultdict[str, list[_Node]] = defaultdict(list)
         self._telemetry = plant.keys.telemetry
         self._nameplates: dict[str, bytes] = {}
@@ -103,7 +102,6 @@ class InprocessBus:
         plant = self._plant
         plant.start(0.0)
         for agent in self._agents:
-            agent.start(0.0)
             self._start(agent)
         while not plant.finished:
             self._do(plant, plant.take_actions())
@@ -114,22 +112,18 @@ class InprocessBus:
                     if actions := to.take_actions():
                         self._do(to, actions)
             self._end_the_stopped()
-            self._start_the_awaited()
+            awaited, self._awaited = self._awaited, []
+            for name in awaited:
+                self._agents.append(self._newcomer(name))
+                self._start(self._agents[-1])
             if not (plant.finished or plant.work(0.0) or self._queue):
                 missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:SHOWN])
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
         self._do(plant, plant.take_actions())
 
-    def _start_the_awaited(self) -> None:
-        awaited, self._awaited = self._awaited, []
-        for name in awaited:
-            agent = self._newcomer(name)
-            self._agents.append(agent)
-            agent.start(0.0)
-            self._start(agent)
-
     def _start(self, agent: LockstepAgent) -> None:
-        """Let an agent and the plant see each other, and introduce it to all agents at once."""
+        """Start an agent: it and the plant see each other, and it is introduced to all agents at once."""
+        agent.start(0.0)
         name = agent.token
         for key in agent.subscriptions:
             self._subscribers[key].append(agent)
@@ -159,10 +153,8 @@ class InprocessBus:
                     if isinstance(message, Telemetry):
                         self._awaited += message.awaited
                         self._on_telemetry(message)
-                    elif isinstance(message, LinkReport):
-                        self._on_links(message)
-                    elif isinstance(message, Journal):
-                        self._on_journal(message)
+                    elif isinstance(message, LinkReport | Journal):
+                        self._on_other(message)
             elif isinstance(action, Fetch):
                 if action.key in self._nameplates:
                     self._queue.append(((side,), action.key, self._nameplates[action.key]))
@@ -189,8 +181,7 @@ def run_inprocess(
     agent_configs: Iterable[AgentConfig],
     on_telemetry: Callable[[Telemetry], None],
     *,
-    on_links: Callable[[LinkReport], None] = lambda report: None,
-    on_journal: Callable[[Journal], None] = lambda journal: None,
+    on_other: Callable[[Other], None] = lambda message: None,
     plant: PlantLike | None = None,
     messages: bool = False,
 ) -> Outcome:
@@ -220,7 +211,9 @@ def run_inprocess(
             try:
                 plant = start_plant(plant_config)
             except RuntimeError as error:
-                return _not_started(f"plant: cannot start: {error}", perf_counter() - began)
+                why = f"plant: cannot start: {error}"
+                spent = perf_counter() - began
+                return Outcome(broke=why, reproducible=False, events=(), notes=(), ticks=0, start_s=spent, run_s=0.0)
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
         stack.enter_context(_all_so_far_stays())
@@ -228,11 +221,10 @@ def run_inprocess(
         agents: list[LockstepAgent] = []
         side: LockstepPlant
         if messages or messages_decide(plant_config, tuple(known.values())):
-            side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_links, on_journal)
+            side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
         else:
-            for config in known.values():
-                laws.append(make_law(config.control))
-            side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_journal)
+            laws += [make_law(config.control) for config in known.values()]
+            side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     for node in (side, *agents):
@@ -273,8 +265,7 @@ def _run_on_bus(
     agents: list[LockstepAgent],
     plant: PlantLike,
     on_telemetry: Callable[[Telemetry], None],
-    on_links: Callable[[LinkReport], None],
-    on_journal: Callable[[Journal], None],
+    on_other: Callable[[Other], None],
 ) -> LockstepPlant:
     """Run with messages; return the plant's core, and add the agents' cores and their laws to the lists."""
     side = LockstepPlant(plant_config, plant, links_of(PLANT, plant_config.links))
@@ -295,9 +286,5 @@ def _run_on_bus(
         agents.append(agent_of(known[name], f"p{len(known) + len(agents)}"))
         return agents[-1]
 
-    InprocessBus(side, agents, on_telemetry, on_links, on_journal, newcomer, known_agents).run()
+    InprocessBus(side, agents, on_telemetry, on_other, newcomer, known_agents).run()
     return side
-
-
-def _not_started(reason: str, start_s: float) -> Outcome:
-    return Outcome(broke=reason, reproducible=False, events=(), notes=(), ticks=0, start_s=start_s, run_s=0.0)

@@ -20,8 +20,8 @@ from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.drivers.supervisor import Supervisor
 from gridpeers.scenarios.drivers.telemetry_client import LOOK, RECORDER, TelemetryClient, with_recorder
 from gridpeers.scenarios.drivers.telemetry_stream import Recordable
-from gridpeers.scenarios.run_request import Outcome
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
+from gridpeers.scenarios.run_request import Other, Outcome
+from gridpeers.wire.messages import PLANT, PlantEvent, Telemetry
 
 BUILD_DEADLINE = 600.0
 """Longest time (s) until the plant is ready; compiling the step at the very first start takes up to a minute."""
@@ -33,13 +33,10 @@ AFTERMATH = 0.3
 """The same when the run broke: processes that die of it do so in this time, the others are ended."""
 
 LAST_TELEMETRY = 2.0
-"""Longest time (s) for which the last telemetry of a plant may come after its process has ended in order: on a busy
-machine the news of its end are faster."""
+"""Longest time (s) for which the last telemetry of a plant may come after its process has ended in order."""
 
 STOOD_STILL = 1.0
 """Time (s) by which a wait may be longer than asked for before this process counts as having stood still itself."""
-
-_EXIT, _WORD = "exit/", "word/"
 
 
 def run_processes(
@@ -50,8 +47,7 @@ def run_processes(
     *,
     start_order: Sequence[str] | None = None,
     on_start: Callable[[Children], None] | None = None,
-    on_links: Callable[[LinkReport], None] = lambda report: None,
-    on_journal: Callable[[Journal | LinkRequest], None] = lambda message: None,
+    on_other: Callable[[Other], None] = lambda message: None,
     plant_command: Sequence[str] = (),
     shared: int = 0,
     star: bool = True,
@@ -75,12 +71,12 @@ def run_processes(
         own["listen"] = ("tls/127.0.0.1:0",)
     configs = [replace(config, **own) for config in agents.values()]
     plant_config = replace(with_recorder(plant_config), listen=(endpoint,), star=star)
-    first = [name for name in agents if name in plant_config.agents]
-    order = list(start_order) if start_order is not None else [PLANT, *first]
-    if sorted(order) != sorted([PLANT, *first]):
+    first = [PLANT, *(name for name in agents if name in plant_config.agents)]
+    order = first if start_order is None else list(start_order)
+    if sorted(order) != sorted(first):
         raise ValueError(f"start_order: must name {PLANT} and every agent once, got {', '.join(order)}")
     log_dir.mkdir(parents=True, exist_ok=True)
-    driver = _ProcessDriver(plant_config, on_telemetry, on_links, on_journal)
+    driver = _ProcessDriver(plant_config, on_telemetry, on_other)
     try:
         with Supervisor(
             plant_config, configs, log_dir, driver.on_exit, driver.on_word, plant_command, shared=shared
@@ -89,9 +85,8 @@ def run_processes(
             if on_start is not None:
                 on_start(supervisor.children)
             driver.run(supervisor)
-            driver.acknowledge_end(supervisor)
             driver.client.close()  # with it goes the recorder's token: the plant knows that the last telemetry is here
-            supervisor.children.wait(AFTERMATH if driver.broke else LEAVING)
+            supervisor.children.wait(driver.patience)
             driver.note_failures(supervisor)
         return driver.outcome()
     finally:
@@ -102,23 +97,19 @@ class _ProcessDriver:
     """Follow a run from its telemetry and the exits of its processes, until it ends or cannot go on."""
 
     def __init__(
-        self,
-        config: PlantConfig,
-        on_telemetry: Callable[[Telemetry], None],
-        on_links: Callable[[LinkReport], None],
-        on_journal: Callable[[Journal | LinkRequest], None],
+        self, config: PlantConfig, on_telemetry: Callable[[Telemetry], None], on_other: Callable[[Other], None]
     ) -> None:
         self.client = TelemetryClient(
             RECORDER, config.run, config.listen[0], config.clock, self._take, config.credentials
         )
-        self.broke = ""
+        self._broke = ""
         """Why the run broke; "" after a good end."""
         self._T_c, self._wall = config.T_c, config.clock == "wall"
         self._plant_deadline = 1.5 * config.deadline + 1.0
         """Longer than the plant's own (s): the plant reports better what is wrong, unless it is the cause itself."""
         if self._wall:
             self._plant_deadline += config.wait_for_agents + 2.0 * config.T_c / config.speed
-        self._on_telemetry, self._on_links, self._on_journal = on_telemetry, on_links, on_journal
+        self._on_telemetry, self._on_other = on_telemetry, on_other
         self._began = self._ended_at = monotonic()
         self._started: float | None = None
         self._plant_ready = self._ended = False
@@ -130,11 +121,17 @@ class _ProcessDriver:
 
     def on_exit(self, child: Child) -> None:
         """Note that a process has ended; from any thread."""
-        self.client.say(f"{_EXIT}{child.pid}")
+        self.client.say(str(child.pid))
 
     def on_word(self, word: str) -> None:
         """Note a word of the starting plant; from any thread."""
-        self.client.say(_WORD + word)
+        if word == READY:
+            self.client.say(READY)
+
+    @property
+    def patience(self) -> float:
+        """Time (s) that processes have to leave by themselves once the run has ended."""
+        return AFTERMATH if self._broke else LEAVING
 
     def run(self, supervisor: Supervisor) -> None:
         """Take in everything until the last telemetry, or until the run cannot go on."""
@@ -151,7 +148,10 @@ class _ProcessDriver:
                 report = supervisor.children[PLANT].report(self._when)
                 self._end(f"nothing was heard of the plant for {deadline:g} s, so the run was ended: {report}")
             for word in words:
-                self._take_word(word, supervisor)
+                if word == READY:
+                    self._plant_ready = True
+                elif not self._ended:
+                    self._note_exit(next(one for one in supervisor.children if str(one.pid) == word), supervisor)
             if client.progress is not None:
                 supervisor.note_time(*client.progress)
             if self._plant_left is not None and not self._ended and now - self._plant_left > LAST_TELEMETRY:
@@ -161,37 +161,24 @@ class _ProcessDriver:
                 self._awaited.clear()
                 supervisor.work()
         supervisor.end_faults()
-
-    def acknowledge_end(self, supervisor: Supervisor) -> None:
-        """In simulated time acknowledge the last telemetry until the plant has left."""
-        until = monotonic() + (AFTERMATH if self.broke else LEAVING)
+        until = monotonic() + self.patience
+        # in simulated time the plant leaves once its last telemetry is acknowledged
         while not self._wall and supervisor.children[PLANT].status is None and (left := until - monotonic()) > 0.0:
-            self.client.take(left)
+            client.take(left)
 
     def _take(self, message: Recordable) -> None:
-        if isinstance(message, LinkReport):
-            self._on_links(message)
-        elif isinstance(message, Journal | LinkRequest):
-            self._on_journal(message)
-        elif isinstance(message, Telemetry):
-            if self._started is None:
-                self._started = monotonic()
-            self._events += message.events
-            self._awaited += message.awaited
-            self._on_telemetry(message)
-            if message.final:
-                self._end(message.outcome)
-
-    def _take_word(self, word: str, supervisor: Supervisor) -> None:
-        if word.startswith(_EXIT):
-            pid = word.removeprefix(_EXIT)
-            self._note_exit(next(child for child in supervisor.children if str(child.pid) == pid), supervisor)
+        if not isinstance(message, Telemetry):
+            self._on_other(message)
             return
-        self._plant_ready = self._plant_ready or word.removeprefix(_WORD) == READY
+        if self._started is None:
+            self._started = monotonic()
+        self._events += message.events
+        self._awaited += message.awaited
+        self._on_telemetry(message)
+        if message.final:
+            self._end(message.outcome)
 
     def _note_exit(self, child: Child, supervisor: Supervisor) -> None:
-        if self._ended:
-            return
         begun = self.client.latest is not None
         if child.name == PLANT and child.status == 0 and begun:
             self._plant_left = monotonic()
@@ -205,7 +192,7 @@ class _ProcessDriver:
 
     def _end(self, reason: str) -> None:
         """Note the end of the run; without a reason it is a good one."""
-        self.broke, self._ended, self._ended_at = reason, True, monotonic()
+        self._broke, self._ended, self._ended_at = reason, True, monotonic()
 
     @property
     def _when(self) -> str:
@@ -219,9 +206,9 @@ class _ProcessDriver:
         unscripted = self.client.latest is not None and not self.client.latest.reproducible and not self._wall
         died = {event.subject: event.t for event in self._events if event.kind == "roster" and unscripted}
         for child in supervisor.children:
-            known = child.name in self._notes or child.name == PLANT or (self.broke and child.status is None)
-            if child.crashed and child.name in died and not self.broke:
-                self.broke = child.report(f"at t = {died[child.name]:g} s")
+            known = child.name in self._notes or child.name == PLANT or (self._broke and child.status is None)
+            if child.crashed and child.name in died and not self._broke:
+                self._broke = child.report(f"at t = {died[child.name]:g} s")
             elif supervisor.failed(child) and not known:
                 self._notes[child.name] = child.report(self._when)
 
@@ -229,8 +216,8 @@ class _ProcessDriver:
         """Return how the run ended, once all processes have."""
         last, started = self.client.latest, self._started or monotonic()
         return Outcome(
-            broke=self.broke,
-            reproducible=last is not None and last.reproducible and not self.broke,
+            broke=self._broke,
+            reproducible=last is not None and last.reproducible and not self._broke,
             events=tuple(self._events),
             notes=(*self._notes.values(), *self.client.rejects.take_lines()),
             ticks=round(self.client.t / self._T_c),

@@ -25,11 +25,11 @@ from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_o
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole
-from gridpeers.scenarios.run_request import Progress
+from gridpeers.scenarios.run_request import Other, Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
-from gridpeers.wire.messages import LinkReport, Telemetry
+from gridpeers.wire.messages import Telemetry
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,7 +92,7 @@ def _both(
     run = _in_simulated_time if record.info.simulated else _in_real_time
     with Recorder(would_be / rule.case, gaps=True) as recorder:
 
-        def take(message: Telemetry | LinkReport) -> None:
+        def take(message: Telemetry | Other) -> None:
             rows.take(message)
             effect.take(message)
             recorder(message)
@@ -110,7 +110,7 @@ def _both(
     return CounterfactualRun(difference=rows.difference, compared=rows.count, t_end=recorded.ended, notes=tuple(notes))
 
 
-Take = Callable[[Telemetry | LinkReport], None]
+Take = Callable[[Telemetry | Other], None]
 
 
 def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
@@ -130,7 +130,7 @@ def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take, make_pl
             replace(info.plant, record="physics", **links),
             [replace(agent, record="physics", **links, **control) for agent in info.agents],
             take,
-            on_links=take,
+            on_other=take,
             plant=plant,
         )
     except ValueError as error:

@@ -99,7 +99,7 @@ def _run(number: int, scenario: ScenarioModel, case: str) -> tuple[SweepRow, His
     plant, agents = configs(scenario, feeder, case)
     recorder = Recorder()
     ready = plant_at_start(plant) if plant.settings.simulator == "gridpeers" else None
-    outcome = run_inprocess(plant, agents, recorder, plant=ready, on_links=recorder)
+    outcome = run_inprocess(plant, agents, recorder, plant=ready, on_other=recorder)
     if outcome.broke:
         stopped = ended_by_a_law(plant.on_law_failure, outcome.events)
         return SweepRow(number=number, status="law failed" if stopped else "broke", why=outcome.broke), None

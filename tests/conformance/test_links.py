@@ -89,9 +89,9 @@ def run(path: Path, *, processes: bool) -> Ran:
     plant, agents = configs(scenario, feeder, case, "tcp/127.0.0.1:0" if processes else "")
     if processes:
         logs = path.parent / "log"
-        outcome = run_processes(plant, agents, logs, lambda told: rows.extend(told.rows), on_links=links)
+        outcome = run_processes(plant, agents, logs, lambda told: rows.extend(told.rows), on_other=links)  # type: ignore[arg-type]
     else:
-        outcome = run_inprocess(plant, agents, lambda told: rows.extend(told.rows), on_links=links)
+        outcome = run_inprocess(plant, agents, lambda told: rows.extend(told.rows), on_other=links)  # type: ignore[arg-type]
     assert outcome.broke == ""
     return Ran(outcome, rows, links)
 

@@ -46,9 +46,9 @@ def recorded_run(
     with Recorder(folder, record=info) as recorder:
         if processes:
             logs = folder / "log"
-            outcome = run_processes(plant, agents, logs, recorder, on_links=recorder, on_journal=recorder, shared=3)
+            outcome = run_processes(plant, agents, logs, recorder, on_other=recorder, shared=3)
         else:
-            outcome = run_inprocess(plant, agents, recorder, on_links=recorder, on_journal=recorder, messages=messages)
+            outcome = run_inprocess(plant, agents, recorder, on_other=recorder, messages=messages)
         assert outcome.broke == ""
         recorder.finish(model.time.end_s, model.time.record_s)
     assert recorder.record_failure == ""

@@ -27,7 +27,7 @@ def hash_of(name: str, case: str) -> str:
     plant, agents = configs(scenario, feeder, case, local_endpoint(0))
     recorder = Recorder()
     with tempfile.TemporaryDirectory() as folder:
-        outcome = run_processes(plant, agents, Path(folder), recorder, on_links=recorder)
+        outcome = run_processes(plant, agents, Path(folder), recorder, on_other=recorder)
     return outcome.broke or recorder.finish(scenario.time.end_s, plant.record_step).sha256
 
 

@@ -55,7 +55,7 @@ def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTr
     plant, agents = toy_configs(4, end=end)
     plant = replace(plant, links=told.to_tree())
     agents = tuple(replace(agent, links=told.to_tree()) for agent in agents)
-    outcome = run_inprocess(plant, agents, lambda telemetry: None, on_links=links, plant=ToyPlant(plant))
+    outcome = run_inprocess(plant, agents, lambda telemetry: None, on_other=links, plant=ToyPlant(plant))  # type: ignore[arg-type]  # there are no journals
     assert outcome.broke == ""
     return links.by_link()
 
@@ -154,7 +154,7 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
         ProcessRun(replace(plant, **wall), [replace(agent, **wall) for agent in agents], tmp_path),
         LinkRecord(),
     )
-    outcome = run(on_links=links)
+    outcome = run(on_other=links)
     calm = simulated(setup(links=faults), 3.0)
 
     assert (outcome.broke, outcome.notes) == ("", ())

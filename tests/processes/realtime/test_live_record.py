@@ -51,7 +51,7 @@ def recorded(
             recorder(telemetry)
 
         outcome = run_processes(
-            plant, agents, folder / "log", note, on_links=recorder, on_journal=recorder, plant_command=TOY
+            plant, agents, folder / "log", note, on_other=recorder, plant_command=TOY
         )
         assert outcome.broke == ""
         recorder.finish(recorder.ended, recorder.record_step)

@@ -41,7 +41,7 @@ def test_the_files_of_a_run_have_about_the_size_that_was_told(tmp_path: Path) ->
     scenario = ISLANDING.replace(changes)
     plant, agents = configs(scenario.spec, scenario.feeder, "IV")
     with Recorder(tmp_path / "IV") as recorder:
-        run_inprocess(plant, agents, recorder, on_links=recorder)
+        run_inprocess(plant, agents, recorder, on_other=recorder)
         recorder.finish(1.0, scenario.spec.time.record_s)
 
     forecast = file_sizes(with_cases(scenario.spec, ["IV"]), scenario.feeder)
