@@ -9,7 +9,6 @@ from time import monotonic
 
 import msgspec
 
-from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.emulation.link_data import decode_statuses
 from gridpeers.scenarios.live.feeder_map import read_feeder_map
 from gridpeers.scenarios.live.run_client import RunClient
@@ -17,7 +16,7 @@ from gridpeers.scenarios.live.run_monitor import PlantStatus
 from gridpeers.scenarios.live.watching import RunSubscriber
 from gridpeers.viewer.run_view import Cursor, Frame, RunView
 from gridpeers.wire.codec import encode
-from gridpeers.wire.messages import AgentStatus, Answer, Command, LinkAcknowledgement, Telemetry
+from gridpeers.wire.messages import Answer, Command, LinkAcknowledgement
 
 PAUSE = 0.1
 """Longest wait (s) for a message; then the page is looked after."""
@@ -74,7 +73,7 @@ class RunFollower:
             return None if self._view.feeder_map is None else msgspec.Raw(msgspec.json.encode(self._view.feeder_map))
 
     def _follow(self) -> None:
-        subscriber = RunSubscriber(self._client, _Locked(self._view, self._lock), self._take_other)
+        subscriber = RunSubscriber(self._client, self._view, self._take_other, self._lock)
         while not self._ending.is_set():
             heard = subscriber.take(PAUSE)
             now = monotonic()
@@ -124,30 +123,6 @@ class RunFollower:
             elif isinstance(message, LinkAcknowledgement) and message.ok and message.data:
                 self._view.accounts(message.sender, decode_statuses(message.data))
         self._on_news()
-
-
-class _Locked:
-    """The view as the subscriber feeds it, while pages read it in another thread."""
-
-    def __init__(self, view: RunView, lock: threading.Lock) -> None:
-        self._view, self._lock = view, lock
-
-    @property
-    def inverters(self) -> tuple[str, ...]:
-        with self._lock:
-            return self._view.inverters
-
-    def config(self, config: AgentConfig) -> None:
-        with self._lock:
-            self._view.config(config)
-
-    def telemetry(self, message: Telemetry, now: float) -> None:
-        with self._lock:
-            self._view.telemetry(message, now)
-
-    def status(self, message: AgentStatus, now: float) -> None:
-        with self._lock:
-            self._view.status(message, now)
 
 
 def _nothing() -> None:

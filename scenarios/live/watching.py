@@ -6,10 +6,10 @@ import os
 import select
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from time import monotonic
-from typing import Protocol
+from typing import Any, Protocol
 
 from rich.console import Console, Group
 from rich.live import Live
@@ -143,34 +143,30 @@ class TakesMessages(Protocol):
     """The part of a `RunMonitor` that takes messages; the page's view has it too."""
 
     @property
-    def inverters(self) -> tuple[str, ...]:
-        """Names of all inverters in the messages so far."""
-        ...
-
-    def config(self, config: AgentConfig) -> None:
-        """Take the configuration of an agent."""
-        ...
-
-    def telemetry(self, message: Telemetry, now: float) -> None:
-        """Take the plant's telemetry."""
-        ...
-
-    def status(self, message: AgentStatus, now: float) -> None:
-        """Take the status of an agent."""
-        ...
+    def inverters(self) -> tuple[str, ...]: ...
+    def config(self, config: AgentConfig) -> None: ...
+    def telemetry(self, message: Telemetry, now: float) -> None: ...
+    def status(self, message: AgentStatus, now: float) -> None: ...
 
 
 def leave_out(key: str, payload: bytes) -> None:
     """Leave out what is neither telemetry nor the status or configuration of an agent."""
 
 
+_NO_LOCK = nullcontext()
+
+
 class RunSubscriber:
-    """Feed the messages of a run into a monitor; `on_other` takes key and payload of every other message."""
+    """Feed the messages of a run into a monitor, under a lock if there is one; `on_other` takes all other messages."""
 
     def __init__(
-        self, client: RunClient, monitor: TakesMessages, on_other: Callable[[str, bytes], None] = leave_out
+        self,
+        client: RunClient,
+        monitor: TakesMessages,
+        on_other: Callable[[str, bytes], None] = leave_out,
+        lock: AbstractContextManager[Any] = _NO_LOCK,
     ) -> None:
-        self._client, self._monitor, self._on_other = client, monitor, on_other
+        self._client, self._monitor, self._on_other, self._lock = client, monitor, on_other, lock
         self._subscribed: set[str] = set()
         self._plant = client.plant
         self._heard_at: dict[str, float] = {}
@@ -197,14 +193,17 @@ class RunSubscriber:
         for key, payload, at in self._client.take(seconds):
             config = read_config(payload)
             if config is not None:
-                self._monitor.config(config)
+                with self._lock:
+                    self._monitor.config(config)
                 self._configured.add(config.name)
                 continue
             message = self._client.read(key, payload)
             if isinstance(message, Telemetry):
-                self._monitor.telemetry(message, at)
+                with self._lock:
+                    self._monitor.telemetry(message, at)
             elif isinstance(message, AgentStatus):
-                self._monitor.status(message, at)
+                with self._lock:
+                    self._monitor.status(message, at)
                 self._used[message.sender] = message.used
             else:
                 self._on_other(key, payload)
@@ -216,9 +215,11 @@ class RunSubscriber:
             self._configured.clear()
             self._ask_at = now
         self._plant = self._client.plant
-        if self._plant and not self._configured.issuperset(self._monitor.inverters):
+        with self._lock:
+            inverters = self._monitor.inverters
+        if self._plant and not self._configured.issuperset(inverters):
             self._ask_for_configs(now)
-        for name in self._monitor.inverters:
+        for name in inverters:
             self._listen_to(name)
         for name in self._client.present:  # anybody may hold tokens of any names
             if len(self._subscribed) < MOST_INVERTERS:
