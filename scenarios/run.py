@@ -5,12 +5,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import traceback
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import ExitStack
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 import msgspec
@@ -54,34 +52,21 @@ def _logged(request: Request, progress: Progress) -> RunReport:
     """Run all cases; what breaks them is in the log, an error of the program with its traceback."""
     file = request.folder / "log" / "run.log"
     file.parent.mkdir()
-    try:
-        with file.open("w", encoding="utf-8", errors="backslashreplace") as log:
-            try:
-                return _run(request, progress, log)
-            except (BrokenRunError, OutputLostError) as error:
-                print(f"broken: {error}", file=log)
+    with file.open("w", encoding="utf-8", errors="backslashreplace") as log:
+        try:
+            return _run(request, progress, log)
+        except (BrokenRunError, OutputLostError) as error:
+            print(f"broken: {error}", file=log)
+            raise
+        except Exception as error:
+            if no_room(error) or not file.exists():  # the folder is gone, and with it this log
                 raise
-            except Exception as error:
-                if no_room(error) or not file.exists():  # the folder is gone, and with it this log
-                    raise
-                traceback.print_exc(file=log)
-                if why := too_few_files(error):
-                    raise BrokenRunError(why) from error
-                if isinstance(error, ImportError):
-                    raise BrokenRunError(not_importable(error)) from error
-                raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
-    except OSError as error:
-        _log_no_room(file, f"broken: {refusal(request.folder, error)}\n")
-        raise
-
-
-def _log_no_room(file: Path, line: str) -> None:
-    """Add a line to a log whose disk is full, if there is room for it; an empty log is not left behind."""
-    with contextlib.suppress(OSError):
-        with contextlib.suppress(OSError), file.open("a", encoding="utf-8", errors="backslashreplace") as log:
-            log.write(line)
-        if not file.stat().st_size:
-            file.unlink()
+            traceback.print_exc(file=log)
+            if why := too_few_files(error):
+                raise BrokenRunError(why) from error
+            if isinstance(error, ImportError):
+                raise BrokenRunError(not_importable(error)) from error
+            raise BrokenRunError(f"{type(error).__name__}: {error} (traceback in {shown(file)})") from error
 
 
 def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
@@ -126,7 +111,9 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
             labels = [window.label for window in one.disturbed]
             unlike = {"disturbed": labels, "departures": one.lines()} if one.events else {}
             notes += [f"case {case}: {one.note}"] if one.note else []
-        notes += [f"case {case}: {note}" for note in _of_laws(cases[case].messages_saved)]
+        if saved := cases[case].messages_saved:
+            shares = ", ".join(f"{100.0 * share:.0f} % in {window}" for window, share in saved.items())
+            notes.append(f"case {case}: states not told to neighbours: {shares}")
         facts[case] = case_facts(record, pacing.get(case), **unlike)
     write_whole(folder / "metrics.json", metrics_json(request, findings, facts))
     stop = JudgingStop()
@@ -165,12 +152,6 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     return report
 
 
-def _of_laws(saved: Mapping[str, float]) -> Iterator[str]:
-    """Yield a note on the states that laws did not send, if there are any."""
-    if saved:
-        yield "states not told to neighbours: " + ", ".join(f"{100.0 * s:.0f} % in {name}" for name, s in saved.items())
-
-
 def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, Departures]:
     """Each case of a run in wall-clock time beside its scenario: what else happened, and which windows it disturbs."""
     if request.clock == "simulated":
@@ -192,11 +173,8 @@ def _compared(request: Request, recorded: Mapping[str, Recorded]) -> dict[str, D
 def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
     if clock == "wall":
         return ["in wall-clock time no two runs are the same: each has its own delays"]
-    notes = []
-    for case, record in recorded.items():
-        if not record.reproducible:
-            notes.append(f"case {case} cannot be reproduced: something happened in it that the scenario does not tell")
-    return notes
+    why = "something happened in it that the scenario does not tell"
+    return [f"case {case} cannot be reproduced: {why}" for case, one in recorded.items() if not one.reproducible]
 
 
 def _as_run(request: Request) -> dict[str, Any]:

@@ -87,14 +87,7 @@ def meaning(word: str, config: PlantConfig) -> str:
     return f"a link was refused: {printable(refused[1])}" if refused else ""
 
 
-def limited(text: str, limit: RateLimit, now: float) -> str:
-    """Return a sentence for a person, or "" of the many that a peer without access makes, as it tries for ever."""
-    return (limit.admit(text, now) or "") if text else ""
-
-
-def plant_here(
-    config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo | None = None
-) -> ProcessOutcome:
+def plant_here(config: PlantConfig, folder: Path | None, link_log: LinkLog, record: RecordInfo) -> ProcessOutcome:
     """Run the plant in this process until it is told to end."""
     requests = stop_at_signals(StoppedError)
     _log()
@@ -107,16 +100,7 @@ def plant_here(
     def run(recorder: LiveRecorder) -> str:
         return run_plant(config, make_links=links_of, on_word=on_word)
 
-    recorder = LiveRecorder(
-        config.run,
-        loopback_of(config.listen[0]),
-        say,
-        folder,
-        silent=LOGGED,
-        link_log=link_log,
-        record=record,
-        credentials=config.credentials,
-    )
+    recorder = LiveRecorder(config, say, folder, link_log, record, silent=LOGGED)
     outcome = _follow(recorder, run, requests)
     if outcome.interrupted:  # else the plant has said it
         _say_end(recorder, config)
@@ -129,7 +113,7 @@ def all_here(
     logs: Path,
     folder: Path | None,
     link_log: LinkLog,
-    record: RecordInfo | None = None,
+    record: RecordInfo,
 ) -> ProcessOutcome:
     """Run the plant and its agents, but for spare ones, as processes of their own, until the run ends."""
     requests = stop_at_signals(StoppedError)
@@ -148,7 +132,8 @@ def all_here(
     limit = RateLimit()
 
     def on_word(word: str) -> None:
-        if line := limited(meaning(word, config), limit, monotonic()):
+        text = meaning(word, config)  # a peer without access tries for ever, and each time the plant says a line
+        if text and (line := limit.admit(text, monotonic())):
             say(line)
 
     def run(recorder: LiveRecorder) -> str:
@@ -169,9 +154,7 @@ def all_here(
 
     configs = [replace(agent, connect=(endpoint,), listen=listen) for agent in agents]
     supervisor = Supervisor(config, configs, logs, on_exit, on_word)
-    recorder = LiveRecorder(
-        config.run, endpoint, say, folder, link_log=link_log, record=record, credentials=config.credentials
-    )
+    recorder = LiveRecorder(config, say, folder, link_log, record)
     outcome = _follow(recorder, run, requests)
     _say_end(recorder, config)
     return outcome

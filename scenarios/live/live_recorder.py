@@ -9,16 +9,17 @@ from pathlib import Path
 from queue import SimpleQueue
 from time import monotonic
 
+from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.scenarios.drivers.telemetry_client import RECORDER, TelemetryClient
 from gridpeers.scenarios.drivers.telemetry_stream import Recordable
 from gridpeers.scenarios.live.live_files import LinkLog
+from gridpeers.scenarios.live.run_address import loopback_of
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.wire.driver.machine import FreeLists, keep_out_of_the_heap
 from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
-from gridpeers.wire.trust.credentials import Credentials
 
 _STOP, _CRASH = "stop", "crash"
 
@@ -29,23 +30,21 @@ class LiveRecorder:
     """Say the plant's events as they come, but for `silent` kinds, and feed the `Recorder` and `LinkLog` of the run.
 
     The plant waits for it before the start and at the end, so nothing of the run is missing. Use it as a context.
-    Without a folder nothing is recorded; without `record` the folder has no run.mcap.
+    Without a folder there is no record.
     """
 
     def __init__(
         self,
-        run: str,
-        endpoint: str,
+        config: PlantConfig,
         say: Callable[[str], None],
-        folder: Path | None = None,
+        folder: Path | None,
+        link_log: LinkLog,
+        record: RecordInfo,
         *,
         silent: Collection[str] = (),
-        link_log: LinkLog | None = None,
-        record: RecordInfo | None = None,
-        credentials: Credentials | None = None,
     ) -> None:
-        self._credentials = credentials
-        self._say, self._silent, self._link_log = say, silent, link_log
+        self._config, self._say, self._silent = config, say, silent
+        self._link_log: LinkLog | None = link_log
         self._recorder = None if folder is None else Recorder(folder, gaps=True, record=record)
         self.recorded: Recorded | None = None
         """The record, once it is closed, if it is whole."""
@@ -58,14 +57,14 @@ class LiveRecorder:
         self._crashes: SimpleQueue[tuple[str, str]] = SimpleQueue()
         """Agent and end in words, one for each `_CRASH` that the thread is told."""
         self._limit = RateLimit()
-        self._run, self._endpoint = run, endpoint
         self.client: TelemetryClient
-        """Follows the run."""
         self._thread = threading.Thread(target=self._follow, daemon=True)
 
     def __enter__(self) -> LiveRecorder:
         keep_out_of_the_heap()
-        self.client = TelemetryClient(RECORDER, self._run, self._endpoint, "wall", self._take, self._credentials)
+        config = self._config
+        endpoint = loopback_of(config.listen[0])
+        self.client = TelemetryClient(RECORDER, config.run, endpoint, "wall", self._take, config.credentials)
         self._thread.start()
         return self
 
@@ -79,9 +78,13 @@ class LiveRecorder:
             try:
                 self._say_all(*self._link_log.close(self.client.t))
             except OSError as error:
-                self._fail(f"the link commands cannot be written: {error.strerror}")
+                self._fail("the link commands cannot be written", error)
         if self._recorder is not None:
-            self._finish(self._recorder)
+            try:
+                self._finish(self._recorder)
+            except (RecordError, OSError) as error:
+                self._fail("the record cannot be written", error)
+                self._abandon(self._recorder)
 
     def note_crash(self, agent: str, end: str) -> None:
         """Note that the process of an agent crashed, with how it ended in words; from any thread."""
@@ -92,28 +95,22 @@ class LiveRecorder:
         for line in lines:
             self._say(line)
 
-    def _fail(self, why: str, consequence: str = "") -> None:
-        """Say why something is not recorded, and the consequence; keep the first reason."""
-        self._say(why + consequence)
-        self.failure = self.failure or why
+    def _fail(self, what: str, why: object, consequence: str = "") -> None:
+        """Say what is not recorded, why, and the consequence; keep the first reason."""
+        text = f"{what}: {getattr(why, 'strerror', None) or why}"
+        self._say(text + consequence)
+        self.failure = self.failure or text
 
     def _finish(self, recorder: Recorder) -> None:
         """Give the files their names; those of a record that is not whole keep the partial ones."""
-        try:
-            if recorder.count < 2:
-                self._say("nothing was recorded, so there are no numbers")
-            elif not self.client.ended:
-                why = self.cut_short or "then no word came of the plant"
-                self._fail(f"the record ends at {recorder.ended:.2f} s: {why}")
-            else:
-                self.recorded = recorder.finish(recorder.ended, recorder.record_step)
-                self._say_all(*self.recorded.link_lines)
-            recorder.close()
-        except RecordError as error:
-            self._fail(str(error))
-            self._abandon(recorder)
-        except OSError as error:
-            self._fail(f"the record cannot be written: {error.strerror}")
+        if recorder.count < 2:
+            self._say("nothing was recorded, so there are no numbers")
+        elif not self.client.ended:
+            self._fail(f"the record ends at {recorder.ended:.2f} s", self.cut_short or "then no word came of the plant")
+        else:
+            self.recorded = recorder.finish(recorder.ended, recorder.record_step)
+            self._say_all(*self.recorded.link_lines)
+        recorder.close()
 
     def _abandon(self, recorder: Recorder) -> None:
         """Leave a record as it is; the reason has been said."""
@@ -134,11 +131,16 @@ class LiveRecorder:
     def _take(self, message: Recordable) -> None:
         """Say and record one message; an error in it must not end the recording of the others."""
         try:
-            if isinstance(message, LinkRequest):
-                self._take_request(message)
+            if isinstance(message, LinkRequest) and self._link_log is not None:
+                try:
+                    self._link_log(message)
+                except OSError as error:
+                    self._fail(f"the link commands end at {self.client.t:.2f} s", error, _ON)
+                    self._link_log = None
             if isinstance(message, Telemetry):
                 self._say_events(message)
-            self._record(message)
+            if self._recorder is not None:
+                self._record(self._recorder, message)
         except Exception as error:
             self.client.rejects.failed("telemetry", error)
 
@@ -151,28 +153,15 @@ class LiveRecorder:
         if telemetry.final:  # before the terminal says that the run has ended
             self._say_all(*self._limit.left_out())
 
-    def _record(self, message: Recordable) -> None:
+    def _record(self, recorder: Recorder, message: Recordable) -> None:
         """Record one message; an error in writing ends the record, not the run."""
-        recorder = self._recorder
-        if recorder is None:
-            return
         known, sound = len(recorder.missing), not recorder.record_failure
         try:
             recorder(message)
         except (RecordError, OSError) as error:
-            why = getattr(error, "strerror", None) or error
-            self._fail(f"the record ends at {recorder.ended:.2f} s: {why}", _ON)
+            self._fail(f"the record ends at {recorder.ended:.2f} s", error, _ON)
             self._abandon(recorder)
         if sound and recorder.record_failure:
             self._say(recorder.record_failure + _ON)
         for before, after in recorder.missing[known:]:
             self._say(f"rows between {before:.2f} and {after:.2f} s are missing: for so long no word came of the plant")
-
-    def _take_request(self, request: LinkRequest) -> None:
-        if self._link_log is None:
-            return
-        try:
-            self._link_log(request)
-        except OSError as error:
-            self._fail(f"the link commands end at {self.client.t:.2f} s: {error.strerror}", _ON)
-            self._link_log = None

@@ -50,9 +50,7 @@ def recorded(
                 watch(telemetry)
             recorder(telemetry)
 
-        outcome = run_processes(
-            plant, agents, folder / "log", note, on_other=recorder, plant_command=TOY
-        )
+        outcome = run_processes(plant, agents, folder / "log", note, on_other=recorder, plant_command=TOY)
         assert outcome.broke == ""
         recorder.finish(recorder.ended, recorder.record_step)
     return RunRecord.open(folder / "wall")

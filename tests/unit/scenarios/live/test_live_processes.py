@@ -16,7 +16,7 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.known_names import COMPILING, LISTENING
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.live import live_processes
-from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, limited, meaning
+from gridpeers.scenarios.live.live_processes import UNHEARD, _follow, meaning
 from gridpeers.scenarios.live.live_recorder import LiveRecorder
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
@@ -49,7 +49,7 @@ def test_an_agent_with_an_expired_certificate_does_not_flood_the_terminal() -> N
         "WARN app-0 zenoh_link_tls::unicast: invalid peer certificate: certificate expired: verification time {} (UNIX)"
     )
 
-    told = [limited(meaning(line.format(1795480184 + k), config), limit, 0.5 * k) for k in range(7200)]
+    told = [limit.admit(meaning(line.format(1795480184 + k), config), 0.5 * k) for k in range(7200)]
 
     assert (
         told[0]
