@@ -6,10 +6,8 @@ import tomllib
 from pathlib import Path
 
 CATALOGUE = Path(__file__).parent / "catalogue"
-"""Folder of the scenarios that come with gridpeers."""
 
 SWEEPS = CATALOGUE / "sweeps"
-"""Folder of the sweeps that come with gridpeers."""
 
 
 def names_in(folder: Path) -> tuple[str, ...]:

@@ -166,7 +166,6 @@ _REGISTRIES: dict[str, tuple[Registry[Any], str, str]] = {
 """By topic: the registry, how an entry is written, and how a scenario names one."""
 
 TOPICS = ("keys", "messages", "scenario", "feeder", *_REGISTRIES)
-"""Pages there are."""
 
 _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("Top of the file", ScenarioModel),

@@ -20,17 +20,14 @@ class Outcome:
     reproducible: bool
     """False once something unscripted (a dead agent) has entered the run."""
     events: tuple[PlantEvent, ...]
-    """All events of the plant and of the roster."""
     notes: tuple[str, ...]
     """Notes for a person though the run went on: processes that died, messages that were dropped."""
     ticks: int
-    """Last tick that was reported."""
     start_s: float
     """Wall time (s) until the first row."""
     run_s: float
     """Wall time (s) from the first row to the end."""
     pacing: Pacing | None = None
-    """How well the plant kept real time; only in wall-clock time."""
 
 
 SPEEDS = (0.1, 50.0)

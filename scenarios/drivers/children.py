@@ -23,7 +23,6 @@ from gridpeers.wire.driver.process import BAD_CONFIG, BROKE, IN_ORDER, LEASH, OK
 from gridpeers.wire.messages import PLANT
 
 LAST_LINES = 12
-"""Last lines of a log in the report on a process that died."""
 
 GRACE = 2.0
 """Time (s) that processes have to leave after SIGTERM."""

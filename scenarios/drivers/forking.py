@@ -162,13 +162,11 @@ class _Surroundings(NamedTuple):
     """What a server has inherited: once it differs, another server is needed."""
 
     owner: int
-    """Process that has started it."""
     folder: Path
     variables: dict[str, str]
 
 
 _kept: dict[tuple[str, ...], tuple[_Surroundings, ForkServer]] = {}
-"""The server of each set of modules."""
 
 
 def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> ForkServer | None:

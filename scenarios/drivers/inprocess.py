@@ -62,7 +62,6 @@ def run_direct(
 
 
 SHOWN = 5
-"""Missing messages that an error names."""
 
 COLLECTED = 20
 """Runs of this process after which it looks for garbage in all that it has: that takes 20 ms."""

@@ -56,7 +56,6 @@ class FaultInjector:
         self._offset: float | None = None
         """Run time minus wall time times the speed (s); None before the run begins."""
         self.killed: set[str] = set()
-        """Agents that a fault has killed."""
         self._paused: set[str] = set()
 
     @property

@@ -54,7 +54,6 @@ class TelemetryClient:
         self._credentials = credentials
         self._name, self._endpoint, self._clock, self._on_message = name, endpoint, clock, on_message
         self.latest: Telemetry | None = None
-        """The latest telemetry; None before the first."""
         self.pacing: Pacing | None = None
         """How well the plant has kept pace so far, in wall-clock time."""
         self.message_at = monotonic()
@@ -65,9 +64,7 @@ class TelemetryClient:
         self._core = TelemetryEndpoint(name, run, self._stream)
         self._closed = False
         self.rejects = self._core.rejects
-        """The messages that were dropped."""
         self.inbox = Inbox(holds=clock == "simulated")
-        """Takes the words of other threads."""
         self.inbox.is_known, self.inbox.is_noted = self._core.is_known, self._core.is_noted
         self._session = self._open()
 

@@ -18,7 +18,6 @@ QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""
 
 AGAIN = 1.0
-"""Time (s) between two questions."""
 
 ASTRAY = 3.0
 """Time (s) without any answer after which a new session is opened; twice as long after each that brought none."""
@@ -27,11 +26,9 @@ ASTRAY_SIMULATED = 10.0
 """The same in simulated time, where a plant answers between two steps, or once a full link of its is closed."""
 
 LONGEST = 60.0
-"""Longest such time (s)."""
 
 
 Recordable = Telemetry | LinkReport | Journal | LinkRequest
-"""Messages that the plant publishes for recorders."""
 
 
 class TelemetryStream:
@@ -44,7 +41,6 @@ class TelemetryStream:
         self.acknowledges = acknowledges
         self.lost = False
         self._next = 0
-        """Number of the next Telemetry."""
         self._held: list[Recordable] = []
         """Other messages that came since the one before: with the next they are known to be in order."""
         self._gap_since: float | None = None
@@ -54,7 +50,6 @@ class TelemetryStream:
         self._over = False
         self._patience = self._shortest = ASTRAY_SIMULATED if acknowledges else ASTRAY
         self._acknowledged = -1
-        """Number in the last question."""
 
     def take(self, message: Recordable, now: float) -> list[Recordable]:
         """Note a message (s, monotonic); return the messages that can be recorded now, in order."""

@@ -51,7 +51,6 @@ class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_f
     """The data of one `LinkReport`."""
 
     traces: tuple[LinkTrace, ...] = ()
-    """Verdicts since the last report."""
     counts: dict[Name, LinkCounts] = {}
     """Counts of the messages of each sender so far."""
     sha256: str = ""
@@ -64,13 +63,11 @@ class LinkStatus(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     """The status of a link while the run goes on."""
 
     holds: tuple[Text, ...] = ()
-    """The faults that it has now, each in words."""
     counts: LinkCounts | None = None
     """Counts of its messages so far; None if none was judged."""
 
 
 encode_statuses = msgspec.msgpack.Encoder().encode
-"""Encode the `LinkStatus` of a receiver's links, by sender."""
 
 _statuses = msgspec.msgpack.Decoder(dict[Name, LinkStatus])
 
@@ -81,7 +78,6 @@ def decode_statuses(data: bytes) -> dict[str, LinkStatus]:
 
 
 encode_data = msgspec.msgpack.Encoder().encode
-"""Encode a `LinkReportData`."""
 
 _reports = msgspec.msgpack.Decoder(LinkReportData)
 
@@ -167,9 +163,7 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """Either a fault or its end. The time from which it holds is sent beside it; times in it do not count."""
 
     fault: Fault | None = None
-    """The fault that links get."""
     heal: Heal | None = None
-    """The links whose faults end."""
     for_s: float | None = None
     """Duration of the fault (s of run time); without it, it holds until it is healed."""
 

@@ -91,7 +91,6 @@ class LiveWindows:
     too_short: tuple[Window, ...]
     """Windows that the next event ended before the values could be steady."""
     not_reached: tuple[Window, ...]
-    """Windows of the scenario whose end the run did not reach."""
     unrecorded: tuple[Window, ...]
     """Windows without numbers, as rows are missing at their end, where they are measured."""
 
@@ -160,12 +159,10 @@ class Departures:
     """The departures of a run from its scenario, and its windows of measurement."""
 
     events: tuple[PlantEvent, ...]
-    """The departures, in the order of time."""
     disturbed: tuple[Window, ...]
     """Measured windows of the scenario, as it means them, that end after the first departure or miss rows: the plant
     remembers whatever happened to it."""
     windows: LiveWindows
-    """The windows of the scenario's events, and of those that people made on switches and loads."""
     live: Mapping[str, str]
     """By label, the operations of each event that people made."""
 

@@ -16,10 +16,8 @@ class MapSwitch(msgspec.Struct, frozen=True):
     name: str
     alias: str
     a: int
-    """Number of the bus at one side."""
     b: int
     closed: bool
-    """Position before the run."""
 
 
 class MapInverter(msgspec.Struct, frozen=True):
@@ -27,9 +25,7 @@ class MapInverter(msgspec.Struct, frozen=True):
 
     name: str
     bus: int
-    """Number of its bus."""
     kind: str
-    """GFM or GFL."""
     microgrid: str
     spare: bool = False
 
@@ -39,7 +35,6 @@ class MapLoad(msgspec.Struct, frozen=True):
 
     name: str
     bus: int
-    """Number of its bus."""
     P: float
     """Real power at nominal voltage (W), of the feeder's tables."""
     Q: float
@@ -63,7 +58,6 @@ class FeederMap(msgspec.Struct, frozen=True):
     scenario: str = ""
     """Name of the scenario that runs; empty of a diagram of a feeder alone."""
     case: str = ""
-    """Name of its case."""
 
 
 def feeder_map(feeder: Feeder) -> FeederMap:

@@ -91,11 +91,9 @@ class Folders:
     """Folders of a live run."""
 
     logs: Path
-    """For the logs of processes."""
     record: Path | None = None
     """For the files of the record, a folder in the run folder; None if nothing is recorded."""
     whole: Path | None = None
-    """The run folder; None if there is none."""
 
     def complete(self, *missing: str) -> None:
         """Write to status.txt that the folder is complete, and sentences on what is missing beside."""
@@ -114,7 +112,6 @@ class Folders:
 
 
 AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
-"""For the head of its scenario, until it has ended."""
 
 
 @contextmanager
@@ -166,7 +163,6 @@ def live_record(
 LINKS_ALONE = (
     "A live run's links, which people changed: agents, switches and loads that they changed are not in it (events.csv)."
 )
-"""For the head of the file."""
 
 COMMANDS_PER_NEW_ONE = 10
 """The file is written anew once a new command has come for every ten that it has, so after each of the first twenty: to

@@ -89,9 +89,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     """Options of `gridpeers plant` and `gridpeers up`."""
 
     run: str
-    """Name of the run."""
     case: str = ""
-    """Case of the scenario; the last one if empty."""
     speed: float = 1.0
     """Run time per wall time (s/s)."""
     wait: float = 30.0
@@ -99,9 +97,7 @@ class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
     duration: float | None = None
     """Run time (s) after which the run ends; None for no end."""
     recorded: bool = False
-    """Whether the run is recorded, as its scenario says."""
     secured: bool = False
-    """Whether the processes have certificates."""
     strict: bool = False
     """Whether the run breaks when the plant cannot keep pace."""
 

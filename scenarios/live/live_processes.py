@@ -61,15 +61,12 @@ class ProcessOutcome:
     """The outcome of a live run in the terminal where it was started."""
 
     broke: str = ""
-    """Why it could not go on; empty after a good end."""
     interrupted: str = ""
     """Name of the signal that ended it: SIGINT, as Ctrl-C gives, or SIGTERM."""
     recorded: Recorded | None = None
     """The record, if it is whole."""
     pacing: Pacing | None = None
-    """How well the plant kept pace, if it ran."""
     failed_laws: tuple[PlantEvent, ...] = ()
-    """The first failure of each agent's law."""
 
 
 def meaning(word: str, config: PlantConfig) -> str:

@@ -51,7 +51,6 @@ class LiveRecorder:
         self.failure = ""
         """Why something could not be recorded: the first reason; "" if everything was."""
         self.failed_laws: dict[str, PlantEvent] = {}
-        """By agent, the first failure of its law."""
         self.cut_short = ""
         """Why the plant's last message does not come, if that is known."""
         self._crashes: SimpleQueue[tuple[str, str]] = SimpleQueue()

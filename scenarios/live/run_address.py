@@ -20,7 +20,6 @@ class Access:
     """The options `--keys`, `--as` and `--insecure` of a command."""
 
     keys: Path | None = None
-    """Folder with the site's certificates."""
     name: str = ""
     """Name of the member; the first that fits if empty."""
     insecure: bool = False
@@ -64,7 +63,6 @@ def with_protocol(endpoint: str, *, keys: bool, default: str) -> str:
 
 
 RUN = "gridpeers"
-"""Default name of a run."""
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 """Default endpoint where the plant listens and the others connect; 7447 is Zenoh's own port."""
@@ -87,11 +85,9 @@ class RunAddress:
     """A run and where to find it."""
 
     run: str
-    """Name of the run, part of every key."""
     connect: tuple[str, ...]
     """Endpoints to connect to; one that answers is enough."""
     credentials: Credentials | None = None
-    """Own certificate and members of the site; None if links are open."""
     access: Access = field(default_factory=Access)
     """The options that gave them, for commands that start others."""
 

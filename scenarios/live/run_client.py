@@ -140,7 +140,6 @@ class RunClient:
         self.where, self.keys = where, Keys(where.run)
         self._meet_agents, self._listen = meet_agents, listen
         self._heard: list[str] = []
-        """Keys that are listened to."""
         self._open()
 
     def _open(self) -> None:

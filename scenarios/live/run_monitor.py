@@ -27,13 +27,9 @@ class RunTokens:
     def __init__(self, run: str) -> None:
         self._run, self._keys = run, Keys(run)
         self.epochs: set[int] = set()
-        """Epochs of the plants of the run."""
         self.agents: dict[str, set[str]] = {}
-        """Instances of each agent of the run."""
         self._others: set[str] = set()
-        """Tokens of the plants of other runs."""
         self._noted: set[str] = set()
-        """All tokens that are noted."""
 
     @property
     def runs(self) -> set[str]:
@@ -84,14 +80,10 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
     phase: str
     """gathering, running or closing."""
     t: float
-    """Run time (s)."""
     speed: float
-    """Run time per wall time (s/s)."""
     pacing: Pacing
     agents: tuple[str, ...] = ()
-    """Inverters whose agents take part."""
     absent: tuple[str, ...] = ()
-    """Inverters whose agents do not."""
     events: tuple[PlantEvent, ...] = ()
     """The latest, oldest first."""
     impaired: tuple[str, ...] = ()
@@ -121,32 +113,22 @@ class InverterStatus:
     name: str
     island: str = ""
     """Name of its island: "grid", or the first inverter in it; "" if nobody has said."""
-    f: float | None = None
-    """Hz."""
-    P: float | None = None
-    """kW."""
-    P_set: float | None = None
-    """kW."""
-    P_share: float | None = None
-    """P by its rating (pu)."""
-    Q: float | None = None
-    """kvar."""
-    V: float | None = None
-    """pu of its nominal voltage."""
-    V_set: float | None = None
-    """pu of its nominal voltage."""
+    f: float | None = None  # Hz
+    P: float | None = None  # kW
+    P_set: float | None = None  # kW
+    P_share: float | None = None  # pu of its rating
+    Q: float | None = None  # kvar
+    V: float | None = None  # pu of nominal
+    V_set: float | None = None  # pu of nominal
     ages: dict[str, float] = field(default_factory=dict)
     """Age (s) of the latest state of each neighbour that it uses."""
     hears: int | None = None
-    """Neighbours that it uses; None if that is not known."""
     late: bool = False
     """Whether the latest state of one of them is `OLD`."""
     off_voltage: bool = False
     """Whether V is beyond `V_LOW` to `V_HIGH`."""
     received: int | None = None
-    """Messages that came in."""
     sent: int | None = None
-    """Messages that went out."""
     lost: int | None = None
     """Messages that were sent to it and never came."""
     impaired: tuple[str, ...] = ()
@@ -161,15 +143,10 @@ class Snapshot:
 
     run: str
     t: float | None = None
-    """Run time (s)."""
     pace: str = ""
-    """The plant's pace in a few words."""
     speed: float = 1.0
-    """Run time per wall time (s/s)."""
     impaired: tuple[str, ...] = ()
-    """Agents whose link to or from the plant has an emulated fault."""
     inverters: tuple[InverterStatus, ...] = ()
-    """All inverters, in their order."""
     events: tuple[str, ...] = ()
     """Events, a line each, the latest last."""
 
@@ -186,7 +163,6 @@ _PER_INVERTER = 6
 """Values of one inverter in a row of telemetry."""
 
 _KEPT = 100
-"""Most events that are kept."""
 
 
 class RunMonitor:
@@ -202,9 +178,7 @@ class RunMonitor:
         self._end: str | None = None
         """Once the run has ended, why it broke; empty if it did not."""
         self._epoch = 0
-        """Epoch of the plant."""
         self._latest = 0.0
-        """Run time of its latest telemetry (s)."""
         self._pacing: Pacing | None = None
         self._impaired: tuple[str, ...] = ()
         self._plant_status: PlantStatus | None = None

@@ -30,7 +30,6 @@ T = TypeVar("T")
 Verb = Literal["open", "close", "synchronise", "load", "stop", "down", "status", "link", "links"]
 
 QUESTIONS = ("status", "links")
-"""Verbs that change nothing."""
 
 ANSWER = 10.0
 """Longest wait (s) for the answer of a plant that is there; on a busy machine it may take a second."""
@@ -42,7 +41,6 @@ ACKNOWLEDGED = 4.0
 """Longest wait (s) for the receivers of a link command; one control period, or a second more if a message was lost."""
 
 AGAIN = 0.1
-"""Time (s) between two requests for the same thing."""
 
 LEAVING = 10.0
 """Longest wait (s) for processes that were asked to leave."""
@@ -271,17 +269,14 @@ class LinkCommandResult:
     """The receivers' answers to a link command."""
 
     t: float
-    """Run time (s) from which on it holds."""
     text: str
     """Its effect in words: a heal names only links that had a fault."""
     acknowledged: tuple[str, ...]
-    """Receivers that have taken it."""
     silent: tuple[str, ...]
     """Receivers that take part and have not answered in time."""
     absent: tuple[str, ...]
     """Receivers without an agent: the plant tells the agent when it comes."""
     refused: Mapping[str, str]
-    """Receivers that have refused, and why."""
 
     @property
     def changes_links(self) -> bool:

@@ -26,7 +26,6 @@ from gridpeers.wire.messages import PLANT, AgentStatus, Telemetry
 from gridpeers.wire.timing import SessionDeadline
 
 EVENTS = 6
-"""Number of the latest events in a view."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +135,6 @@ PERIOD = 1.0
 """Time (s) between two texts where the output is no terminal."""
 
 QUIT = ("q", "Q", "\x1b")
-"""Keys that end it."""
 
 
 class TakesMessages(Protocol):
@@ -170,12 +168,9 @@ class RunSubscriber:
         self._subscribed: set[str] = set()
         self._plant = client.plant
         self._heard_at: dict[str, float] = {}
-        """Time at which each sender was last heard."""
         self._used: dict[str, tuple[str, ...]] = {}
-        """Neighbours that each agent uses."""
         self._patience = SessionDeadline()
         self._configured: set[str] = set()
-        """Inverters whose configuration has come."""
         self._ask_at = 0.0
         """When (s, monotonic) to ask for those that are missing."""
         client.listen(client.keys.telemetry)

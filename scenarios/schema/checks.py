@@ -32,7 +32,6 @@ _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,30}")
 TRIPS = "protection.trips"
 
 LONGEST_CLEARING_TIME = 3600.0
-"""Longest clearing time (s)."""
 
 _LIMITS_OF_P = {"GFM": ("P_max", "P_set_lim", "P_min"), "GFL": ("P_max", "S_max", "i_max", "P_set_lim", "P_min")}
 """Parameters by kind of inverter that limit a set-point of P; the first broken one is noted."""

@@ -13,7 +13,6 @@ from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import supply_states
 
 _SHOWN = 4
-"""So many buses of a part are named."""
 
 _OTHERWISE = 'or use simulator = "gridpeers"'
 

@@ -50,7 +50,6 @@ from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
 
 ReadFeeder = Callable[[str, str], Feeder]
-"""Reads a feeder, given its name or path and its load set."""
 
 
 def catalogue() -> tuple[str, ...]:

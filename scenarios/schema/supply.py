@@ -70,20 +70,16 @@ def _setting(change: LoadChange) -> LoadSetting:
 
 
 _SHOWN = 6
-"""So many buses of a dead part are named."""
 
 
 class SupplyState(NamedTuple):
     """Supply of the feeder from an event on: de-energised nodes, islands, and inverters on the network."""
 
     event: Event | None
-    """The event from which on it is so; None at t = 0."""
     dead: frozenset[Node]
-    """Nodes that nothing feeds."""
     new: frozenset[Node]
     """Those of them that were fed until then."""
     islands: tuple[frozenset[Node], ...]
-    """Parts that inverters feed alone."""
     inverters: frozenset[str]
     """Inverters that are on the network."""
 

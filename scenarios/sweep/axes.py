@@ -75,7 +75,6 @@ class Setting(NamedTuple):
     """One point of an axis."""
 
     shown: Mapping[str, Any]
-    """Columns of the table."""
     put: Mapping[str, Any]
     """Keys of the scenario, by path."""
 
@@ -210,7 +209,6 @@ class Distribution:
     """How one key is drawn."""
 
     name: str
-    """One of `DISTRIBUTIONS`."""
     of: Sequence[Any]
     """Bounds, or the choices."""
 

@@ -47,7 +47,6 @@ class SweepFolder:
     def __init__(self, folder: Path, plan: Plan) -> None:
         self.path, self._size = folder, len(plan.runs)
         self.done: dict[int, SweepRow] = {}
-        """Finished runs by number."""
         whole = {"name": plan.name, "runs": len(plan.runs), "fingerprint": plan.fingerprint, "versions": _versions()}
         try:
             _check(folder, whole)
@@ -148,17 +147,13 @@ class Summary:
     """Counts and files of a sweep."""
 
     runs: int
-    """All of its runs."""
     before: int
-    """Those that were done before."""
     broke: Counter[str]
     """How many broke, by reason."""
     law_failed: Counter[str]
     """In how many a law failed, by the first reason."""
     table: Path
-    """The Parquet file."""
     plots: tuple[Path, ...]
-    """The figures."""
 
 
 def study(plan: Plan, folder: SweepFolder, tell: Callable[[int], None], *, jobs: int, dask: str = "") -> Summary:

@@ -58,7 +58,6 @@ class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
     """Whether it reached its end under its laws. Where one failed there are no measures, which would be droop's; a
     scenario that switches the check "law_failed" off wants them, and the status is "ran"."""
     why: str = ""
-    """Why it broke, or which law failed, where and why."""
     history_sha256: str = ""
     """Of the bytes that history.csv would have."""
     links_sha256: str = ""

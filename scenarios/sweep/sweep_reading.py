@@ -46,9 +46,7 @@ class Run:
     sample: int
     """Number of the sample, from 0, in the order of the axes."""
     case: str
-    """Case that is run."""
     scenario: ScenarioModel
-    """The sample's scenario, checked."""
     shown: Mapping[str, Any]
     """The sample's value of each parameter."""
 
@@ -58,15 +56,10 @@ class Plan:
     """A checked sweep."""
 
     name: str
-    """Name of the results' folder."""
     title: str
-    """One line on the study."""
     text: str
-    """The sweep file."""
     base: ScenarioModel
-    """The scenario as it is without the sweep."""
     runs: Sequence[Run]
-    """All runs: sample by sample, case by case."""
     fingerprint: str
     """SHA-256 of everything that decides the runs: scenarios, feeders, order. Two sweeps with one are the same."""
 
@@ -94,13 +87,10 @@ class BaseScenario(NamedTuple):
     """The scenario that is varied."""
 
     tree: Tree
-    """Its tables."""
     path: Path
     """Its file: relative paths start there."""
     scenario: ScenarioModel
-    """Checked."""
     feeder: Feeder
-    """Its feeder."""
 
 
 class _SampleProblems(Problems):

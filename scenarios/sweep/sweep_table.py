@@ -26,7 +26,6 @@ class IndexAxis(NamedTuple):
     """The axis of an index."""
 
     label: str
-    """Words instead of the index's name."""
     least: float
     """Least length, in the index's unit: smaller differences are rounding, or too small to see.
 
@@ -51,7 +50,6 @@ INDEXES = {
     "V_max_pu": IndexAxis("largest voltage at the end (pu)", 0.001),
     "steady": IndexAxis("steady at the end (1: yes, 0: no)", 1.0),
 }
-"""Axes of the project's own indexes."""
 
 GRAPH_WORDS = {"graph.links": "links of the graph", "graph.lambda_2": "algebraic connectivity, lambda_2"}
 """Axis labels for the parameters of drawn graphs, which no scenario file has."""

@@ -17,7 +17,6 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 Task = Callable[..., T]
-"""Does one run."""
 
 Calls = Iterable[tuple[Any, ...]]
 """Arguments of the task for each run, such as its number, its scenario and its case; taken as workers become free."""
