@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from gridpeers.scenarios.checks.check_registry import CHECKS
+from gridpeers.scenarios.checks.check_registry import CHECKS, chosen_checks, switched_off
 from gridpeers.scenarios.checks.check_verdict import (
     INTERRUPTED,
     MOST_VIOLATIONS,
@@ -23,7 +23,6 @@ from gridpeers.scenarios.checks.check_verdict import (
     Violation,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.schema.plugin_keys import checks_of, checks_off
 from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, made
 from gridpeers.wire.plugins.registry import PluginError
@@ -64,8 +63,8 @@ def judge_case(case: CheckedCase, stop: JudgingStop | None = None) -> tuple[Chec
     stop : JudgingStop, optional
         As for `judge_by`.
     """
-    off = (CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in checks_off(case.scenario))
-    return *judge_by(checks_of(case.scenario), case, stop), *off
+    off = (CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in switched_off(case.scenario.checks))
+    return *judge_by(chosen_checks(case.scenario.checks), case, stop), *off
 
 
 def judge_by(

@@ -138,7 +138,7 @@ class _ProcessDriver:
         client, since = self.client, self._began
         while not self._ended:
             deadline = self._plant_deadline if self._plant_ready else BUILD_DEADLINE
-            limit = min(deadline, supervisor.wait, LAST_TELEMETRY if self._plant_left is not None else deadline)
+            limit = min(deadline, supervisor.faults.wait, LAST_TELEMETRY if self._plant_left is not None else deadline)
             asked = monotonic()
             words = client.take(limit)
             now = monotonic()
@@ -153,14 +153,14 @@ class _ProcessDriver:
                 elif not self._ended:
                     self._note_exit(next(one for one in supervisor.children if str(one.pid) == word), supervisor)
             if client.progress is not None:
-                supervisor.note_time(*client.progress)
+                supervisor.faults.note_time(*client.progress)
             if self._plant_left is not None and not self._ended and now - self._plant_left > LAST_TELEMETRY:
                 self._end(supervisor.children[PLANT].report(self._when))
             if not self._ended:
                 supervisor.start_when_gone(self._awaited)
                 self._awaited.clear()
                 supervisor.work()
-        supervisor.end_faults()
+        supervisor.faults.end(supervisor.children)
         until = monotonic() + self.patience
         # in simulated time the plant leaves once its last telemetry is acknowledged
         while not self._wall and supervisor.children[PLANT].status is None and (left := until - monotonic()) > 0.0:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 import signal
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
 from time import monotonic
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -44,15 +44,12 @@ def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
 
 
 class FaultInjector:
-    """Inject the process faults in the tree `links` of the plant's configuration; telemetry gives the run's time.
+    """Inject the process faults of a plant's run in real time; telemetry gives the run's time."""
 
-    The speed is run time per real time (s/s).
-    """
-
-    def __init__(self, links: Mapping[str, Any], speed: float) -> None:
-        setup = EmulationConfig.of_tree(links) if links else None
+    def __init__(self, plant: PlantConfig) -> None:
+        setup = EmulationConfig.of_tree(plant.links) if plant.links and plant.clock == "wall" else None
         self._due = process_faults(setup.netem.nodes) if setup is not None and setup.real_nodes else []
-        self._speed = speed
+        self._speed, self._T_c = plant.speed, plant.T_c
         self._offset: float | None = None
         """Run time minus wall time times the speed (s); None before the run begins."""
         self.killed: set[str] = set()
@@ -64,8 +61,8 @@ class FaultInjector:
         return {fault.name for fault in self._due}
 
     def note_time(self, t: float, at: float) -> None:
-        """Note that the run had reached t (s) at a time of `monotonic` (s); the latest counts, as a plant may lag."""
-        self._offset = t - at * self._speed
+        """Note that telemetry of t (s), one period ahead, came at a time of `monotonic` (s); a plant may lag."""
+        self._offset = t - self._T_c - at * self._speed
 
     @property
     def wait(self) -> float:
@@ -116,9 +113,9 @@ class Supervisor:
         self.children = Children()
         self._agents, self._log_dir = {config.name: config for config in agents}, log_dir
         self._on_exit, self._on_word, self._plant_command = on_exit, on_word, plant_command
-        self._faults = FaultInjector(plant.links if plant.clock == "wall" else {}, plant.speed)
+        self.faults = FaultInjector(plant)
         self._awaited: set[str] = set()
-        alone = self._faults.names | {action.inverter for action in plant.schedule}
+        alone = self.faults.names | {action.inverter for action in plant.schedule}
         self._shared = share(tuple(name for name in self._agents if name not in alone), shared)
         """Agents that share the process of each."""
         self._plant = replace(plant, agent_processes=len({self._mates(name) for name in plant.agents}))
@@ -128,7 +125,7 @@ class Supervisor:
 
     def __exit__(self, *_: object) -> None:
         try:
-            self.end_faults()
+            self.faults.end(self.children)
         finally:
             self.children.end()
 
@@ -175,30 +172,17 @@ class Supervisor:
         """Start agents that the plant awaits, as soon as the former process of their name has ended."""
         self._awaited.update(names)
 
-    def note_time(self, t: float, at: float) -> None:
-        """Note that telemetry of t (s of run time) came at a time of `monotonic` (s); it is one period ahead."""
-        self._faults.note_time(t - self._plant.T_c, at)
-
-    @property
-    def wait(self) -> float:
-        """Time (s) until the next process fault; infinite if there is none."""
-        return self._faults.wait
-
     def work(self) -> None:
         """Start the awaited agents whose former process has ended, and inject the faults that are due."""
         for name in sorted(self._awaited):
             if all(child.status is not None for child in self.children.lives(name)):
                 self._awaited.discard(name)
                 self.start(name)
-        self._faults.inject(self.children)
-
-    def end_faults(self) -> None:
-        """Inject no more faults, and continue paused processes."""
-        self._faults.end(self.children)
+        self.faults.inject(self.children)
 
     def failed(self, child: Child) -> bool:
         """Whether a process has ended, or still runs, though neither the scenario nor a request explains it."""
-        return (child.status != 0 or child.crashed) and child.name not in self._faults.killed
+        return (child.status != 0 or child.crashed) and child.name not in self.faults.killed
 
 
 def share(names: Sequence[str], processes: int) -> dict[str, tuple[str, ...]]:

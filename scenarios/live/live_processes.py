@@ -138,14 +138,14 @@ def all_here(
             supervisor.start(PLANT, *(agent.name for agent in agents if agent.name in config.agents))
             release()
             try:
-                while not over.wait(min(supervisor.wait, CHECK)):
+                while not over.wait(min(supervisor.faults.wait, CHECK)):
                     if recorder.client.progress is not None:
-                        supervisor.note_time(*recorder.client.progress)
+                        supervisor.faults.note_time(*recorder.client.progress)
                     supervisor.work()
                 supervisor.children.wait(LEAVING)
             finally:
                 over.set()  # what is killed from here on, is so because it did not end in time
-                supervisor.end_faults()
+                supervisor.faults.end(supervisor.children)
         plant = supervisor.children[PLANT]
         return "" if plant.status == 0 else plant.report(f"after t = {recorder.client.t:.2f} s")
 

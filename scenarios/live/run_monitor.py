@@ -46,7 +46,9 @@ class RunTokens:
         match self._keys.parts(key):
             case ("alive", "plant", part) if (epoch := epoch_of(part)) is not None and len(self.epochs) < MOST_PLANTS:
                 self.epochs.add(epoch)
-            case ("alive", "agent", name, instance) if self._has_room(name):
+            case ("alive", "agent", name, instance) if (
+                len(self.agents[name]) < MOST_PROCESSES if name in self.agents else len(self.agents) < MOST_INVERTERS
+            ):
                 self.agents.setdefault(name, set()).add(instance)
             case () if run_of_plant(key) and len(self._others) < MOST_PLANTS:
                 self._others.add(key)
@@ -68,10 +70,6 @@ class RunTokens:
                     del self.agents[name]
             case _:
                 self._others.discard(key)
-
-    def _has_room(self, name: str) -> bool:
-        instances = self.agents.get(name)
-        return len(self.agents) < MOST_INVERTERS if instances is None else len(instances) < MOST_PROCESSES
 
 
 class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
@@ -321,10 +319,8 @@ class RunMonitor:
         if status.phase != "running":
             return f"waits for {status.waits_for}" if status.waits_for else status.phase
         unused = [neighbour for neighbour in status.neighbours if neighbour not in status.used]
-        apart = [neighbour for neighbour in unused if self._island(neighbour) not in ("", status.island)]
+        islands = {sender: message.island for sender, (message, _) in self._status.items()}
+        apart = [neighbour for neighbour in unused if islands.get(neighbour, "") not in ("", status.island)]
         silent = [neighbour for neighbour in unused if neighbour not in apart]
         parts = (f"apart: {short(apart)}" if apart else "", f"without {short(silent)}" if silent else "")
         return "; ".join(part for part in parts if part)
-
-    def _island(self, name: str) -> str:
-        return self._status[name][0].island if name in self._status else ""

@@ -206,12 +206,8 @@ def check_free(client: RunClient, name: str) -> None:
         )
 
 
-def own_code(config: AgentConfig) -> tuple[str, ...]:
-    """Return the code that a configuration names beside gridpeers' own and installed plug-ins, in words."""
-    return tuple(_named(config))
-
-
-def _named(config: AgentConfig) -> Iterator[str]:
+def own_code(config: AgentConfig) -> Iterator[str]:
+    """Yield the code that a configuration names beside gridpeers' own and installed plug-ins, in words."""
     law, graph = config.control.law, config.control.own_graph
     if law.command or law.fmu or ":" in law.use:
         yield f"the law {law.name}"

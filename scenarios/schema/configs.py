@@ -23,7 +23,7 @@ from gridpeers.scenarios.schema.participants import (
     with_agent,
 )
 from gridpeers.scenarios.schema.plugin_keys import graph_of, law_of
-from gridpeers.scenarios.schema.scenario_model import InverterTable, ScenarioModel
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import load_events
 
 
@@ -126,7 +126,16 @@ def changes_of(scenario: ScenarioModel) -> FeederChanges:
         load_factor=plant.load_factor,
         m_p_factor=plant.m_p_factor,
         m_q_factor=plant.m_q_factor,
-        inverters={name: _inverter_change(table) for name, table in plant.inverter.items()},
+        inverters={
+            name: InverterChange(
+                m_p=table.m_p_pu,
+                m_q=table.m_q_pu,
+                P_rated=None if table.P_rated_kW is None else 1e3 * table.P_rated_kW,
+                parameters=table.parameters,
+                own=table.own,
+            )
+            for name, table in plant.inverter.items()
+        },
     )
 
 
@@ -146,11 +155,4 @@ def _switch_events(scenario: ScenarioModel) -> tuple[SwitchEvent, ...]:
         for event in scenario.events
         for closes, switches in ((False, event.open), (True, event.close))
         for switch in switches
-    )
-
-
-def _inverter_change(table: InverterTable) -> InverterChange:
-    P_rated = None if table.P_rated_kW is None else 1e3 * table.P_rated_kW
-    return InverterChange(
-        m_p=table.m_p_pu, m_q=table.m_q_pu, P_rated=P_rated, parameters=table.parameters, own=table.own
     )

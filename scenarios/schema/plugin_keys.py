@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,7 +17,7 @@ from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
-from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, check_name, chosen_checks, switched_off
+from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, switched_off
 from gridpeers.scenarios.results.evaluation.claims import BENCHMARKS, CLAIMS
 from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
 from gridpeers.scenarios.schema.participants import with_agent
@@ -62,19 +62,9 @@ def claims_of(scenario: ScenarioModel) -> list[Plugin]:
     return [plugin_of(key) for key in scenario.claims]
 
 
-def checks_of(scenario: ScenarioModel) -> dict[str, Plugin]:
-    """Return the checks that judge a scenario's runs, by their names in the verdict."""
-    return chosen_checks(scenario.checks)
-
-
-def checks_off(scenario: ScenarioModel) -> tuple[str, ...]:
-    """Return the names of the checks of every run that a scenario switches off."""
-    return switched_off(scenario.checks)
-
-
 def judges_laws(scenario: ScenarioModel) -> bool:
     """Whether a law that fails, fails the run: a scenario may switch that check off."""
-    return LAW_FAILED not in checks_off(scenario)
+    return LAW_FAILED not in switched_off(scenario.checks)
 
 
 def with_folders(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
@@ -147,53 +137,38 @@ def check_benchmark(scenario: ScenarioModel, problems: Problems) -> None:
 
 
 def check_measures(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note metrics and claims that there are not, and metrics of one name."""
-    names: list[str] = []
-    for i, key in enumerate(scenario.metrics):
-        path, table = f"metrics[{i}]", table_of(key)
-        label = table.pop("name", "")
-        if not isinstance(label, str) or (label and not good_name(label)):
-            problems.add(f"{path}.name", "a name in tables is up to 41 letters, digits and _, the unit last: f_min_Hz")
-            continue
-        plugin = _check(path, key if isinstance(key, str) else table, METRICS, problems)
-        if plugin is None:
-            continue
-        name = name_of(plugin, label)
-        if name in ALWAYS and plugin.use != name:
-            problems.add(
-                path, f'every run has a metric "{name}" already; give this one a name: {{ name = "my_{name}" }}'
-            )
-        elif name in names:
-            problems.add(path, f'there is a metric "{name}" in this list already; give one of them another name')
-        names.append(name)
+    """Note metrics, claims and checks that there are not, or cannot be made with their keys, and two of one name."""
+    _check_named("metrics", scenario.metrics, METRICS, ALWAYS, problems)
     for i, key in enumerate(scenario.claims):
         _check(f"claims[{i}]", key, CLAIMS, problems)
-    _check_checks(scenario, problems)
+    _check_named("checks", scenario.checks, CHECKS, ALWAYS_CHECKED, problems)
 
 
-def _check_checks(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note checks that there are not, that cannot be made with their limits, and two of one name."""
+def _check_named(
+    field: str, keys: Sequence[PluginKey], registry: Registry[Any], always: Collection[str], problems: Problems
+) -> None:
+    """Note problems of the entries of a list whose names stand in tables beside those that every run has."""
     names: list[str] = []
-    for i, key in enumerate(scenario.checks):
-        path, table = f"checks[{i}]", table_of(key)
-        label, off = table.pop("name", ""), table.pop("off", False)
+    for i, key in enumerate(keys):
+        path, table = f"{field}[{i}]", table_of(key)
+        label, off = table.pop("name", ""), table.pop("off", False) if registry is CHECKS else False
         if not isinstance(label, str) or (label and not good_name(label)):
-            problems.add(f"{path}.name", "a name in the verdict is up to 41 letters, digits and _: calm_at_night")
-            label = ""
+            where = "the verdict is up to 41 letters, digits and _: calm_at_night"
+            where = where if registry is CHECKS else "tables is up to 41 letters, digits and _, the unit last: f_min_Hz"
+            problems.add(f"{path}.name", f"a name in {where}")
+            continue
         if not isinstance(off, bool):
             problems.add(f"{path}.off", "must be true or false; true takes the check out of the verdict")
-            off = False
-        plugin = _check(path, key if isinstance(key, str) else table, CHECKS, problems)
+        plugin = _check(path, key if isinstance(key, str) else table, registry, problems)
         if plugin is None:
             continue
-        name = check_name(table | {"name": label})
-        if name in ALWAYS_CHECKED and plugin.use != name:
-            problems.add(
-                path, f'every run has a check "{name}" already; give this one a name: {{ name = "my_{name}" }}'
-            )
+        kind, name = registry.kind, name_of(plugin, label)
+        if name in always and plugin.use != name:
+            text = f'every run has a {kind} "{name}" already; give this one a name: {{ name = "my_{name}" }}'
+            problems.add(path, text)
         elif name in names:
-            problems.add(path, f'there is a check "{name}" in this list already; give one of them another name')
-        elif off and name not in ALWAYS_CHECKED:
+            problems.add(path, f'there is a {kind} "{name}" in this list already; give one of them another name')
+        elif off is True and name not in always:
             problems.add(f"{path}.off", f'no run has a check "{name}" unless it is named; leave this entry out')
         names.append(name)
 

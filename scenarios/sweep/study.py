@@ -108,11 +108,8 @@ def _check(folder: Path, whole: Mapping[str, object]) -> bool:
         raise FolderError(f"{where}: this is a file; give a folder")
     manifest = folder / MANIFEST
     if not manifest.is_file():
-        rest = (
-            [path.name for path in folder.iterdir() if path.name not in (LOCK, "sweep.toml", "scenario.toml")]
-            if (folder.is_dir())
-            else []
-        )
+        known = (LOCK, "sweep.toml", "scenario.toml")
+        rest = [path.name for path in folder.iterdir() if path.name not in known] if folder.is_dir() else []
         if any(not name.endswith(".partial") for name in rest):
             raise FolderError(f"{where}: there are other things in it ({min(rest)}); give a new folder, or a sweep's")
         return False

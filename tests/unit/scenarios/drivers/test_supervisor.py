@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import pytest
+from msgspec.structs import replace
 
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.scenarios.drivers import supervisor
 from gridpeers.scenarios.drivers.supervisor import FaultInjector
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
+from tests.toy.toy_configs import toy_configs
 
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"}
 
@@ -34,11 +36,10 @@ def test_process_faults_come_in_turn_and_no_process_stays_paused(monkeypatch: py
             sent.append((clock[0] - 100.0, self.name, number.name))
 
     children: Any = {name: Victim(name) for name in ("inv1", "inv2", "inv3")}
-    injector = FaultInjector(
-        EmulationConfig(netem=Netem(nodes=nodes), microgrids=MICROGRIDS, real_nodes=True).to_tree(), speed=2.0
-    )
+    links = EmulationConfig(netem=Netem(nodes=nodes), microgrids=MICROGRIDS, real_nodes=True).to_tree()
+    injector = FaultInjector(replace(toy_configs(3)[0], clock="wall", speed=2.0, links=links))
     injector.inject(children)
-    injector.note_time(0.0, 100.0)
+    injector.note_time(0.02, 100.0)
     for _ in range(5):
         clock[0] += injector.wait
         injector.inject(children)

@@ -69,8 +69,8 @@ def test_what_is_not_gridpeers_own_is_named() -> None:
     """Law, graph and faults by module:Name; what is registered or installed is on this host anyway."""
     calm = replace(CONTROL, own_graph=None, law=LawChoice(use="dapi"))
 
-    assert own_code(CONFIG) == ("the law mine:Mine", "the graph mine:star", "the link fault mine:Jammer")
-    assert own_code(replace(CONFIG, control=calm, links={})) == ()
+    assert tuple(own_code(CONFIG)) == ("the law mine:Mine", "the graph mine:star", "the link fault mine:Jammer")
+    assert tuple(own_code(replace(CONFIG, control=calm, links={}))) == ()
 
 
 @pytest.mark.parametrize(("endpoint", "trusts", "runs"), [
