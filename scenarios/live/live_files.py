@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
@@ -264,7 +263,7 @@ def check_new(file: Path | None) -> None:
     if file is None:
         return
     with _writable(file):
-        if os.path.lexists(file):
+        if file.exists():
             raise FileExistsError
         if not file.absolute().parent.is_dir():
             raise UsageError(f"--record {file}: there is no folder {file.parent}; make it first")
