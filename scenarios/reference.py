@@ -197,41 +197,35 @@ def page(topic: str) -> str:
 
 
 def _keys() -> Iterator[str]:
-    yield "# Keys of a run"
-    yield ""
+    yield from ("# Keys of a run", "")
     header = ("key", "kind", "message", "from", "to", "when")
     rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.describe())
     yield from markdown_table(header, rows)
 
 
 def _messages() -> Iterator[str]:
-    yield "# Messages"
-    yield ""
-    yield (
+    yield from (
+        "# Messages",
+        "",
         "msgpack maps with a field `type` that names the message, and their CRC-32; SI units; "
-        f"at most {LONGEST_MESSAGE} bytes."
+        f"at most {LONGEST_MESSAGE} bytes.",
+        "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:",
+        "counted by kind, logged once and dropped.",
     )
-    yield "Another CRC-32, unknown fields, missing fields, wrong types and values out of bounds are refused:"
-    yield "counted by kind, logged once and dropped."
     common = {doc.name for doc in field_docs(messages.Message)}
     yield from _section("Fields of every message", messages.Message, "")
     for kind in (*typing.get_args(messages.AnyMessage), messages.PlantEvent):
         yield from _section(
             kind.__name__, kind, class_doc(kind), leave_out=common if kind != messages.PlantEvent else set()
         )
-    yield ""
-    yield "## Types, and their bounds"
-    yield ""
+    yield from ("", "## Types, and their bounds", "")
     yield from markdown_table(("type", "meaning"), ((f"`{name}`", text) for name, text in alias_docs(bounds)))
-    yield ""
-    yield "## Kinds of refused messages"
-    yield ""
+    yield from ("", "## Kinds of refused messages", "")
     yield from markdown_table(("kind", "meaning"), KINDS.items())
 
 
 def _scenario() -> Iterator[str]:
-    yield "# The scenario file"
-    yield ""
+    yield from ("# The scenario file", "")
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
     yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
     yield "must be given. A value out of its range is an error, and so is an unknown key."
@@ -242,8 +236,7 @@ def _scenario() -> Iterator[str]:
 
 
 def _feeder() -> Iterator[str]:
-    yield "# A feeder"
-    yield ""
+    yield from ("# A feeder", "")
     yield "A folder of CSV tables with one header line, UTF-8. A quantity's unit is in its column's name. Further"
     yield "columns are free. `plant/data/README.md` says which files a feeder needs."
     tables: list[type[msgspec.Struct]] = [*TABLES.values(), LoadColumns, Manifest]
@@ -275,20 +268,13 @@ def _registry(topic: str) -> Iterator[str]:
     """Yield the page of one registry: how an entry is written and named, and the entries that there are."""
     registry, how, key = _REGISTRIES[topic]
     title, _, rest = how.strip().partition("\n")
-    yield f"# {registry.plural[:1].upper()}{registry.plural[1:]}"
-    yield ""
-    yield title
-    yield from rest.rstrip().split("\n")
-    yield ""
+    yield from (f"# {registry.plural[:1].upper()}{registry.plural[1:]}", "", title, *rest.rstrip().split("\n"), "")
     yield f"In a scenario: {key}. A module is looked for beside the scenario's file, then on the Python path. A"
     yield f"distribution adds its own under the entry points `{registry.group}`."
     if not registry.names:
-        yield ""
-        yield "None come with gridpeers."
+        yield from ("", "None come with gridpeers.")
     for name in registry.names:
-        yield ""
-        yield f"## {name}"
-        yield ""
+        yield from ("", f"## {name}", "")
         yield from _entry(registry, name)
 
 

@@ -20,9 +20,6 @@ to the agents, which start with the plant: for listening, or as the near end of 
 
 _TRIES = 100
 
-_CALLED = 1.0
-"""Longest wait (s) for a connection within this host, which takes a fraction of a millisecond."""
-
 
 class ListenError(ValueError):
     """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
@@ -66,8 +63,7 @@ def local_endpoint(port: int) -> str:
 def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> str:
     """Return an endpoint where a process of this host will be able to listen; port 0 becomes a free port.
 
-    ListenError, which names the option, if the port is in use, the address is not one of this host, or its loopback
-    interface is down.
+    ListenError, which names the option, if the port is in use, or the address is not one of this host.
     """
     endpoint = parse_endpoint(text)
     if endpoint is None:
@@ -81,8 +77,6 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
         except OSError as error:
             reason = error
             continue
-        if fault := loopback_fault():
-            raise ListenError(f"{option}: {text} is of no use: {fault}")
         return str(endpoint._replace(port=port))
     raise ListenError(
         f"{option}: {text} cannot be listened on: {(reason.strerror or str(reason)).lower()}; "
@@ -98,25 +92,6 @@ def _listen_for_a_moment(host: str, port: int) -> None:
         trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         trial.bind((host.strip("[]"), port))
         trial.listen()
-
-
-def loopback_fault() -> str:
-    """Return why processes of this host cannot connect to each other; empty if they can, or if it is not known."""
-    with socket.socket() as listener, socket.socket() as caller:
-        try:
-            listener.bind(("127.0.0.1", 0))
-            listener.listen()
-        except OSError:  # a host without IPv4, or without a free port
-            return ""
-        caller.settimeout(_CALLED)
-        try:
-            caller.connect(listener.getsockname())
-        except OSError as error:
-            return (
-                f"processes of this host cannot connect to each other ({(error.strerror or str(error)).lower()}), as "
-                "its loopback interface is down; bring it up: ip link set lo up"
-            )
-    return ""
 
 
 def _way_out(host: str, error: OSError) -> str:

@@ -1,4 +1,4 @@
-"""Folders of a live run: a run folder on request, with the scenario as long as the run was, else a temporary one."""
+"""Files of a live run: its folder, with the scenario as long as the run was, and its link commands as a scenario."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-import msgspec
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig
@@ -30,8 +29,8 @@ from gridpeers.scenarios.results.run_files import (
     shown,
     write_whole,
 )
-from gridpeers.scenarios.schema.participants import inverters_of, netem_of
-from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, Case, ScenarioModel
+from gridpeers.scenarios.schema.participants import LISTS, inverters_of, netem_of
+from gridpeers.scenarios.schema.scenario_model import LONGEST_RUN, ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml, toml_lines
 from gridpeers.scenarios.versions import versions
 from gridpeers.wire.driver.command_line import command_line
@@ -49,12 +48,24 @@ def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel
     reached = tuple(event for event in scenario.events if event.t_s < end)
     missed = [f'"{event.label}" at {event.t_s:g} s' for event in scenario.events[len(reached) :]]
     labels = {event.label for event in reached}
-    cases = {name: _case(case, end, labels) for name, case in scenario.cases.items()}
+
+    def begun_by_then(netem: Netem) -> Netem:
+        entries = {one.name: tuple(it for it in getattr(netem, one.name) if it.from_s < end) for one in LISTS}
+        return replace(netem, **entries)
+
+    cases = {
+        name: replace(
+            case,
+            P_max_kW={label: powers for label, powers in case.P_max_kW.items() if label in labels},
+            netem=begun_by_then(case.netem),
+        )
+        for name, case in scenario.cases.items()
+    }
     changed = replace(
         scenario,
         time=replace(scenario.time, end_s=end),
         events=reached,
-        netem=_netem(scenario.netem, end),
+        netem=begun_by_then(scenario.netem),
         cases=cases,
     )
     remarks = [f"A live run: what people did in it is in events.csv and run.mcap. It lasted {ended:.2f} s."]
@@ -67,22 +78,6 @@ def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel
     if changed.netem != scenario.netem or any(cases[name].netem != case.netem for name, case in scenario.cases.items()):
         remarks.append("Faults of links and nodes that it did not reach are left out.")
     return changed, tuple(remarks)
-
-
-def _case(case: Case, end: float, labels: set[str]) -> Case:
-    """Return a case without what its scenario's events that are left out, and late faults, need."""
-    available = {label: powers for label, powers in case.P_max_kW.items() if label in labels}
-    return replace(case, P_max_kW=available, netem=_netem(case.netem, end))
-
-
-def _netem(netem: Netem, end: float) -> Netem:
-    """Return the entries that begin before the end (s)."""
-    return replace(
-        netem,
-        links=tuple(each for each in netem.links if each.from_s < end),
-        partitions=tuple(each for each in netem.partitions if each.from_s < end),
-        nodes=tuple(each for each in netem.nodes if each.from_s < end),
-    )
 
 
 @dataclass(frozen=True)
@@ -240,19 +235,19 @@ def replay_lines(scenario: ScenarioModel, feeder: Feeder, changes: Sequence[Chan
     ((name, case),) = scenario.cases.items()
     microgrids = {row.name: row.microgrid for row in inverters_of(scenario, feeder)}
     ages = case.degraded_communication
-    ages = msgspec.structs.replace(ages, max_age=ages.max_age or MAX_AGE)
+    ages = replace(ages, max_age=ages.max_age or MAX_AGE)
     T_c = scenario.time.T_c_s
     needed = max([t, *(change.from_s + T_c for change in changes)])
     end = max(scenario.time.end_s, rounded_up(needed, T_c))
     netem = netem_of(scenario, name)
     by_island = tuple(part for part in netem.partitions if part.by == "island")
-    replay = msgspec.structs.replace(
+    replay = replace(
         scenario,
         name="",
         paper="",
-        time=msgspec.structs.replace(scenario.time, end_s=end),
-        netem=msgspec.structs.replace(netem, links=(), partitions=by_island),
-        cases={name: msgspec.structs.replace(case, netem=Netem(), degraded_communication=ages)},
+        time=replace(scenario.time, end_s=end),
+        netem=replace(netem, links=(), partitions=by_island),
+        cases={name: replace(case, netem=Netem(), degraded_communication=ages)},
     )
     as_run = {"driver": LIVE, "python": platform.python_version()}
     return toml_lines(replay, as_run, [LINKS_ALONE], links=replayed(netem, changes, microgrids))

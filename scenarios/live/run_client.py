@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator
 from time import monotonic
 
-from gridpeers.scenarios.drivers.free_endpoint import loopback_fault, parse_endpoint
-from gridpeers.scenarios.live.run_address import PROBE, RunAddress, accepting, is_loopback_host
+from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
+from gridpeers.scenarios.live.run_address import PROBE, RunAddress, accepting
 from gridpeers.scenarios.live.run_monitor import RunTokens
 from gridpeers.wire.codec import RejectedError, decode
 from gridpeers.wire.driver.command_line import command_line
@@ -101,8 +101,6 @@ def _refusal(text: str, where: RunAddress) -> str:
     endpoint = parse_endpoint(text)
     if endpoint is None or not endpoint.connects:
         return ""
-    if is_loopback_host(endpoint.host) and (fault := loopback_fault()):
-        return f"nothing can be reached at {text}: {fault}"
     refusal = tls_refusal(endpoint.host.strip("[]"), endpoint.port, where.credentials, PROBE)
     if not refusal:
         return ""

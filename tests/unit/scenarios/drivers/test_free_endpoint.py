@@ -1,9 +1,6 @@
 """Endpoints to listen on: free ones, and the errors of others."""
 
-import shutil
 import socket
-import subprocess
-import sys
 
 import pytest
 
@@ -43,34 +40,3 @@ def test_a_name_without_an_address_cannot_be_listened_on() -> None:
     """The names under .invalid never have one."""
     with pytest.raises(ListenError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
         free_endpoint("tcp/lab.invalid:7447")
-
-
-def _apart(code: str) -> str:
-    """Return what code prints in a network namespace of its own, where the loopback interface is down."""
-    if shutil.which("unshare") is None or subprocess.run(["unshare", "-n", "true"], capture_output=True).returncode:
-        pytest.skip("network namespaces cannot be made here")
-    done = subprocess.run(["unshare", "-n", sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    return done.stdout + done.stderr
-
-
-@pytest.mark.parametrize("text", ["tcp/127.0.0.1:0", "tcp/0.0.0.0:7447"])
-def test_a_host_whose_loopback_is_down_is_told_before_anything_starts(text: str) -> None:
-    """An address can be bound there, and nobody reaches it: a run would wait for its agents and never begin."""
-    told = _apart(
-        f"from gridpeers.scenarios.drivers.free_endpoint import free_endpoint; "
-        f"free_endpoint({text!r}, option='--listen')"
-    )
-
-    assert f"ListenError: --listen: {text} is of no use: processes of this host cannot connect to each other" in told
-    assert "bring it up: ip link set lo up" in told
-
-
-def test_a_plant_is_not_waited_for_where_nothing_can_be_reached() -> None:
-    """The search for one on the loopback ends at its first look, with the same advice."""
-    told = _apart(
-        "from gridpeers.scenarios.live.run_address import address_of\n"
-        "from gridpeers.scenarios.live.run_client import RunClient\n"
-        "with RunClient(address_of('lab', None)) as client: client.find_plant(60.0)"
-    )
-
-    assert "NobodyError: nothing can be reached at tcp/127.0.0.1:7447: processes of this host cannot connect" in told
