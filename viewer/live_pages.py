@@ -4,21 +4,25 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import signal
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any
 
 import msgspec
 
-from gridpeers.scenarios.live.run_address import RunAddress
-from gridpeers.viewer.own_agents import OwnAgents
-from gridpeers.viewer.page_actions import ActionClient, PageAction, command_line
-from gridpeers.viewer.page_rights import looks_only
+from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_name
+from gridpeers.viewer.page_actions import ActionClient, PageAction, command_line, scenario_form
 from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
 from gridpeers.viewer.run_follower import RunFollower
 from gridpeers.viewer.run_view import Cursor
-from gridpeers.viewer.scenario_form import scenario_form
 from gridpeers.wire.codec import decode_foreign
+from gridpeers.wire.trust.credentials import Credentials
+from gridpeers.wire.trust.key_folder import COMMANDING
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
@@ -119,3 +123,93 @@ class LivePages:
             return {"ok": True, "command": command, "text": perform(), "scenario": scenario_form(action)}
         except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
             return {"ok": False, "command": command, "text": str(error)}
+
+
+LEAVING = 5.0
+"""Time (s) that an agent has to leave by itself."""
+
+
+class OwnAgents:
+    """Start agents as `gridpeers agent` does in a terminal, and end them.
+
+    Parameters
+    ----------
+    where : RunAddress
+        The run.
+    """
+
+    def __init__(self, where: RunAddress) -> None:
+        self._where = where
+        self._started: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
+
+    def start(self, name: str) -> str:
+        """Start an agent; return a sentence.
+
+        Raises
+        ------
+        UsageError
+            If one of that name that was started here still runs.
+        """
+        check_name("INVERTER", name)
+        self.take_endings()
+        if name in self._started:
+            raise UsageError(f"{name}: its agent was started here already, process {self._started[name][0].pid}")
+        log = tempfile.TemporaryFile()  # noqa: SIM115  closed with its process
+        words = ["agent", name, *self._where.words]
+        command = [sys.executable, "-P", "-m", "gridpeers", *words]
+        process = subprocess.Popen(
+            command, stdin=subprocess.DEVNULL, stdout=log, stderr=subprocess.STDOUT, start_new_session=True
+        )
+        self._started[name] = process, log
+        return f"{name}: its agent starts, process {process.pid}; it leaves when this view ends"
+
+    def take_endings(self) -> list[str]:
+        """Return a sentence for each agent that has ended by itself since the last call."""
+        endings = []
+        for name, (process, log) in list(self._started.items()):
+            if process.poll() is None:
+                continue
+            log.seek(0)
+            lines = log.read()[-2000:].decode(errors="replace").strip().splitlines()
+            log.close()
+            del self._started[name]
+            if process.returncode:
+                endings.append(f"{name}: its agent ended, exit code {process.returncode}: {lines[-1] if lines else ''}")
+        return endings
+
+    def close(self) -> None:
+        """Let all leave; end those that do not."""
+        for process, _ in self._started.values():
+            process.send_signal(signal.SIGTERM)
+        for process, log in self._started.values():
+            try:
+                process.wait(LEAVING)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+            log.close()
+        self._started.clear()
+
+
+def looks_only(credentials: Credentials | None) -> str:
+    """Return that a page only looks, and what would let it act.
+
+    A role that may not command gets no advice to say `--control` alone, which would be refused.
+
+    Parameters
+    ----------
+    credentials : Credentials or None
+        Of the one who opened the page; None of a run with open links.
+
+    Examples
+    --------
+    >>> looks_only(None)
+    'the page only looks (--control lets it act)'
+    """
+    if credentials is None or credentials.own.role in COMMANDING:
+        return "the page only looks (--control lets it act)"
+    folder = Path(credentials.certificate).parent
+    may = (member.name for member in credentials.members if member.role in COMMANDING and not member.revoked)
+    here = next((name for name in may if (folder / f"{name}.key").is_file()), None)
+    way = f"--as {here} --control lets it act" if here else f"to act takes --control and the key of an {COMMANDING[0]}"
+    return f"the page only looks, as {credentials.own.name} has the role {credentials.own.role} ({way})"

@@ -69,8 +69,7 @@ def view(
 def _live(live: LiveRun, *, control: bool) -> Iterator[tuple[Pages, Line]]:
     """Yield the pages of a live run, and the line that tells their address."""
     with live.client(meet_agents=True, acts=control) as client:
-        from gridpeers.viewer.live_pages import LivePages
-        from gridpeers.viewer.page_rights import looks_only
+        from gridpeers.viewer.live_pages import LivePages, looks_only
         from gridpeers.viewer.run_follower import RunFollower
 
         rights = "" if control else f"; {looks_only(client.where.credentials)}"
@@ -87,8 +86,7 @@ def _recorded(path: Path, case: str) -> Iterator[tuple[Pages, Line]]:
     require({"mcap": "the record of a run"})
     from gridpeers.scenarios.record.record_file import record_path
     from gridpeers.scenarios.record.record_reader import RecordFileError
-    from gridpeers.viewer.recorded.record_pages import RecordPages
-    from gridpeers.viewer.recorded.recorded_run import RecordedRun
+    from gridpeers.viewer.record_pages import RecordedRun, RecordPages
 
     try:
         path = record_path(path, case).parent if case else path
@@ -103,7 +101,7 @@ def _serve(
 ) -> NoReturn:
     """Serve pages until a signal comes."""
     with usage_errors():
-        from gridpeers.viewer.page_address import access, listen, url_of
+        from gridpeers.viewer.page_server import access, listen, url_of
 
         token, hosts = access(address, token)
         listening = listen(address, port)  # first: a port in use is told at once

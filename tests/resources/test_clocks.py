@@ -28,7 +28,7 @@ ALLOWED = {
     "wire/trust/site_authority.py": "the same",
     "scenarios/run_case.py": "the record says when a run began",
     "scenarios/live/live_files.py": "names of folders, and the same",
-    "viewer/recorded/recorded_run.py": "how long ago a file was written, which only says whether to look again",
+    "viewer/record_pages.py": "how long ago a file was written, which only says whether to look again",
 }
 """Files that may ask for the time of the day, and what for."""
 

@@ -16,7 +16,7 @@ import pytest
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
-from gridpeers.viewer.own_agents import OwnAgents
+from gridpeers.viewer.live_pages import OwnAgents
 from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, command_line
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from gridpeers.scenarios.live.run_address import UsageError
-from gridpeers.viewer.page_address import access
+from gridpeers.viewer.page_server import access
 
 
 @pytest.mark.parametrize("address", ["0.0.0.0", "192.0.2.7", "::", "lab.example"])

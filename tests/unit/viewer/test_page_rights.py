@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.viewer.page_rights import looks_only
+from gridpeers.viewer.live_pages import looks_only
 from gridpeers.wire.trust.key_folder import open_credentials
 from gridpeers.wire.trust.site_authority import make_site
 

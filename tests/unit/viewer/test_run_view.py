@@ -10,8 +10,7 @@ import pytest
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.emulation.link_data import LinkStatus
 from gridpeers.scenarios.live.run_monitor import PlantStatus
-from gridpeers.viewer.liveness import FROZEN
-from gridpeers.viewer.run_view import Cursor, RunView
+from gridpeers.viewer.run_view import FROZEN, Cursor, RunView
 from gridpeers.viewer.strips import LENGTH, STEP
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
 from tests.toy.toy_configs import agent_config

@@ -9,8 +9,7 @@ import pytest
 
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_model import LoadChange, ScenarioModel
-from gridpeers.viewer.page_actions import PageAction
-from gridpeers.viewer.scenario_form import scenario_form
+from gridpeers.viewer.page_actions import PageAction, scenario_form
 from tests.scenario_files import written
 
 SCENARIO = """

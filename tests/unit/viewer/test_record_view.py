@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.viewer.recorded.record_view import RecordView
+from gridpeers.viewer.record_view import RecordView
 from gridpeers.viewer.run_view import Frame
 from gridpeers.wire.messages import PlantEvent
 from tests.record.recorded_runs import recorded_in_chunks, recorded_run

@@ -14,8 +14,7 @@ import pytest
 from gridpeers.scenarios.record.record_file import RecordFileError
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.viewer.recorded.record_pages import RecordPage, RecordPages, RecordQuestion
-from gridpeers.viewer.recorded.recorded_run import STILL, RecordedRun
+from gridpeers.viewer.record_pages import STILL, RecordedRun, RecordPage, RecordPages, RecordQuestion
 from tests.record.recorded_runs import recorded_in_chunks
 
 ISLANDED = """

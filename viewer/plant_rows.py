@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.viewer.liveness import FROZEN
+from gridpeers.viewer.run_view import FROZEN
 from gridpeers.viewer.strips import LENGTH, Point, next_due, point_of
 from gridpeers.wire.messages import Telemetry
 

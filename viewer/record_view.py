@@ -9,21 +9,23 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Mapping
 from itertools import takewhile
+from math import cos, pi, sin
 
 from msgspec.structs import replace
 
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import set_power
+from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.rooms import ROOMS
-from gridpeers.scenarios.live.feeder_map import FeederMap, feeder_map
+from gridpeers.scenarios.live.feeder_map import FeederMap, MapInverter, feeder_map
 from gridpeers.scenarios.live.run_monitor import InverterStatus, PlantStatus
+from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
+from gridpeers.viewer.agent_moments import AgentMoment, AgentMoments
+from gridpeers.viewer.link_faults import NO_MESSAGES, LinkFaults
 from gridpeers.viewer.link_states import LinkView
-from gridpeers.viewer.liveness import LivenessView
-from gridpeers.viewer.recorded.agent_moments import AgentMoment, AgentMoments
-from gridpeers.viewer.recorded.inverter_ring import feeder_of, inverter_ring
-from gridpeers.viewer.recorded.link_faults import NO_MESSAGES, LinkFaults
-from gridpeers.viewer.recorded.plant_rows import PlantRows
-from gridpeers.viewer.run_view import Cursor, EventView, Frame, RunView
+from gridpeers.viewer.plant_rows import PlantRows
+from gridpeers.viewer.run_view import Cursor, EventView, Frame, LivenessView, RunView
 from gridpeers.viewer.strips import LENGTH
 from gridpeers.wire.messages import PLANT, AgentStatus, Pacing, PlantEvent, Telemetry
 
@@ -276,3 +278,37 @@ def _missing(record: RunRecord, *, has_feeder: bool) -> Iterator[str]:
         yield 'It was recorded with record = "decisions": what else arrived, and the fates of messages, are not in it.'
     if not has_feeder:
         yield f"The feeder {info.plant.settings.feeder} is not here: its inverters stand in a ring."
+
+
+def feeder_of(info: RecordInfo) -> Feeder | None:
+    """Return the feeder of a run; None if it is not here, or has other inverters now."""
+    try:
+        feeder = read_feeder(info.plant.settings.feeder, info.plant.settings.load_set)
+    except (FeederError, OSError, ValueError):
+        return None
+    names = {row.name for row in (*feeder.inverters, *feeder.spares)}
+    return feeder if names >= set(info.inverters) else None
+
+
+def inverter_ring(info: RecordInfo) -> FeederMap:
+    """Return a diagram that has the inverters of a run alone, in a ring, those of a microgrid beside each other."""
+    configs = {config.name: config for config in info.agents}
+    microgrids = list(dict.fromkeys(config.microgrid for config in info.agents))
+
+    def group(name: str) -> int:
+        return microgrids.index(configs[name].microgrid) if name in configs else len(microgrids)
+
+    names = sorted(info.inverters, key=group)
+    angles = [2.0 * pi * i / max(1, len(names)) for i in range(len(names))]
+    return FeederMap(
+        buses=tuple((name, sin(angle), cos(angle)) for name, angle in zip(names, angles, strict=True)),
+        inverters=tuple(
+            MapInverter(
+                name,
+                i,
+                configs[name].kind if name in configs else "GFL",
+                configs[name].microgrid if name in configs else "",
+            )
+            for i, name in enumerate(names)
+        ),
+    )
