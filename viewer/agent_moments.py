@@ -39,13 +39,7 @@ class AgentMoment(NamedTuple):
 
 
 class AgentMoments:
-    """Find the last decisions of all agents at any time.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    """
+    """Find the last decisions of all agents at any time."""
 
     def __init__(self, record: RunRecord) -> None:
         self._index, self._info, self._entries = record.index, record.info, record.entries_of_decisions
@@ -72,8 +66,6 @@ class AgentMoments:
         holes = self._entries.holes(PLANT)
         return sum(max(0.0, min(until, end) - max(since, begin)) for begin, end in holes)
 
-    # ---------------------------------------------------------------- simulated time
-
     def _in_ticks(self, t: float) -> list[AgentMoment]:
         T_c = self._info.T_c
         last, moments = int(t / T_c + 1e-6), []
@@ -95,8 +87,6 @@ class AgentMoments:
         ages = () if form is None else tuple(-1.0 if lag is None else round(lag * T_c, 9) for lag in form.states)
         return _moment(name, t, measured.island, form, ages, idle=state.idle)
 
-    # ---------------------------------------------------------------- wall-clock time
-
     def _live(self, t: float) -> list[AgentMoment]:
         gone = self._gone
         last: dict[str, tuple[Measurement, Decision]] = {}
@@ -114,8 +104,6 @@ class AgentMoments:
             else _moment(name, own.t, own.island, entry, tuple(-1.0 if age is None else age for age in entry.ages))
             for name, (own, entry) in last.items()
         ]
-
-    # ---------------------------------------------------------------- both
 
     def _perhaps_there(self, t: float) -> dict[str, AgentMoment]:
         """Return the agents that may have been there, for all that a damaged file says."""

@@ -21,13 +21,7 @@ NO_MESSAGES = LinkCounts(sent=0, duplicated=0, delivered=0, dropped={}, corrupte
 
 
 class LinkFaults:
-    """Say what the emulated links of a run did at a time.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    """
+    """Say what the emulated links of a run did at a time."""
 
     def __init__(self, record: RunRecord) -> None:
         self._index = record.index

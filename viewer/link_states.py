@@ -40,13 +40,7 @@ class LinkView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class LinkStates:
-    """Collect what is known of the links of a run.
-
-    Parameters
-    ----------
-    age_step : float
-        Step of ages (s).
-    """
+    """Collect what is known of the links of a run; ages come in steps (s)."""
 
     def __init__(self, age_step: float = AGE_STEP) -> None:
         self._age_step = age_step
@@ -64,11 +58,10 @@ class LinkStates:
         """Take an agent's status; `now` is the client's clock (s)."""
         at, sent, rate = self._sent.get(message.sender, (now, message.sent, 0.0))
         if message.sent < sent:
-            self._sent[message.sender] = now, message.sent, 0.0  # another process of that name
+            at, sent, rate = now, message.sent, 0.0  # another process of that name
         elif now - at > 0.3:  # statuses that a change causes come close together
-            self._sent[message.sender] = now, message.sent, _two_digits((message.sent - sent) / (now - at))
-        else:
-            self._sent[message.sender] = at, sent, rate
+            at, sent, rate = now, message.sent, _two_digits((message.sent - sent) / (now - at))
+        self._sent[message.sender] = at, sent, rate
         self._status[message.sender] = message
 
     def rates(self, rates: Mapping[str, float], now: float) -> None:
@@ -94,17 +87,7 @@ class LinkStates:
         return any(status.impaired for status in self._status.values())
 
     def into(self, receiver: str, islands: Mapping[str, str], max_age: float) -> tuple[LinkView, ...]:
-        """Return the links into an agent.
-
-        Parameters
-        ----------
-        receiver : str
-            Its name.
-        islands : Mapping[str, str]
-            Island of each agent, as far as it is known.
-        max_age : float
-            Age (s) beyond which it uses no state.
-        """
+        """Return the links into an agent, which uses no state beyond an age (s); islands as far as they are known."""
         status = self._status.get(receiver)
         if status is None:
             return ()

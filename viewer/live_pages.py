@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
@@ -16,11 +15,12 @@ from typing import IO, TYPE_CHECKING, Any
 import msgspec
 
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError, check_name
-from gridpeers.viewer.page_actions import ActionClient, PageAction, command_line, scenario_form
+from gridpeers.viewer.page_actions import ActionClient, PageAction, scenario_form
 from gridpeers.viewer.page_server import FASTEST, HEARTBEAT, SILENT, Talk, as_json, send, texts
 from gridpeers.viewer.run_follower import RunFollower
 from gridpeers.viewer.run_view import Cursor
 from gridpeers.wire.codec import decode_foreign
+from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.trust.credentials import Credentials
 from gridpeers.wire.trust.key_folder import COMMANDING
 
@@ -29,17 +29,7 @@ if TYPE_CHECKING:
 
 
 class LivePages:
-    """Send every page what is new of a run, and carry out what it asks for.
-
-    Parameters
-    ----------
-    follower : RunFollower
-        Follows the run.
-    where : RunAddress
-        The run.
-    control : bool, optional
-        Whether pages may act on it.
-    """
+    """Send every page what is new of a run, and with `control` carry out what it asks for."""
 
     def __init__(self, follower: RunFollower, where: RunAddress, *, control: bool = False) -> None:
         self._follower, self._where, self._control = follower, where, control
@@ -113,14 +103,12 @@ class LivePages:
             action = decode_foreign(msgspec.json.Decoder(PageAction).decode, text)
         except msgspec.DecodeError as error:
             return {"ok": False, "text": f"no action: {error}"}
-        command = command_line(action.words(), self._where)
+        command = command_line(*action.words(), *self._where.words)
         if not self._control:
             return {"ok": False, "command": command, "text": f"refused: {self._looks_only}"}
-        perform: Callable[[], str] = lambda: self._actions.perform(action)  # noqa: E731
-        if action.kind == "start":
-            perform = lambda: self._agents.start(action.subject)  # noqa: E731
         try:
-            return {"ok": True, "command": command, "text": perform(), "scenario": scenario_form(action)}
+            done = self._agents.start(action.subject) if action.kind == "start" else self._actions.perform(action)
+            return {"ok": True, "command": command, "text": done, "scenario": scenario_form(action)}
         except (ValueError, OSError) as error:  # refused, nobody there, bad usage, no memory for a process
             return {"ok": False, "command": command, "text": str(error)}
 
@@ -130,26 +118,14 @@ LEAVING = 5.0
 
 
 class OwnAgents:
-    """Start agents as `gridpeers agent` does in a terminal, and end them.
-
-    Parameters
-    ----------
-    where : RunAddress
-        The run.
-    """
+    """Start agents as `gridpeers agent` does in a terminal: processes that leave when the page's server ends."""
 
     def __init__(self, where: RunAddress) -> None:
         self._where = where
         self._started: dict[str, tuple[subprocess.Popen[bytes], IO[bytes]]] = {}
 
     def start(self, name: str) -> str:
-        """Start an agent; return a sentence.
-
-        Raises
-        ------
-        UsageError
-            If one of that name that was started here still runs.
-        """
+        """Start an agent, unless it was started here and still runs; return a sentence."""
         check_name("INVERTER", name)
         self.take_endings()
         if name in self._started:
@@ -192,17 +168,10 @@ class OwnAgents:
 
 
 def looks_only(credentials: Credentials | None) -> str:
-    """Return that a page only looks, and what would let it act.
+    """Return that a page without `--control` only looks, and what would let it act.
 
     A role that may not command gets no advice to say `--control` alone, which would be refused.
 
-    Parameters
-    ----------
-    credentials : Credentials or None
-        Of the one who opened the page; None of a run with open links.
-
-    Examples
-    --------
     >>> looks_only(None)
     'the page only looks (--control lets it act)'
     """

@@ -18,7 +18,6 @@ from gridpeers.scenarios.live.run_client import NobodyError, RunClient
 from gridpeers.scenarios.live.run_requests import ask, check_link_command, command_links, links_of_run, load_setting
 from gridpeers.scenarios.schema.scenario_writing import inline
 from gridpeers.wire.bounds import Text
-from gridpeers.wire.driver.command_line import command_line as typed_command
 
 ActionKind = Literal[
     "open", "close", "synchronise", "stop", "start", "cut", "delay", "loss", "heal", "heal all", "load"
@@ -53,8 +52,6 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     def words(self) -> list[str]:
         """Return the words of the command that does the same.
 
-        Examples
-        --------
         >>> PageAction(kind="cut", subject="inv1", other="inv4").words()
         ['link', 'cut', 'inv1', 'inv4']
         >>> PageAction(kind="load", subject="48", P_kW=300.0, Q_kvar=90.0).words()
@@ -92,45 +89,20 @@ class PageAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
         return LinkCommand(heal=Heal(on=on, from_s=0.0))
 
 
-def command_line(words: list[str], where: RunAddress) -> str:
-    """Return a command as it can be typed in the terminal in which the page's was.
-
-    Examples
-    --------
-    >>> command_line(["link", "cut", "inv1", "inv4"], RunAddress(run="gridpeers", connect=("tcp/127.0.0.1:7447",)))
-    'gridpeers link cut inv1 inv4'
-    >>> command_line(["stop", "inv4"], RunAddress(run="lab", connect=("tcp/10.0.0.1:7447",)))
-    'gridpeers stop inv4 --run lab --connect tcp/10.0.0.1:7447'
-    """
-    return typed_command(*words, *where.words)
-
-
 def _exact(value: float) -> str:
     """Return the shortest number that is read back as the same one."""
     return repr(value).removesuffix(".0")
 
 
 class ActionClient:
-    """Carry actions out, one after another, over a session of its own; all calls from one thread.
-
-    Parameters
-    ----------
-    where : RunAddress
-        The run.
-    """
+    """Carry actions out, one after another, over a session of its own; all calls from one thread."""
 
     def __init__(self, where: RunAddress) -> None:
         self._where = where
         self._client: RunClient | None = None
 
     def perform(self, action: PageAction) -> str:
-        """Carry out an action other than to start an agent; return its effect in words.
-
-        Raises
-        ------
-        NobodyError, RefusedError, UsageError
-            If it cannot be done.
-        """
+        """Carry out an action other than to start an agent; return its effect, or raise what says why it cannot be."""
         client = self._at_the_run()
         match action.kind:
             case "open" | "close" | "synchronise" | "stop":
@@ -176,8 +148,6 @@ def scenario_form(action: PageAction) -> str:
     An entry `[[event]]` needs a label and t_s beside, and `[[link]]` takes from_s and to_s; to heal a link is to_s of
     the entry that cuts it.
 
-    Examples
-    --------
     >>> print(scenario_form(PageAction(kind="load", subject="48", factor=1.5)))
     [[event]]
     load = { 48 = { factor = 1.5 } }
@@ -188,10 +158,8 @@ def scenario_form(action: PageAction) -> str:
     """
     link: dict[str, Any] = {"on": f"{action.subject} <-> {action.other}"}
     match action.kind:
-        case "open":
-            return _entry("event", {"open": [action.subject]})
-        case "close":
-            return _entry("event", {"close": [action.subject]})
+        case "open" | "close":
+            return _entry("event", {action.kind: [action.subject]})
         case "synchronise":
             return _entry("event", {"close": [action.subject], "synchronised": True})
         case "stop":

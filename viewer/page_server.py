@@ -6,7 +6,6 @@ import asyncio
 import contextlib
 import errno
 import hashlib
-import ipaddress
 import logging
 import secrets
 import signal
@@ -20,7 +19,7 @@ from urllib.parse import parse_qs
 
 import msgspec
 
-from gridpeers.scenarios.live.run_address import UsageError
+from gridpeers.scenarios.live.run_address import UsageError, is_loopback_host
 from gridpeers.wire.driver.drive import StoppedError
 
 if TYPE_CHECKING:
@@ -32,15 +31,7 @@ if TYPE_CHECKING:
 PAGE = Path(__file__).parent / "page"
 """The page's own files; it loads nothing from elsewhere."""
 
-FILES = {
-    "view.css": "text/css",
-    "view.js": "text/javascript",
-    "diagram.js": "text/javascript",
-    "diagram_keys.js": "text/javascript",
-    "load_dialog.js": "text/javascript",
-    "strips.js": "text/javascript",
-    "player.js": "text/javascript",
-}
+KINDS = {".css": "text/css", ".js": "text/javascript"}
 
 HEARTBEAT = 0.25
 """Longest time (s) between two frames: a page that hears nothing for a second knows that its numbers are old."""
@@ -105,15 +96,7 @@ class Pages(Protocol):
 
 
 class PageServer:
-    """Serve the page until a signal comes.
-
-    Parameters
-    ----------
-    pages : Pages
-        What the pages show.
-    options : PageOptions
-        Options of the command.
-    """
+    """Serve the page until a signal comes."""
 
     def __init__(self, pages: Pages, options: PageOptions) -> None:
         self._pages, self._options = pages, options
@@ -199,10 +182,10 @@ class PageServer:
         return answer
 
     async def _static(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        if name not in FILES or not self._admits(request):
+        found = next((file for file in PAGE.iterdir() if file.name == request.path_params["name"]), None)
+        if found is None or found.suffix not in KINDS or not self._admits(request):
             return _answer("not found", 404, "text/plain")
-        return _answer((PAGE / name).read_text(), 200, FILES[name])
+        return _answer(found.read_text(), 200, KINDS[found.suffix])
 
     # ---- a page that is open
 
@@ -256,13 +239,7 @@ def as_json(value: Any) -> str:
 
 
 async def send(socket: WebSocket, text: str) -> None:
-    """Send a page a message.
-
-    Raises
-    ------
-    WebSocketDisconnect
-        If the page has gone, or the server has closed the connection.
-    """
+    """Send a page a message; WebSocketDisconnect if the page has gone, or the server has closed the connection."""
     from starlette.websockets import WebSocketDisconnect
 
     try:
@@ -275,30 +252,8 @@ LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 """Names of this host's loopback in the address of a page."""
 
 
-def is_this_host(address: str) -> bool:
-    """Return whether an address is this host's loopback.
-
-    Examples
-    --------
-    >>> is_this_host("127.0.0.1"), is_this_host("localhost"), is_this_host("0.0.0.0")
-    (True, True, False)
-    """
-    if address == "localhost":
-        return True
-    try:
-        return ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        return False
-
-
 def listen(address: str, port: int) -> socket.socket:
-    """Return a socket that listens; port 0 takes any free one.
-
-    Raises
-    ------
-    UsageError
-        If the address is none of this host, or the port is in use.
-    """
+    """Return a socket that listens; port 0 takes any free one. UsageError if the port is in use."""
     if not 0 <= port <= 65535:
         raise UsageError(f"--port: a port is a number from 0 to 65535, got {port}")
     try:
@@ -326,19 +281,12 @@ def access(address: str, token: str) -> tuple[str, tuple[str, ...]]:
     On this host's loopback no token is needed, and only names of this host are taken. Beyond it a token is: without a
     given one it is made up.
 
-    Raises
-    ------
-    UsageError
-        If the token is no text.
-
-    Examples
-    --------
     >>> access("127.0.0.1", "")
     ('', ('127.0.0.1', 'localhost', '[::1]'))
     """
     if token != token.encode(errors="replace").decode():
         raise UsageError("--token: has bytes that are no text; give letters and digits")
-    if is_this_host(address):
+    if is_loopback_host(address):
         return token, tuple(dict.fromkeys((*LOOPBACK, address)))
     return token or secrets.token_urlsafe(16), ()
 

@@ -27,15 +27,7 @@ class _Rows(NamedTuple):
 
 
 class PlantRows:
-    """Read rows by time.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    configs : Mapping[str, AgentConfig]
-        Configuration of each inverter, for per-unit values.
-    """
+    """Read rows by time; the configuration of each inverter gives per-unit values."""
 
     def __init__(self, record: RunRecord, configs: Mapping[str, AgentConfig]) -> None:
         self._record, self._index, self._configs = record, record.index, configs

@@ -56,13 +56,7 @@ class RecordPage:
 
 
 class RecordPages:
-    """Answer the questions of pages, one at a time, from the records of a run.
-
-    Parameters
-    ----------
-    run : RecordedRun
-        The records. Only a thread of these pages uses it.
-    """
+    """Answer the questions of pages, one at a time, from the records of a run, which their thread alone uses."""
 
     def __init__(self, run: RecordedRun) -> None:
         self._run = run
@@ -111,8 +105,6 @@ class RecordPages:
         async for text in texts(socket):
             with contextlib.suppress(msgspec.DecodeError):
                 await page.questions.put(decode_foreign(msgspec.json.Decoder(RecordQuestion).decode, text))
-
-    # ---------------------------------------------------------------- in the thread that reads
 
     def news(self, page: RecordPage) -> list[str]:
         """Return what is new of the record that a page shows, after the record itself if it is another one."""
@@ -213,17 +205,9 @@ class RecordNews(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RecordedRun:
-    """Open the records of a run, each when it is asked for.
+    """Open the records of a run, each when it is asked for, from the folder of a run or case, or a run.mcap.
 
-    Parameters
-    ----------
-    path : Path
-        Folder of a run, folder of a case, or run.mcap.
-
-    Raises
-    ------
-    RecordFileError
-        If there is no record, none is coming, or the only one is none of ours.
+    RecordFileError if there is no record, none is coming, or the only one is none of ours.
     """
 
     def __init__(self, path: Path) -> None:
@@ -245,13 +229,7 @@ class RecordedRun:
         return tuple(self._files())
 
     def view(self, case: str = "") -> RecordView:
-        """Return a record as it is now; without a case, the latest.
-
-        Raises
-        ------
-        RecordFileError
-            If there is no such record, or it cannot be read.
-        """
+        """Return a record as it is now; without a case, the latest. RecordFileError if it cannot be read."""
         files = self._files()
         if not files:
             known = self._views and not self.path.exists()
@@ -266,13 +244,7 @@ class RecordedRun:
         return view
 
     def news(self, case: str, events: int) -> RecordNews:
-        """Return what is new of a record, whose first events are known; of the latest without a case.
-
-        Raises
-        ------
-        RecordFileError
-            As `view`.
-        """
+        """Return what is new of a record, whose first events are known; of the latest without a case."""
         view = self.view(case)
         record = view.record
         growth, text = self._growth(record)
@@ -286,8 +258,6 @@ class RecordedRun:
             notes=(*view.missing, *(f"{each[:1].upper()}{each[1:]}." for each in damage)),
             events=tuple(view.events[events:]),
         )
-
-    # ---------------------------------------------------------------- inner
 
     def _files(self) -> dict[str, Path]:
         """Return the file of each case, the latest last."""

@@ -39,13 +39,7 @@ _STILL = Pacing(steps=0, late=0, p50=0.0, p95=0.0, p99=0.0, worst=0.0, slipped=0
 
 
 class RecordView:
-    """Read a record for the page.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    """
+    """Read a record for the page."""
 
     def __init__(self, record: RunRecord) -> None:
         self.record = record
@@ -128,17 +122,9 @@ class RecordView:
         )
 
     def decision(self, agent: str, t: float) -> str:
-        """Return in words and numbers how an agent decided at a run time (s), as `gridpeers why` does.
-
-        Raises
-        ------
-        RecordFileError
-            If it had not decided, or the record does not have it.
-        """
+        """Return how an agent decided at a run time (s), as `gridpeers why` does."""
         self.events  # noqa: B018  reads them, if there are more
         return str(ROOMS.resolve("explain")(self.record, agent, t, tuple(self._plant_events)))
-
-    # ---------------------------------------------------------------- inner
 
     def _present(self, t: float, agents: Mapping[str, AgentMoment]) -> list[str]:
         """Return the agents that were there: by their decisions, or by the schedule if the record has none.

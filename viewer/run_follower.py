@@ -33,18 +33,12 @@ AGAIN = 0.1
 
 
 class RunFollower:
-    """Feed a run's messages into a `RunView`, and read frames from it. Use it as a context.
-
-    Parameters
-    ----------
-    client : RunClient
-        At the run, with its agents met. Only this follower's thread uses it.
-    """
+    """Feed a run's messages into a `RunView`, and read frames from it. Only its thread uses the client."""
 
     def __init__(self, client: RunClient) -> None:
         self._client = client
         self._view, self._lock = RunView(client.where.run), threading.Lock()
-        self._on_news: Callable[[], None] = _nothing
+        self._on_news: Callable[[], None] = lambda: None
         self._ending = threading.Event()
         self._thread = threading.Thread(target=self._follow, daemon=True)
         self._asked_status = self._asked_accounts = self._ask_map_at = float("-inf")
@@ -123,7 +117,3 @@ class RunFollower:
             elif isinstance(message, LinkAcknowledgement) and message.ok and message.data:
                 self._view.accounts(message.sender, decode_statuses(message.data))
         self._on_news()
-
-
-def _nothing() -> None:
-    """Do nothing."""

@@ -79,15 +79,7 @@ class Frame(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class RunView:
-    """Collect a run's messages for the page.
-
-    Parameters
-    ----------
-    run : str
-        Name of the run.
-    age_step : float
-        Step of the ages of links (s).
-    """
+    """Collect a run's messages for the page; ages of links come in steps (s)."""
 
     def __init__(self, run: str, age_step: float = AGE_STEP) -> None:
         self._monitor = RunMonitor(run)
@@ -115,7 +107,6 @@ class RunView:
 
     @property
     def inverters(self) -> tuple[str, ...]:
-        """Names of all inverters in the messages so far, in order."""
         return self._monitor.inverters
 
     @property
@@ -123,10 +114,7 @@ class RunView:
         """Whether any link has an emulated fault, so that its account is of interest."""
         return self._links.any_impaired
 
-    # ---- what comes
-
     def config(self, config: AgentConfig) -> None:
-        """Take the configuration of an agent."""
         self._configs[config.name] = config
         self._monitor.config(config)
 
@@ -142,7 +130,6 @@ class RunView:
         self._take_events(message.events)
 
     def plant_status(self, status: PlantStatus) -> None:
-        """Take the plant's status."""
         self._monitor.plant_status(status)
         self.wants_status = False
         if status.switches != self._switches:
@@ -152,7 +139,6 @@ class RunView:
         self._take_events(status.events, old=True)
 
     def status(self, message: AgentStatus, now: float) -> None:
-        """Take the status of an agent."""
         self._note_status(message, now)
         self._renew_links(message.sender)
 
@@ -165,7 +151,6 @@ class RunView:
             self._renew_links(message.sender)
 
     def accounts(self, receiver: str, statuses: Mapping[str, LinkStatus]) -> None:
-        """Take the states of the emulated links into a receiver."""
         self._links.accounts(receiver, statuses)
         self._renew_links(receiver)
 
@@ -179,8 +164,6 @@ class RunView:
         for name, (_, links) in list(self._into.items()):
             if links and (name not in self._present or now - self._status_at[name] > SILENT):
                 self._note_links(name, ())
-
-    # ---- what a page reads
 
     def frame(self, cursor: Cursor, now: float) -> tuple[Frame, Cursor]:
         """Return what is new since a cursor, and the next cursor."""
@@ -215,8 +198,6 @@ class RunView:
             loads=self._loads_version,
         )
         return frame, later
-
-    # ---- inner
 
     def _begin_again(self) -> None:
         """Forget what the former plant said."""
@@ -275,8 +256,6 @@ class LivenessView(msgspec.Struct, frozen=True, kw_only=True):
 class Liveness:
     """Decide from tokens and telemetry whether numbers are of now.
 
-    Examples
-    --------
     >>> liveness = Liveness()
     >>> liveness.at(0.0).word
     'waiting'
@@ -323,16 +302,11 @@ class Liveness:
         if silent is None:
             return self._view("waiting", "The run has not begun: the plant waits for its agents.", None)
         if silent > FROZEN:
-            return self._view(
-                "frozen", f"The plant has been silent for {silent:.1f} s: frozen, or out of reach.", silent
-            )
+            text = f"The plant has been silent for {silent:.1f} s: frozen, or out of reach."
+            return self._view("frozen", text, silent)
         return self._view("live", "live", None)
 
     def _view(self, word: Word, text: str, since: float | None) -> LivenessView:
         again = f" The plant was restarted {self._restarts} times." if self._restarts and word != "live" else ""
-        return LivenessView(
-            word=word,
-            text=text + again,
-            since=None if since is None else round(since, 1),
-            restarts=self._restarts,
-        )
+        since = None if since is None else round(since, 1)
+        return LivenessView(word=word, text=text + again, since=since, restarts=self._restarts)

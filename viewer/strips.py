@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from math import isfinite
 
 import numpy as np
@@ -30,8 +31,6 @@ finite, or of an inverter off the network."""
 class Strips:
     """Keep points of the last `LENGTH` seconds.
 
-    Examples
-    --------
     >>> strips = Strips()
     >>> strips.add(("inv1",), [(0.0, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0), (0.01, 60.0, 3e5, 0.0, 277.0, 3e5, 277.0)], {})
     >>> strips.since(-1.0)
@@ -53,10 +52,7 @@ class Strips:
         self._due = 0.0
 
     def add(
-        self,
-        inverters: tuple[str, ...],
-        rows: list[tuple[float, ...]] | tuple[tuple[float, ...], ...],
-        configs: Mapping[str, AgentConfig],
+        self, inverters: tuple[str, ...], rows: Sequence[tuple[float, ...]], configs: Mapping[str, AgentConfig]
     ) -> None:
         """Take rows of telemetry; per-unit values need the nameplates of all inverters."""
         for row in rows:
@@ -68,12 +64,7 @@ class Strips:
 
     def since(self, t: float) -> list[Point]:
         """Return the points after a run time (s)."""
-        found = []
-        for point in reversed(self._points):
-            if point[0] <= t:
-                break
-            found.append(point)
-        return found[::-1]
+        return [*takewhile(lambda point: point[0] > t, reversed(self._points))][::-1]
 
 
 def next_due(t: float, inverters: int, length: float = LENGTH) -> float:

@@ -16,12 +16,16 @@ import pytest
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, EmulationConfig, LinkCommand
 from gridpeers.scenarios.live.run_address import ENDPOINT, RUN, RunAddress
+from gridpeers.scenarios.schema import load_scenario
+from gridpeers.scenarios.schema.scenario_model import LoadChange, ScenarioModel
 from gridpeers.viewer.live_pages import OwnAgents
-from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, command_line
+from gridpeers.viewer.page_actions import ActionClient, ActionKind, PageAction, scenario_form
 from gridpeers.wire.codec import decode, encode
+from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Answer, AnyMessage, Command, LoadSetting, Pacing
 from tests.command_line import invoke
+from tests.scenario_files import written
 from tests.toy.toy_configs import agent_config
 
 WHERE = RunAddress(run=RUN, connect=(ENDPOINT,))
@@ -196,7 +200,7 @@ def test_the_command_is_written_as_the_page_was_called(tmp_path: Path, monkeypat
     program.touch()
     monkeypatch.setattr("sys.argv", [str(program), "view"])
 
-    assert command_line(["stop", "inv4"], WHERE) == f"{program} stop inv4"
+    assert command_line("stop", "inv4", *WHERE.words) == f"{program} stop inv4"
 
 
 def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -216,7 +220,7 @@ def test_to_start_an_agent_is_the_command_too(monkeypatch: pytest.MonkeyPatch) -
 
     assert text == "inv4: its agent starts, process 7; it leaves when this view ends"
     (command,) = begun
-    typed = shlex.split(command_line(action.words(), where))
+    typed = shlex.split(command_line(*action.words(), *where.words))
     assert typed == ["gridpeers", "agent", "inv4", "--run", "lab", "--connect", "tcp/10.0.0.1:7447"]
     assert command[-len(typed) :] == typed
 
@@ -232,3 +236,59 @@ def test_a_name_is_no_option_of_its_command(name: str) -> None:
 def test_every_action_is_here() -> None:
     """An action of the page without a test of its request would be a way to do another one."""
     assert {action.kind for action, _, _ in REQUESTS} | {"start"} == set(get_args(ActionKind))
+
+
+SCENARIO = """
+[time]
+end_s = 2.0
+[case.IV]
+secondary = "all"
+graph = "full"
+"""
+
+
+def of_event(scenario: ScenarioModel, key: str) -> Any:
+    """A key of the one event of a scenario."""
+    (event,) = scenario.events
+    return getattr(event, key)
+
+
+@pytest.mark.parametrize(
+    ("action", "key", "value"),
+    [
+        (PageAction(kind="open", subject="13-152"), "open", ("13-152",)),
+        (PageAction(kind="close", subject="18-135"), "close", ("18-135",)),
+        (PageAction(kind="synchronise", subject="18-135"), "synchronised", True),
+        (PageAction(kind="stop", subject="inv4"), "leave", ("inv4",)),
+        (PageAction(kind="start", subject="inv10"), "join", ("inv10",)),
+        (PageAction(kind="load", subject="48", factor=1.5), "load", {"48": LoadChange(factor=1.5)}),
+        (PageAction(kind="load", subject="48", P_kW=300, Q_kvar=-9), "load", {"48": LoadChange(P_kW=300, Q_kvar=-9)}),
+    ],
+)
+def test_an_event_of_the_page_is_one_of_a_scenario(action: PageAction, key: str, value: Any, tmp_path: Path) -> None:
+    """With a label and a time it loads, and has what was clicked."""
+    entry = scenario_form(action).replace("[[event]]", '[[event]]\nlabel = "mine"\nt_s = 1.0')
+
+    assert of_event(load_scenario(written(tmp_path, SCENARIO + entry))[0], key) == value
+
+
+@pytest.mark.parametrize(
+    ("action", "kinds"),
+    [
+        (PageAction(kind="cut", subject="inv1", other="inv4"), {"cut"}),
+        (PageAction(kind="delay", subject="inv1", other="inv4", value=0.1), {"delay"}),
+        (PageAction(kind="loss", subject="inv1", other="inv4", value=0.25), {"loss"}),
+    ],
+)
+def test_a_fault_of_the_page_is_one_of_a_scenario(action: PageAction, kinds: set[str], tmp_path: Path) -> None:
+    """A link that is cut, or late, or loses messages, both ways."""
+    scenario, _ = load_scenario(written(tmp_path, SCENARIO + scenario_form(action)))
+
+    (fault,) = scenario.netem.links
+    assert fault.on == "inv1 <-> inv4"
+    assert set(fault.models()) == kinds
+
+
+def test_what_ends_another_entry_has_none() -> None:
+    """To heal a link is the end of the entry that cuts it."""
+    assert scenario_form(PageAction(kind="heal", subject="inv1", other="inv4")) == ""

@@ -179,8 +179,7 @@ def test_switches_and_loads_of_an_old_record_are_read_from_its_words(
         assert numbers
         return PlantEvent(t=t, kind=kind, subject=subject, text=text)
 
-    for module in ("switchboard", "load_board"):
-        monkeypatch.setattr(f"gridpeers.plant.feeder.{module}.PlantEvent", in_words)
+    monkeypatch.setattr("gridpeers.plant.feeder.switchboard.PlantEvent", in_words)
     view = RecordView(recorded_in_chunks(WITH_LOADS, tmp_path))
 
     positions = [view.frame(t).switches for t in (0.19, 0.2)]
