@@ -52,12 +52,7 @@ def settling(history: History, nameplates: Nameplates, window: Window, f_nom: fl
 def nameplates_of(spec: ScenarioModel, feeder: Feeder, case: str = "") -> Nameplates:
     """Return the nameplates of a scenario's inverters, in the order of a record's columns.
 
-    Parameters
-    ----------
-    spec, feeder : ScenarioModel, Feeder
-        What was run (`gridpeers.Scenario.spec`, `gridpeers.Scenario.feeder`).
-    case : str, optional
-        Leave out the inverters that have no agent in this case, as the sharing indices do.
+    With a case, those without an agent in it are left out, as the sharing indices do.
     """
     from gridpeers.scenarios.schema.participants import inverters_of, without_agent
 

@@ -45,10 +45,7 @@ __all__ = [
 def whole_folder(folder: Path) -> Iterator[None]:
     """Fill a folder, new or empty, within this; whatever ends it early leaves the folder as it was.
 
-    Raises
-    ------
-    FolderError
-        If there is something in it, it is a file, it cannot be made or written, or another command fills it.
+    FolderError if there is something in it, it cannot be written, or another command fills it.
     """
     there = folder.exists()
     handle = os.open(empty_folder(folder), os.O_RDONLY | os.O_CLOEXEC)
@@ -75,13 +72,6 @@ def whole_folder(folder: Path) -> Iterator[None]:
 def feeder_folder(name: str) -> Path:
     """Return the folder with the tables of a feeder that comes with gridpeers, e.g. to copy and change them.
 
-    Raises
-    ------
-    ValueError
-        If there is none of this name.
-
-    Examples
-    --------
     >>> (feeder_folder("microgrid123") / "inverters.csv").is_file()
     True
     """

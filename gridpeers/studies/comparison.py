@@ -30,39 +30,18 @@ RunSource = Result | Results | str | Path
 
 
 def compare(a: RunSource, b: RunSource, *, names: tuple[str, str] = ("a", "b")) -> Comparison:
-    """Compare two runs.
+    """Compare two results, or the folders of runs; `names` are two different words for them, in tables and figures.
 
-    Parameters
-    ----------
-    a, b : Result, Results, str or Path
-        Two results, or the folders of runs. Of runs with several cases, those are compared that both have; two single
-        cases are compared whatever they are called.
-    names : tuple[str, str]
-        Two different words for them, in tables and figures.
-
-    Raises
-    ------
-    ScenarioError
-        If they have no case in common.
-    FolderError
-        If a folder cannot be read.
-
-    Examples
-    --------
-    >>> compare(load("islanding").run("III"), load("islanding").run("IV"), names=("III", "IV"))  # doctest: +SKIP
+    Of runs with several cases, those are compared that both have; two single cases whatever they are called.
     """
-    if not _are_names(names):
+    words = tuple(names) if isinstance(names, list | tuple) else ()
+    if len(words) != 2 or words[0] == words[1] or not all(isinstance(word, str) and word for word in words):
         raise ScenarioError([f'names: two different words are needed, as ("before", "after"), got {names!r:.60}'])
     first, second = (read(run) if isinstance(run, str | Path) else run for run in (a, b))
     for run in (first, second):
         if not isinstance(run, Result | Results):
             raise ScenarioError([f"compare: needs results or folders of runs, got {run!r:.60}"])
-    return Comparison(_pairs(first, second), (names[0], names[1]))
-
-
-def _are_names(it: Any) -> bool:
-    words = tuple(it) if isinstance(it, list | tuple) else ()
-    return len(words) == 2 and all(isinstance(word, str) and word for word in words) and words[0] != words[1]
+    return Comparison(_pairs(first, second), (words[0], words[1]))
 
 
 def _pairs(a: Result | Results, b: Result | Results) -> dict[str, tuple[Result, Result]]:
@@ -108,7 +87,7 @@ class Comparison:
         """Keys of the scenarios that differ, with both values; "" where a scenario has no such key."""
         first, second = (_keys(pair) for pair in zip(*self._pairs.values(), strict=True))
         keys = [key for key in dict.fromkeys((*first, *second)) if first.get(key) != second.get(key)]
-        rows = {key: [_shown(keys_of, key) for keys_of in (first, second)] for key in keys}
+        rows = {key: [str(of.get(key, "")) for of in (first, second)] for key in keys}
         return pd.DataFrame.from_dict(rows, orient="index", columns=list(self.names)).rename_axis("key")
 
     @property
@@ -183,7 +162,3 @@ def _keys(runs: tuple[Result, ...]) -> dict[str, Any]:
     cases = tables.pop("case")
     tables["case"] = cases[runs[0].case] if len(runs) == 1 else {run.case: cases[run.case] for run in runs}
     return dict(flatten(tables))
-
-
-def _shown(keys: dict[str, Any], key: str) -> str:
-    return str(keys[key]) if key in keys else ""

@@ -43,47 +43,32 @@ def sweep(
 ) -> pd.DataFrame:
     """Run a scenario over values of its keys, and return a row per run.
 
+    Its columns are case, seed, the varied keys, `status` ("ran", "broke" or "law failed") and `why`, the metrics as
+    "WINDOW.METRIC" (nan where there is no value), and without `metrics` also `history_sha256` and the like. Units are
+    in its `attrs`. ScenarioError has everything that is wrong with the values, before anything is run; WorkersError
+    if the scheduler does not answer, or a worker has gone.
+
     Parameters
     ----------
-    scenario : Scenario, str or Path
-        What is varied, or its name or path.
     grid : Mapping[str, Iterable], optional
         Values by the dotted path of a key, as in `Scenario.replace`; every combination is run.
     zip : Mapping[str, Iterable], optional
         Keys whose values go together, first with first.
     cases : iterable of str, optional
-        Cases that are run; all when left out.
+        All when left out.
     seeds : int
         How many seeds every point is run with: the scenario's, and those that follow it.
     metrics : iterable, optional
         Metrics to keep, e.g. `["MPSI", "t_restore_s"]`, of every window; all when left out. One of your own is a
         function of a window, its registered name, `module:Name`, or a table with `use` and parameters.
     histories : bool
-        Whether each row has its history, in a column of that name, as `Result.history`.
+        Give each row its history, in a column of that name, as `Result.history`.
     jobs : int, optional
         Processes; one per core when left out. More than one needs joblib, of the extra `sweep`.
     dask : str, optional
         Address of a Dask scheduler to use instead, e.g. "tcp://10.0.0.1:8786" (docs/sweeps.md).
     progress : Callable[[int, int], None], optional
-        Is called with the number of runs that are done, and of all runs.
-
-    Returns
-    -------
-    pandas.DataFrame
-        Columns: case, seed, the varied keys, `status` ("ran", "broke" or "law failed") and `why`, the metrics as
-        "WINDOW.METRIC" (nan where there is no value), and without `metrics` also `history_sha256` and the like. Units
-        are in its `attrs`.
-
-    Raises
-    ------
-    ScenarioError
-        With everything that is wrong with the values, before anything is run.
-    WorkersError
-        If the scheduler does not answer, or a worker has gone.
-
-    Examples
-    --------
-    >>> table = sweep(load("islanding"), {"gains.k_p": [0.001, 0.002]}, cases=["IV"])  # doctest: +SKIP
+        Takes the number of runs that are done, and of all runs.
     """
     known = as_scenario(scenario)
     _check_words(grid, zip, cases, metrics, jobs, dask, progress)
@@ -113,7 +98,6 @@ def sweep(
 
 
 def _check_words(grid: Any, zipped: Any, cases: Any, metrics: Any, jobs: Any, dask: Any, progress: Any) -> None:
-    """Check the kind of each argument, all at once."""
     wrong = [
         f'{name}: needs lists of values by the path of their key, as {{"gains.k_p": [0.001, 0.002]}}, got {it!r:.60}'
         for name, it in (("grid", grid), ("zip", zipped))
@@ -150,7 +134,6 @@ def _with_metrics(scenario: Scenario, metrics: str | Iterable[Any] | None) -> tu
 
 
 def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ...], seeds: int) -> Plan:
-    """Check the runs."""
     problems = Problems("sweep")
     crossed: dict[str, Any] = {}
     paired: dict[str, Any] = {}
@@ -171,7 +154,6 @@ def _plan(scenario: Scenario, grid: Values, zipped: Values, cases: tuple[str, ..
 
 
 def _require_dask(plan: Plan) -> None:
-    """Raise a ScenarioError if runs cannot be done on a Dask cluster."""
     if find_spec("joblib") is None or find_spec("distributed") is None:
         raise ScenarioError(["dask: needs joblib and distributed: pip install 'gridpeers[sweep]'"])
     unknown = (text for run in plan.runs for text in check_portable(run.scenario, measures=True))

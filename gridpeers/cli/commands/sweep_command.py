@@ -78,20 +78,7 @@ def sweep(
 def finish(file: str, plan: Plan, path: Path, jobs: int | None, dask: str, again: Sequence[str]) -> Summary:
     """Do what is left of a sweep, showing how far it is; whatever ends it early ends the command.
 
-    Parameters
-    ----------
-    file : str
-        What the user calls it.
-    plan : Plan
-        The sweep.
-    path : Path
-        Its folder.
-    jobs : int or None
-        Processes; None is one per core.
-    dask : str
-        Address of a scheduler to use instead, or nothing.
-    again : sequence of str
-        Words of the command that goes on with what was interrupted.
+    `again` has the words of the command that goes on with what was interrupted.
     """
     from gridpeers.cli.progress import remaining
     from gridpeers.scenarios.results.run_files import FolderError, refusal, shown

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import socket
 import urllib.error
 import urllib.request
 from pathlib import Path
@@ -13,10 +12,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.processes.realtime.browsers import SLOW, WAIT, accessible, page_of, run_of, view_of
-from tests.processes.terminals import Desk
+from tests.processes.terminals import Desk, Terminal
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser
+    from playwright.sync_api import Browser, Page
 
 pytest.importorskip("starlette", reason="the extra view is not installed")
 pytest.importorskip("websockets", reason="the extra view is not installed")
@@ -31,6 +30,36 @@ def status(url: str, **headers: str) -> int:
     except urllib.error.HTTPError as error:
         error.close()
         return error.code
+
+
+def sets_a_load(desk: Desk, plant: Terminal, page: Page, other: Page) -> None:
+    """By factor or in kW and kvar, with the command beside it, on every open page; what makes no sense is refused."""
+    page.wait_for_selector('[data-load="48"]', state="attached")
+    page.locator('[data-load="48"]').dispatch_event("click")
+    assert page.locator("#load-now").inner_text() == "210 kW and 150 kvar at nominal voltage"
+    page.locator("#load-factor").fill("1.5")
+    page.keyboard.press("Enter")
+    assert not page.locator("#load-dialog").is_visible()
+    for each in (page, other):
+        each.wait_for_selector('[data-load="48"].set', state="attached")
+    plant.expect("load 48 set to 315 kW and 225 kvar at nominal voltage, 1.5 times its table")
+    page.wait_for_selector("#event-list :text('load 48 set to 315 kW')")
+    options = " ".join(desk.options)
+    assert page.locator("#command-list code").first.inner_text() == f"gridpeers load 48 --factor 1.5 {options}"
+    assert page.locator("#command-list pre").first.text_content() == "[[event]]\nload = { 48 = { factor = 1.5 } }"
+    assert "Loads set: 48 (315 kW, 225 kvar)." in other.locator("#diagram-text").inner_text()
+
+    page.get_by_label("load", exact=True).select_option("48")
+    page.locator("#load-choice button").click()
+    assert page.locator("#load-now").inner_text().startswith("set to 315 kW and 225 kvar; in its table 210 kW")
+    page.locator("#load-P").fill("210000")
+    page.locator("#load-power-form button").click()
+    refused = page.wait_for_selector("#command-list li.bad").inner_text()
+    assert f"gridpeers load 48 --P 210000 --Q 225 {options}" in refused
+    assert "did you mean 210 (210000 W)?" in refused
+    assert desk.type("load", "48", "--factor", "1")[0] == 0
+    for each in (page, other):
+        each.wait_for_selector('[data-load="48"]:not(.set)', state="attached")
 
 
 def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk, browser: Browser) -> None:
@@ -72,6 +101,8 @@ def test_a_click_is_a_command_and_stale_numbers_are_not_shown_as_live(desk: Desk
     plant.expect("inv4 joined")
     for each in (page, other):
         each.wait_for_selector('[data-agent="inv4"]:not(.absent)', state="attached")
+
+    sets_a_load(desk, plant, page, other)
 
     page.evaluate(
         """() => { window.seen = [];
@@ -115,40 +146,6 @@ def test_a_frozen_plant_and_a_restarted_one_are_told(desk: Desk, browser: Browse
     view.signal(signal.SIGINT)
     view.end()
     page.wait_for_selector('body[data-live="lost"]')
-
-
-def test_a_click_on_a_load_sets_it(desk: Desk, browser: Browser) -> None:
-    """By factor or in kW and kvar, with the command beside it, on every open page; what makes no sense is refused."""
-    plant = run_of(desk)
-    _, url = view_of(desk, "--control")
-    page, other = page_of(browser, url), page_of(browser, url)
-
-    page.wait_for_selector('[data-load="48"]', state="attached")
-    page.locator('[data-load="48"]').dispatch_event("click")
-    assert page.locator("#load-now").inner_text() == "210 kW and 150 kvar at nominal voltage"
-    page.locator("#load-factor").fill("1.5")
-    page.keyboard.press("Enter")
-    assert not page.locator("#load-dialog").is_visible()
-    for each in (page, other):
-        each.wait_for_selector('[data-load="48"].set', state="attached")
-    plant.expect("load 48 set to 315 kW and 225 kvar at nominal voltage, 1.5 times its table")
-    page.wait_for_selector("#event-list :text('load 48 set to 315 kW')")
-    options = " ".join(desk.options)
-    assert page.locator("#command-list code").first.inner_text() == f"gridpeers load 48 --factor 1.5 {options}"
-    assert page.locator("#command-list pre").first.text_content() == "[[event]]\nload = { 48 = { factor = 1.5 } }"
-    assert "Loads set: 48 (315 kW, 225 kvar)." in other.locator("#diagram-text").inner_text()
-
-    page.get_by_label("load", exact=True).select_option("48")
-    page.locator("#load-choice button").click()
-    assert page.locator("#load-now").inner_text().startswith("set to 315 kW and 225 kvar; in its table 210 kW")
-    page.locator("#load-P").fill("210000")
-    page.locator("#load-power-form button").click()
-    refused = page.wait_for_selector("#command-list li.bad").inner_text()
-    assert f"gridpeers load 48 --P 210000 --Q 225 {options}" in refused
-    assert "did you mean 210 (210000 W)?" in refused
-    assert desk.type("load", "48", "--factor", "1")[0] == 0
-    for each in (page, other):
-        each.wait_for_selector('[data-load="48"]:not(.set)', state="attached")
 
 
 def test_the_diagram_by_keyboard_and_for_a_screen_reader(desk: Desk, browser: Browser) -> None:
@@ -205,38 +202,31 @@ def test_the_diagram_by_keyboard_and_for_a_screen_reader(desk: Desk, browser: Br
     assert page.evaluate(focused).startswith("inverter "), "a diagram that is drawn anew keeps the focus"
 
 
-def test_a_page_that_only_looks_offers_nothing_to_press(desk: Desk, browser: Browser) -> None:
-    """Without --control the diagram is of images; Enter does nothing; what ended is told, and no number stays."""
-    run_of(desk)
-    _, url = view_of(desk)
-    page = page_of(browser, url)
-    page.wait_for_selector('[data-link="inv1|inv2"] + .link.used', state="attached")
-    found = accessible(page)
+def test_views_are_for_those_who_may_see_them_and_only_look(desk: Desk, browser: Browser) -> None:
+    """Each has its own port and its own rights: a token is asked for, and a page of others reaches none.
 
-    assert "link inv1 to inv2, heard" in found["image"]
-    assert not [name for name in found.get("button", []) if name.startswith(("link", "switch", "load", "inverter"))]
-    page.locator('[data-load="48"]').focus()
-    page.keyboard.press("Enter")
-    assert not page.locator("#load-dialog").is_visible()
-
-    assert desk.type("down")[0] == 0
-    page.wait_for_selector('body[data-live="ended"]')
-    assert "The run has ended" in page.locator("#live").inner_text()
-    assert page.locator("#diagram-text").inner_text().startswith("Not of now")
-    assert page.locator("tbody tr").first.locator("td").all_inner_texts()[:9] == ["\N{EN DASH}"] * 9
-
-
-def test_two_views_of_one_run_and_a_token_for_one_of_them(desk: Desk, browser: Browser) -> None:
-    """Each has its own port and its own rights; without the token no frame comes, with it the page is as any other."""
+    Without --control the diagram is of images, and Enter does nothing; what ended is told, and no number stays.
+    """
     from websockets.exceptions import InvalidStatus
     from websockets.sync.client import connect
 
     plant = run_of(desk)
     _, url = view_of(desk, "--control")
-    _, closed = view_of(desk, "--token", "mine")
+    token = "mine & yours: \N{GREEK SMALL LETTER PI}/?#;%"
+    view, closed = view_of(desk, "--token", token)
     bare = closed.partition("?")[0]
-    page = page_of(browser, url)
 
+    assert status(closed) == 200, "any letter of a token is quoted in the address"
+    assert status(bare) == 401
+    assert status(bare + "?token=yours") == 401
+    assert status(closed, Host="elsewhere.example") == 403
+    assert status(closed, Origin="http://elsewhere.example") == 403
+    assert status(bare + "static/..%2fpage_server.py") == 404
+    port = re.findall(r":(\d+)/", bare)[0]
+    in_use = f"gridpeers: --port: {port} of 127.0.0.1 is in use; give another one, or 0 for any free one\n"
+    assert desk.type("view", "--port", port) == (2, in_use)
+
+    page = page_of(browser, url)
     with pytest.raises(InvalidStatus):
         connect(bare.replace("http", "ws") + "frames", open_timeout=WAIT / 1e3)
     looking = browser.new_page()
@@ -245,7 +235,7 @@ def test_two_views_of_one_run_and_a_token_for_one_of_them(desk: Desk, browser: B
     looking.get_by_label("Token").fill("yours")
     looking.keyboard.press("Enter")
     looking.get_by_role("alert").filter(has_text="That is not the token of this view.").wait_for()
-    looking.get_by_label("Token").fill("mine")
+    looking.get_by_label("Token").fill(token)
     looking.keyboard.press("Enter")
     looking.wait_for_selector('body[data-live="live"]')
     assert looking.url == bare, "the token does not stay in the address"
@@ -255,34 +245,25 @@ def test_two_views_of_one_run_and_a_token_for_one_of_them(desk: Desk, browser: B
     looking.wait_for_selector('[data-switch="13-152"].open', state="attached")
     assert looking.locator("#control").is_hidden()
 
+    looking.wait_for_selector('[data-link="inv1|inv2"] + .link.used', state="attached")
+    found = accessible(looking)
+    assert "link inv1 to inv2, heard" in found["image"]
+    assert not [name for name in found.get("button", []) if name.startswith(("link", "switch", "load", "inverter"))]
+    looking.locator('[data-load="48"]').focus()
+    looking.keyboard.press("Enter")
+    assert not looking.locator("#load-dialog").is_visible()
 
-def test_the_page_is_for_those_who_may_see_it(desk: Desk) -> None:
-    """A token is asked for; a page of others reaches it neither by another name nor by another origin."""
-    run_of(desk)
-    view, url = view_of(desk, "--token", "mine & yours: \N{GREEK SMALL LETTER PI}/?#;%")
-    bare = url.partition("?")[0]
-
-    assert status(url) == 200, "any letter of a token is quoted in the address"
-    assert status(bare) == 401
-    assert status(bare + "?token=yours") == 401
-    assert status(url, Host="elsewhere.example") == 403
-    assert status(url, Origin="http://elsewhere.example") == 403
-    assert status(bare + "static/..%2fpage_server.py") == 404
-    port = re.findall(r":(\d+)/", bare)[0]
-    code, text = desk.type("view", "--port", port)
-    assert code == 2
-    assert text == f"gridpeers: --port: {port} of 127.0.0.1 is in use; give another one, or 0 for any free one\n"
+    assert desk.type("down")[0] == 0
+    looking.wait_for_selector('body[data-live="ended"]')
+    assert "The run has ended" in looking.locator("#live").inner_text()
+    assert looking.locator("#diagram-text").inner_text().startswith("Not of now")
+    assert looking.locator("tbody tr").first.locator("td").all_inner_texts()[:9] == ["\N{EN DASH}"] * 9
     view.signal(signal.SIGTERM)
     assert view.end() == 143
 
 
 def test_an_address_that_cannot_be_is_one_line(desk: Desk, tmp_path: Path) -> None:
     """No traceback; nothing is sought before."""
-    with socket.socket() as taken:
-        taken.bind(("127.0.0.1", 0))
-        taken.listen()
-        code, text = desk.type("view", "--port", str(taken.getsockname()[1]))
-        assert (code, text.count("\n")) == (2, 1)
     code, text = desk.type("view", "--port", "70000")
     assert (code, text) == (2, "gridpeers: --port: a port is a number from 0 to 65535, got 70000\n")
     code, text = desk.type("view", "--address", "nowhere.invalid", "--port", "0")

@@ -132,7 +132,7 @@ def test_a_run_into_a_folder_is_the_commands_folder_and_is_judged(scenario: gp.S
 
 def test_what_is_no_folder_or_case_is_told_in_one_line(scenario: gp.Scenario, run: gp.Result) -> None:
     """A number, nothing, or a text that no path can be: an error of the library's own, and nothing is run."""
-    for wrong in (5, None, "", "a\0b"):
+    for wrong in (5, "", "a\0b"):
         with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):
             gp.read(wrong)  # type: ignore[arg-type]
         with pytest.raises(gp.FolderError, match="needs the path of a folder, got"):

@@ -50,26 +50,17 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
             "--listen: tcp/192.0.2.1:1 cannot be listened on",
         ),
         (["plant", "islanding", "--speed", "0"], "--speed: must be from 0.1 to 50 (1 is real time), got 0"),
-        (["plant", "islanding", "--wait", "-1"], "--wait: must be a time of at least 0 s, got -1 s"),
         (["plant", "islanding", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
         (["up", "islanding", "--for", "0"], "--for: must be a time of more than 0 s and at most 1e+09 s, got 0 s"),
-        (["up", "islanding", "--for", "1e308"], "at most 1e+09 s, got 1e+308 s"),
-        (["watch", "--for", "nan"], "--for: must be a time of more than 0 s and at most 1e+09 s, got nan s"),
         (["watch", "--for", "-1"], "--for: must be a time of more than 0 s and at most 1e+09 s, got -1 s"),
         (["up", "islanding", "--out", "full"], "--out full: the folder is not empty"),
         (["up", "islanding", "--record", "nowhere/it.toml"], "there is no folder nowhere; make it first"),
         (["up", "islanding", "--record", "full"], "--record full: is there already"),
-        (["up", "islanding", "--record", "a" * 300], "cannot be written: File name too long; give another name"),
         (["agent"], "INVERTER is missing"),
         (["agent", "inv 2"], 'INVERTER: "inv 2" cannot be part of a Zenoh key'),
-        (["agent", "inv2", "--run", "*"], '--run: "*" cannot be part of a Zenoh key'),
         (["agent", "inv2", "--connect", "lab"], '--connect: "lab" is no endpoint; write PROTOCOL/HOST:PORT'),
         (["agent", "inv2", "--wait", "-3"], "--wait: must be a time of at least 0 s, got -3 s"),
-        (["down", "--wait", "nan"], "--wait: must be a time of at least 0 s, got nan s"),
-        (["status", "--run", "$x"], '--run: "$x" cannot be part of a Zenoh key'),
         (["event", "toggle", "sw1_2"], '"toggle" cannot be done to a switch; write open or close'),
-        (["event", "open"], "SWITCH is missing"),
-        (["load"], "LOAD is missing"),
         (["load", "48"], "nothing is to be set; give --factor, or one or both of --P (kW) and --Q (kvar)"),
         (["load", "48", "--factor", "2", "--P", "9"], "--factor: goes with neither --P nor --Q"),
         (
@@ -78,8 +69,6 @@ def test_the_defaults_in_the_help_are_those_of_the_place() -> None:
         ),
         (["load", "48", "--factor", "150"], "--factor: 150 is not plausible for a factor on a load (0 to 10)"),
         (["load", "48", "--Q", "nan"], "--Q: must be a finite number, at most 1e+08, got nan"),
-        (["load", "48", "--P", "-inf"], "--P: must be a finite number, at most 1e+08, got -inf"),
-        (["stop"], "INVERTER is missing"),
     ],
 )
 def test_what_cannot_be_used_is_told_before_anything_starts(elsewhere: Path, words: list[str], said: str) -> None:
@@ -98,11 +87,14 @@ def test_what_cannot_be_used_is_told_before_anything_starts(elsewhere: Path, wor
 
 @pytest.mark.parametrize(
     "words",
-    [["agent", "inv2"], ["status"], ["watch"], ["stop", "inv2"], ["event", "open", "sw1_2"], ["down"]],
+    [["agent", "inv2"], ["watch"], ["event", "open", "sw1_2"], ["view", "--port", "0"]],
     ids=lambda words: words[0],
 )
 def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
     """The endpoint, how long it was tried, and what to do."""
+    if words[0] == "view":
+        pytest.importorskip("starlette", reason="the extra view is not installed")
+        pytest.importorskip("websockets", reason="the extra view is not installed")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))  # nobody listens, and nobody else gets the port meanwhile
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
@@ -115,20 +107,6 @@ def test_nobody_there_is_told_within_the_wait(words: list[str]) -> None:
         f"gridpeers: nothing answers at {endpoint} within 0.2 s; start a plant there (gridpeers plant SCENARIO), "
         "or say by --connect where it is"
     ]
-
-
-def test_a_view_seeks_its_run_first() -> None:
-    """A page without a run would show nothing."""
-    pytest.importorskip("starlette", reason="the extra view is not installed")
-    pytest.importorskip("websockets", reason="the extra view is not installed")
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
-
-        code, text = invoke("view", "--port", "0", "--connect", endpoint, "--wait", "0.2")
-
-    assert code == 2
-    assert f"gridpeers: nothing answers at {endpoint} within 0.2 s" in text
 
 
 def test_something_that_listens_in_silence_is_told() -> None:
