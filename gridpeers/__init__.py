@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from gridpeers.agents.graphs import GRAPHS
     from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
     from gridpeers.feeder import Feeder
+    from gridpeers.lab.predict.prediction import Prediction, predict
     from gridpeers.netem.models.own_fault import FAULTS, LinkFault
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
@@ -37,7 +38,6 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.schema.loading import catalogue
     from gridpeers.scenarios.schema.scenario_errors import ScenarioError
     from gridpeers.studies.comparison import Comparison, compare
-    from gridpeers.studies.prediction import Prediction, predict
     from gridpeers.studies.replaying import Counterfactual, counterfactual, replay
     from gridpeers.studies.sweeping import sweep
     from gridpeers.wire.schema.plausible import Plausible, Range, Unit
@@ -60,7 +60,6 @@ _HOME = {
     "Neighbour": "gridpeers.agents.laws.law",
     "NotJudgedError": "gridpeers.scenarios.checks.check_verdict",
     "Own": "gridpeers.agents.laws.law",
-    "Prediction": "gridpeers.studies.prediction",
     "Plausible": "gridpeers.wire.schema.plausible",
     "Range": "gridpeers.wire.schema.plausible",
     "Result": "gridpeers.runs.result",
@@ -83,12 +82,14 @@ _HOME = {
     "link_fault": "gridpeers.netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
     "metric": "gridpeers.scenarios.results.evaluation.metric:METRICS.register",
-    "predict": "gridpeers.studies.prediction",
     "read": "gridpeers.runs.running",
     "replay": "gridpeers.studies.replaying",
     "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
+
+_OF_ROOMS = ("Prediction", "predict")
+"""Public names that rooms above the face bring (`gridpeers.rooms`)."""
 
 __all__ = [
     "BrokenRunError",
@@ -142,12 +143,18 @@ if not TYPE_CHECKING:
             from importlib.metadata import version
 
             return version("gridpeers")
-        if name not in _HOME:
+        if name in _OF_ROOMS:
+            from gridpeers.rooms import ROOMS
+
+            found = ROOMS.resolve(name)
+        elif name in _HOME:
+            module, _, attributes = _HOME[name].partition(":")
+            found = attrgetter(attributes or name)(import_module(module))
+        else:
             from gridpeers.wire.wording import suggestion
 
-            raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, _HOME, "names")}')
-        module, _, attributes = _HOME[name].partition(":")
-        found = globals()[name] = attrgetter(attributes or name)(import_module(module))
+            raise AttributeError(f'gridpeers has no "{name}"; {suggestion(name, __all__, "names")}')
+        globals()[name] = found
         return found
 
 

@@ -5,56 +5,14 @@ The functions take what a scenario holds: its keys as typed values (`Scenario.sp
 
 from __future__ import annotations
 
-from msgspec.structs import replace
+from typing import TYPE_CHECKING, Any
 
-from gridpeers.netem.schema.netem import Netem
-from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.tables import read_feeder
-from gridpeers.scenarios.predict.delay_limits import delay_limit
-from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from gridpeers.scenarios.predict.linear_model import Loop, Ticks
-from gridpeers.scenarios.predict.load_steps import load_steps
-from gridpeers.scenarios.predict.times import LoadStep, Times, predicted_times, sharing_index
-from gridpeers.scenarios.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response
-from gridpeers.scenarios.schema import Case, ScenarioModel
-from gridpeers.scenarios.schema.configs import as_in
+from gridpeers.rooms import ROOMS
 
-__all__ = [
-    "Case",
-    "Feeder",
-    "InverterGroup",
-    "LoadStep",
-    "Loop",
-    "ScenarioModel",
-    "Ticks",
-    "Times",
-    "VarResponse",
-    "delay_limit",
-    "feeder_of",
-    "first_window",
-    "inverter_group_of",
-    "load_steps",
-    "predicted_times",
-    "sharing_index",
-    "var_delay_limit",
-    "var_growth",
-    "var_response",
-    "without_faults",
-]
+if TYPE_CHECKING:
+    from gridpeers.lab.predict.theory import *  # noqa: F403
+else:
 
-
-def feeder_of(spec: ScenarioModel) -> Feeder:
-    """Return the feeder of a scenario, with what the scenario changes in it."""
-    return as_in(spec, read_feeder(spec.plant.feeder, spec.plant.load_set))
-
-
-def without_faults(spec: ScenarioModel) -> ScenarioModel:
-    """Return a scenario whose links do nothing to messages."""
-    return replace(spec, netem=Netem())
-
-
-def first_window(spec: ScenarioModel, length_s: float) -> ScenarioModel:
-    """Return a scenario without faults that ends a time (s) after its first event, and has no other."""
-    (first, *_) = spec.events
-    time = replace(spec.time, end_s=first.t_s + length_s)
-    return replace(without_faults(spec), events=(first,), time=time)
+    def __getattr__(name: str) -> Any:
+        """Return a part, which a room above the face brings."""
+        return getattr(ROOMS.resolve("theory"), name)

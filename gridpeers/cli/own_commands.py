@@ -25,7 +25,6 @@ OWN_COMMANDS = {
         ("doc", "show:doc", "Print a reference page that is made from the code."),
         ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
         ("chaos", "chaos_command:chaos", "Disturb a scenario at random; judge and shrink what fails."),
-        ("predict", "predict:predict", "Predict from theory how a scenario will go."),
         ("compare", "results_commands:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "results_commands:metrics", "Measure a run from its record, also one that was killed."),
         ("replay", "replay_command:replay", "Replay a recorded run, or show what would have been."),

@@ -154,7 +154,7 @@ class Registry(Generic[T]):
         else:
             module = self._module(module_name, reference, folder)
         found = module
-        for part in name.split("."):
+        for part in filter(None, name.split(".")):  # a module alone, where a registry takes modules
             try:
                 found = getattr(found, part)
             except AttributeError:

@@ -44,7 +44,7 @@ def check(
     require({"numba": "the plant", "scipy": "the plant", "threadpoolctl": "the plant"})
 
     from gridpeers.cli.progress import TRYING, explained
-    from gridpeers.scenarios.predict.robustness_notes import robustness_notes
+    from gridpeers.rooms import ROOMS
     from gridpeers.scenarios.results.file_sizes import file_sizes
     from gridpeers.scenarios.schema.check_notes import liar_notes, security_notes, start_problem
     from gridpeers.scenarios.schema.supply import supply_notes
@@ -53,6 +53,7 @@ def check(
         problem = start_problem(spec, feeder)
     if problem:
         fail([f"{file}: the plant cannot start: {problem}"], BAD_INPUT)
+    robustness_notes = ROOMS.resolve("robustness_notes")
     notes = (supply_notes(spec, feeder), liar_notes(spec, feeder), robustness_notes(spec, feeder))
     for note in chain(*notes, security_notes(spec, feeder, file)):
         typer.echo(f"NOTE  {note}")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from gridpeers.lab.predict.var_response import var_growth
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.papers.singhal2022.experiments.outage_experiments import predicted
 from gridpeers.plant.equipment import F_NOM
-from gridpeers.scenarios.predict.var_response import var_growth
 from tests.papers.experiments.experiment_runs import ALL, measured, theory, told
 
 

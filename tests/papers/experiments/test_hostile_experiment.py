@@ -10,9 +10,9 @@ import pandas as pd
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.lab.predict.robustness import robustness
 from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import GRAPHS, attack_words, defence_words, hostile
-from gridpeers.scenarios.predict.robustness import robustness
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
 from gridpeers.sweep_files import read_sweep

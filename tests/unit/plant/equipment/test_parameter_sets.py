@@ -8,14 +8,14 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
+from gridpeers.lab.predict.inverter_group import inverter_group_of
+from gridpeers.lab.predict.response import response
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import Bus, Source
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.predict.inverter_group import inverter_group_of
-from gridpeers.scenarios.predict.response import response
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
 from gridpeers.scenarios.schema.configs import configs
 

@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.scenarios.results.history import Floats
 
 SETTLING = 4.0

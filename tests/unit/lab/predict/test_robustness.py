@@ -8,8 +8,8 @@ from math import ceil
 import numpy as np
 import pytest
 
-from gridpeers.scenarios.predict.robustness import robustness
-from tests.unit.scenarios.predict.predicted_graphs import inverters
+from gridpeers.lab.predict.robustness import robustness
+from tests.unit.lab.predict.predicted_graphs import inverters
 
 
 def by_definition(A: np.ndarray) -> int:

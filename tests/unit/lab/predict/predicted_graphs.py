@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 
 from gridpeers.agents.agent import Agent
+from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import F_NOM, Feeder
 from gridpeers.plant.telemetry_reporter import measurement_of
-from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, sharing_index
 from gridpeers.scenarios.schema import ScenarioModel, load_scenario
@@ -83,7 +83,7 @@ def on_the_plant(
     still_voltage: bool = False,
     end_s: float = 7.0,
 ) -> Run:
-    """The real agents on the real plant, with delays in ticks: `gridpeers.scenarios.predict.linear_model.Ticks`.
+    """The real agents on the real plant, with delays in ticks: `gridpeers.lab.predict.linear_model.Ticks`.
 
     With `frequency_only` V and Q are measured at once, and V_set is held at once.
     """

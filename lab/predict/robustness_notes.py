@@ -10,9 +10,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from gridpeers.agents.laws.resilient import Resilient
+from gridpeers.lab.predict.inverter_group import inverter_group_of
+from gridpeers.lab.predict.robustness import robustness
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.predict.inverter_group import inverter_group_of
-from gridpeers.scenarios.predict.robustness import robustness
 from gridpeers.scenarios.schema.plugin_keys import law_of
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 

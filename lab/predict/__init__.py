@@ -1,9 +1,9 @@
 """Predictions by theory, before a scenario is run: modes, settling times, limits of delay, times after an event.
 
-    from gridpeers.scenarios.predict.inverter_group import inverter_group_of
-    from gridpeers.scenarios.predict.times import LoadStep, predicted_times
-    from gridpeers.scenarios.predict.delay_limits import delay_limit
-    from gridpeers.scenarios.predict.closed_form import delay_limit_closed, modes
+    from gridpeers.lab.predict.inverter_group import inverter_group_of
+    from gridpeers.lab.predict.times import LoadStep, predicted_times
+    from gridpeers.lab.predict.delay_limits import delay_limit
+    from gridpeers.lab.predict.closed_form import delay_limit_closed, modes
 
     inverters = inverter_group_of(scenario, feeder, "IV")
     predicted_times(inverters, link_delay_s=0.1, loss=0.3)     Times(restore_s, share_s, stable, note)

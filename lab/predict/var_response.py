@@ -32,13 +32,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from gridpeers.agents.laws.consensus import V_factors
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.linear_model import AT_REST
+from gridpeers.lab.predict.load_steps import LoadError
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.feeder import Plant, raise_for_trip
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.linear_model import AT_REST
-from gridpeers.scenarios.predict.load_steps import LoadError
 from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs

@@ -25,8 +25,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from gridpeers.agents.laws.consensus import towards
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.response import PlantModel, response
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.response import PlantModel, response
 from gridpeers.scenarios.results.history import Floats
 
 LinkEnds = tuple[str, str]

@@ -10,11 +10,11 @@ import pytest
 
 from gridpeers.agents.agent_config import Gains
 from gridpeers.agents.laws.consensus import P_set_step
-from gridpeers.scenarios.predict.delay_limits import delay_limit, first_crossing
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.linear_model import Loop, Ticks
+from gridpeers.lab.predict.delay_limits import delay_limit, first_crossing
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.linear_model import Loop, Ticks
 from gridpeers.scenarios.results.history import Floats
-from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, inverters
+from tests.unit.lab.predict.predicted_graphs import GRAPHS, inverters
 
 UNBOUNDED = Gains(P_set_min=-1e9, P_set_max=1e9)
 START, LOAD = 0.00647, 0.0088

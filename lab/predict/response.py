@@ -23,8 +23,8 @@ from typing import Literal
 import numpy as np
 from scipy.linalg import expm
 
+from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
 from gridpeers.scenarios.results.history import Floats
 
 PlantModel = Literal["lagged", "quasi-steady"]

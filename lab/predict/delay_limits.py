@@ -1,4 +1,4 @@
-"""Limits of delay, law and plant in discrete time, by the eigenvalues of `gridpeers.scenarios.predict.linear_model`."""
+"""Limits of delay, law and plant in discrete time, by the eigenvalues of `gridpeers.lab.predict.linear_model`."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from gridpeers.scenarios.predict.closed_form import DelayKind
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.linear_model import Loop, Ticks
-from gridpeers.scenarios.predict.response import PlantModel, response
+from gridpeers.lab.predict.closed_form import DelayKind
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.linear_model import Loop, Ticks
+from gridpeers.lab.predict.response import PlantModel, response
 
 ANGLES = 600
 """Angles at which delay-independence is tried, between 1e-3 rad and pi, evenly in their logarithm."""

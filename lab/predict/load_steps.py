@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from gridpeers.lab.predict.times import LoadStep
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.feeder import GRID, Plant, raise_for_trip
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.scenarios.predict.times import LoadStep
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.predict.delay_limits import delay_limit
-from gridpeers.scenarios.predict.load_steps import load_steps
-from gridpeers.scenarios.predict.times import LoadStep, predicted_times
-from gridpeers.scenarios.predict.var_response import VarResponse, var_delay_limit, var_response
+from gridpeers.lab.predict.delay_limits import delay_limit
+from gridpeers.lab.predict.load_steps import load_steps
+from gridpeers.lab.predict.times import LoadStep, predicted_times
+from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_response
 from gridpeers.scenarios.schema import load_scenario
-from tests.unit.scenarios.predict.predicted_graphs import inverters, on_the_plant, scenario_of
+from tests.unit.lab.predict.predicted_graphs import inverters, on_the_plant, scenario_of
 
 T_C = 0.02
 ALL_BUT_9 = [f"inv{i}" for i in range(1, 9)]

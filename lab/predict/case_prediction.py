@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+from gridpeers.lab.predict.closed_form import DelayKind, Modes, delay_limit_closed, modes
+from gridpeers.lab.predict.delay_limits import delay_limit
+from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.lab.predict.load_steps import IslandStep, load_steps
+from gridpeers.lab.predict.times import Times, predicted_times
+from gridpeers.lab.predict.var_response import VarResponse, var_response
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.predict.closed_form import DelayKind, Modes, delay_limit_closed, modes
-from gridpeers.scenarios.predict.delay_limits import delay_limit
-from gridpeers.scenarios.predict.inverter_group import InverterGroup, inverter_group_of
-from gridpeers.scenarios.predict.load_steps import IslandStep, load_steps
-from gridpeers.scenarios.predict.times import Times, predicted_times
-from gridpeers.scenarios.predict.var_response import VarResponse, var_response
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.participants import is_calm, netem_of
 

@@ -6,8 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from gridpeers.scenarios.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes
-from tests.unit.scenarios.predict.predicted_graphs import GRAPHS, inverters
+from gridpeers.lab.predict.closed_form import delay_limit_closed, equivalent_delay, groups, modes
+from tests.unit.lab.predict.predicted_graphs import GRAPHS, inverters
 
 TABLE = {
     "full": (36, 9.0, 9.0, 0.04, 1.01, 14.5, 18.2),

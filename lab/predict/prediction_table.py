@@ -8,14 +8,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gridpeers.scenarios.predict.case_prediction import CasePrediction
-from gridpeers.scenarios.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.linear_model import Loop
-from gridpeers.scenarios.predict.load_steps import IslandStep
-from gridpeers.scenarios.predict.robustness import robustness
-from gridpeers.scenarios.predict.times import Times
-from gridpeers.scenarios.predict.var_response import var_delay_limit, var_spectral_radius
+from gridpeers.lab.predict.case_prediction import CasePrediction
+from gridpeers.lab.predict.closed_form import SETTLING, DelayKind, equivalent_delay, groups, settling_in_ticks
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.linear_model import Loop
+from gridpeers.lab.predict.load_steps import IslandStep
+from gridpeers.lab.predict.robustness import robustness
+from gridpeers.lab.predict.times import Times
+from gridpeers.lab.predict.var_response import var_delay_limit, var_spectral_radius
 
 WIDTH = 100
 """Columns."""

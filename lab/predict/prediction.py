@@ -9,13 +9,13 @@ from pathlib import Path
 import pandas as pd
 
 from gridpeers.agents.carriers.law_check import PAPER
+from gridpeers.lab.predict.case_prediction import CasePrediction, predict_cases
+from gridpeers.lab.predict.closed_form import DelayKind
+from gridpeers.lab.predict.load_steps import LoadError
+from gridpeers.lab.predict.prediction_table import case_text
 from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
-from gridpeers.scenarios.predict.case_prediction import CasePrediction, predict_cases
-from gridpeers.scenarios.predict.closed_form import DelayKind
-from gridpeers.scenarios.predict.load_steps import LoadError
-from gridpeers.scenarios.predict.prediction_table import case_text
 from gridpeers.scenarios.run_request import BrokenRunError
 from gridpeers.scenarios.schema import ScenarioError
 from gridpeers.scenarios.schema import scenario_model as model

@@ -32,9 +32,9 @@ def predict(
     spec = chosen(spec, case, None)
     require({"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant"})
 
+    from gridpeers.lab.predict.prediction import predictions
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema import ScenarioError
-    from gridpeers.studies.prediction import predictions
 
     if not feeder.inverters:
         fail([f"{scenario}: the feeder {feeder.name} has no inverters, so there is nothing to control"], BAD_INPUT)

@@ -1,6 +1,6 @@
 """Times to restore the frequency and to share power after an event, by theory.
 
-All of it comes from `gridpeers.scenarios.predict.linear_model`, law and plant in discrete time, and is exact for that
+All of it comes from `gridpeers.lab.predict.linear_model`, law and plant in discrete time, and is exact for that
 model. Delays are in seconds and become control periods as in a simulated run: a state sent at t_k with delay d is used
 from the first tick at or after t_k + d, and never before t_(k+1); a measurement or set-point from the first tick at or
 after t_k + d.
@@ -15,10 +15,10 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gridpeers.scenarios.predict.closed_form import groups
-from gridpeers.scenarios.predict.inverter_group import InverterGroup
-from gridpeers.scenarios.predict.linear_model import LinkEnds, Loop, Path, Ticks
-from gridpeers.scenarios.predict.response import PlantModel
+from gridpeers.lab.predict.closed_form import groups
+from gridpeers.lab.predict.inverter_group import InverterGroup
+from gridpeers.lab.predict.linear_model import LinkEnds, Loop, Path, Ticks
+from gridpeers.lab.predict.response import PlantModel
 from gridpeers.scenarios.results.history import Flags, Floats
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND
 
@@ -85,7 +85,7 @@ def predicted_times(
     loss : float or Mapping[(src, dst), float], optional
         Probability that a state is lost; the last one is held.
     load : LoadStep, optional
-        The event; the paper's event 1 if left out. `gridpeers.scenarios.predict.load_steps.load_steps` has those of a
+        The event; the paper's event 1 if left out. `gridpeers.lab.predict.load_steps.load_steps` has those of a
         scenario.
     plant : {"lagged", "quasi-steady"}, optional
         With the inverters' filters, or as docs/theory.md has it.
