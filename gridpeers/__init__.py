@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
     from gridpeers.feeder import Feeder
     from gridpeers.lab.predict.prediction import Prediction, predict
+    from gridpeers.lab.replay.replaying import Counterfactual, counterfactual, replay
     from gridpeers.netem.models.own_fault import FAULTS, LinkFault
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
@@ -38,7 +39,6 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.schema.loading import catalogue
     from gridpeers.scenarios.schema.scenario_errors import ScenarioError
     from gridpeers.studies.comparison import Comparison, compare
-    from gridpeers.studies.replaying import Counterfactual, counterfactual, replay
     from gridpeers.studies.sweeping import sweep
     from gridpeers.wire.schema.plausible import Plausible, Range, Unit
 
@@ -52,7 +52,6 @@ _HOME = {
     "CheckedCase": "gridpeers.scenarios.checks.checked_case",
     "Claim": "gridpeers.scenarios.results.evaluation.claims",
     "Comparison": "gridpeers.studies.comparison",
-    "Counterfactual": "gridpeers.studies.replaying",
     "Feeder": "gridpeers.feeder",
     "FolderError": "gridpeers.scenarios.results.run_files",
     "Law": "gridpeers.agents.laws.law",
@@ -76,19 +75,17 @@ _HOME = {
     "check": "gridpeers.scenarios.checks.check_registry:CHECKS.register",
     "claim": "gridpeers.scenarios.results.evaluation.claims:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
-    "counterfactual": "gridpeers.studies.replaying",
     "graph": "gridpeers.agents.graphs:GRAPHS.register",
     "law": "gridpeers.agents.carriers.law_registry:LAWS.register",
     "link_fault": "gridpeers.netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
     "metric": "gridpeers.scenarios.results.evaluation.metric:METRICS.register",
     "read": "gridpeers.runs.running",
-    "replay": "gridpeers.studies.replaying",
     "sweep": "gridpeers.studies.sweeping",
 }
 """Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
 
-_OF_ROOMS = ("Prediction", "predict")
+_OF_ROOMS = ("Counterfactual", "Prediction", "counterfactual", "predict", "replay")
 """Public names that rooms above the face bring (`gridpeers.rooms`)."""
 
 __all__ = [

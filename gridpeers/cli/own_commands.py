@@ -27,7 +27,6 @@ OWN_COMMANDS = {
         ("chaos", "chaos_command:chaos", "Disturb a scenario at random; judge and shrink what fails."),
         ("compare", "results_commands:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "results_commands:metrics", "Measure a run from its record, also one that was killed."),
-        ("replay", "replay_command:replay", "Replay a recorded run, or show what would have been."),
         ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
         (
             "reproduce",

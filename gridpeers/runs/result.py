@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from gridpeers.lab.explanation.explanation import Explanation
+    from gridpeers.lab.replay.replay import Replay
     from gridpeers.scenarios.record.record_reader import RunRecord
 
 
@@ -229,6 +230,19 @@ class Result(_FromFolder):
         RecordFileError if the run was not recorded, there was no such agent, or it had not decided by then.
         """
         found: Explanation = ROOMS.resolve("explain")(self.run_record, agent, t)
+        return found
+
+    def replay(self) -> Replay:
+        """Give the cores again what they got, and compare what they decide, as `gridpeers replay` does.
+
+        Raises
+        ------
+        RecordFileError
+            If the run was not recorded.
+        ReplayError
+            If its record does not have what the cores got, or its law, graph or feeder is not here.
+        """
+        found: Replay = ROOMS.resolve("replay")(self.run_record)
         return found
 
     @cached_property

@@ -10,10 +10,10 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from gridpeers.lab.replay.replay import replay
 from gridpeers.scenarios.checks.communication.record_content import read_content
 from gridpeers.scenarios.record.journal_coverage import JournalCoverage, inside
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-from gridpeers.scenarios.replay.replay import replay
 from gridpeers.viewer.record_view import RecordView
 from gridpeers.wire.messages import Journal
 from tests.record.fake_clock import fake_clock_record

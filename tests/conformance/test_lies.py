@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.lab.explanation.explanation import explain
-from gridpeers.scenarios.replay.recomputation import recomputed
+from gridpeers.lab.replay.recomputation import recomputed
 from tests.conformance.test_links import run
 from tests.record.recorded_runs import recorded_run
 

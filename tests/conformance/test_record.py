@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gridpeers.agents.laws.consensus import Consensus
+from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.recomputation import recomputed
 from gridpeers.scenarios.results.history import read_history
 from tests.conformance.test_links import STORM
 from tests.record.recorded_runs import recorded_run

@@ -13,14 +13,14 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
+from gridpeers.lab.replay.replay import replay
+from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.tables import read_feeder
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.replay import replay
-from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import Telemetry
@@ -58,7 +58,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Result:
 
 def test_a_replay_gives_the_run(run: Result) -> None:
     """Rows of the plant and states of every agent are the same within 1e-9."""
-    done = gp.replay(run)
+    done = run.replay()
 
     assert done.difference is None
     assert [part.name for part in done.parts] == ["plant", *(f"inv{k}" for k in range(1, 10))]

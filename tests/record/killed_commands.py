@@ -17,9 +17,9 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Literal, NamedTuple
 
+from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.recomputation import recomputed
 from gridpeers.scenarios.results.record import PARTIAL
 from tests.record.reader_commands import assert_commands_read
 

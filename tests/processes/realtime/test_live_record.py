@@ -10,6 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.lab.replay.recomputation import recomputed
 from gridpeers.netem.models.delay import Normal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
@@ -19,7 +20,6 @@ from gridpeers.scenarios.drivers.process_driver import run_processes
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.recomputation import recomputed
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.journal import ProcessEvent, Token, WakeUp
 from gridpeers.wire.messages import Telemetry

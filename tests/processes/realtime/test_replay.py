@@ -12,9 +12,9 @@ import pytest
 from msgspec.structs import replace as replaced
 
 import gridpeers as gp
+from gridpeers.lab.replay.replay import replay
 from gridpeers.runs.result import Result
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.replay import replay
 from gridpeers.wire.journal import ProcessEvent
 from tests.command_line import invoke
 from tests.processes.terminals import Desk

@@ -12,14 +12,14 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.lab.replay.recorded_process import Input, RecordedProcess, RecordedStep
+from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
-from gridpeers.scenarios.replay.recorded_process import Input, RecordedProcess, RecordedStep
-from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.wire.backlog import Loss
 from gridpeers.wire.codec import KINDS, encode, sound
 from gridpeers.wire.journal import (

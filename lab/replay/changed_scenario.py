@@ -11,8 +11,8 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 if TYPE_CHECKING:
+    from gridpeers.lab.replay.changes import ChangedRule
     from gridpeers.scenarios.record.record_reader import RunRecord
-    from gridpeers.scenarios.replay.changes import ChangedRule
 
 
 def with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioModel:

@@ -8,14 +8,14 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.lab.replay.difference import Difference, message_difference, row_difference
+from gridpeers.lab.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
+from gridpeers.lab.replay.replay import ComparedRows, Replay, ReplayedPart, replay
+from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.replayed_process import agent_again, message_of
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
-from gridpeers.scenarios.replay.recorded_process import JournalParts, RecordedProcess, RecordedStep, processes_of
-from gridpeers.scenarios.replay.replay import ComparedRows, Replay, ReplayedPart, replay
-from gridpeers.scenarios.replay.replay_error import ReplayError
-from gridpeers.scenarios.replay.replayed_process import agent_again, message_of
 from gridpeers.wire.journal import MessageReference, ProcessEvent, ReceivedMessage, RejectedCount, Token, WakeUp
 from gridpeers.wire.messages import Measurement, State, Telemetry
 from tests.record.fake_clock import FakeClockRun, fake_clock_record

@@ -9,19 +9,19 @@ from pathlib import Path
 
 from msgspec.structs import replace
 
+from gridpeers.lab.replay.changed_scenario import unwritten
+from gridpeers.lab.replay.changes import ChangedRule
+from gridpeers.lab.replay.closed_loop import ClosedLoop
+from gridpeers.lab.replay.difference import Difference
+from gridpeers.lab.replay.no_difference import no_difference
+from gridpeers.lab.replay.replay import ComparedRows
+from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.replayed_process import MakePlant, start_plant_of
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.live_report import write_report
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changed_scenario import unwritten
-from gridpeers.scenarios.replay.changes import ChangedRule
-from gridpeers.scenarios.replay.closed_loop import ClosedLoop
-from gridpeers.scenarios.replay.difference import Difference
-from gridpeers.scenarios.replay.no_difference import no_difference
-from gridpeers.scenarios.replay.replay import ComparedRows
-from gridpeers.scenarios.replay.replay_error import ReplayError
-from gridpeers.scenarios.replay.replayed_process import MakePlant, start_plant_of
 from gridpeers.scenarios.results.metrics_file import RunMetrics
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
 from gridpeers.scenarios.results.run_files import broken_if_ended, set_status, write_whole

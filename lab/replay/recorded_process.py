@@ -7,9 +7,9 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
+from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.wire.codec import sound
 from gridpeers.wire.journal import (
     EACH_TICK,

@@ -7,10 +7,10 @@ from math import inf
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.lab.replay.changed_faults import lossless, spliced, without_loss
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
-from gridpeers.scenarios.replay.changed_faults import lossless, spliced, without_loss
 from gridpeers.wire.plugins.plugin import plugin_of
 
 EARLY = Fault(on="* -> inv1", delay=0.1, to_s=2.0)

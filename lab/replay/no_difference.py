@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from gridpeers.lab.replay.changes import ChangedRule
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changes import ChangedRule
 
 
 def no_difference(record: RunRecord, rule: ChangedRule, until: float) -> str:

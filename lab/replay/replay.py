@@ -18,14 +18,11 @@ from msgspec.structs import replace
 
 from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
-from gridpeers.plant.build import start_plant
-from gridpeers.scenarios.drivers.inprocess import run_inprocess
-from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-from gridpeers.scenarios.replay.difference import Difference, message_difference, row_difference
-from gridpeers.scenarios.replay.recomputation import recomputed
-from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
-from gridpeers.scenarios.replay.replay_error import ReplayError
-from gridpeers.scenarios.replay.replayed_process import (
+from gridpeers.lab.replay.difference import Difference, message_difference, row_difference
+from gridpeers.lab.replay.recomputation import recomputed
+from gridpeers.lab.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
+from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.replayed_process import (
     MakePlant,
     Message,
     ReplayedProcess,
@@ -37,6 +34,9 @@ from gridpeers.scenarios.replay.replayed_process import (
     start_plant_of,
     tick_message,
 )
+from gridpeers.plant.build import start_plant
+from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import MessageReference, ReceivedMessage

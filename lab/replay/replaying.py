@@ -10,16 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
+from gridpeers.lab.replay.changes import ChangedRule, Changes, changed_rule
+from gridpeers.lab.replay.counterfactual import CounterfactualRun, run_counterfactual
+from gridpeers.lab.replay.replay import Replay
+from gridpeers.lab.replay.replay import replay as replay_record
+from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.runs.result import Result, shown_in_notebooks
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
 from gridpeers.scenario import plain
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changes import ChangedRule, Changes, changed_rule
-from gridpeers.scenarios.replay.counterfactual import CounterfactualRun, run_counterfactual
-from gridpeers.scenarios.replay.replay import Replay
-from gridpeers.scenarios.replay.replay import replay as replay_record
-from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.studies.comparison import Comparison
 
 if TYPE_CHECKING:
@@ -174,7 +174,7 @@ class Counterfactual:
 
     def plot(self) -> Figure:
         """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
-        from gridpeers.scenarios.replay.counterfactual_figure import counterfactual_figure
+        from gridpeers.lab.replay.counterfactual_figure import counterfactual_figure
 
         shown_in_notebooks()
         since = self.changes.since if self.changes else 0.0

@@ -13,16 +13,16 @@ from typing import Any
 import msgspec
 
 from gridpeers.agents.agent_config import Control
+from gridpeers.lab.replay.changed_faults import spliced, without_loss
+from gridpeers.lab.replay.changed_scenario import with_links, with_title
+from gridpeers.lab.replay.recorded_process import require_arrivals
+from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import objections
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changed_faults import spliced, without_loss
-from gridpeers.scenarios.replay.changed_scenario import with_links, with_title
-from gridpeers.scenarios.replay.recorded_process import require_arrivals
-from gridpeers.scenarios.replay.replay_error import ReplayError
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.loading import check_tables
 from gridpeers.scenarios.schema.participants import netem_of, setup_of

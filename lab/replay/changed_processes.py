@@ -8,18 +8,18 @@ from msgspec.structs import replace
 
 from gridpeers.agents.carriers.law_registry import close_laws, make_law
 from gridpeers.agents.laws.law import Law
+from gridpeers.lab.replay.changed_faults import lossless
+from gridpeers.lab.replay.changes import ChangedRule
+from gridpeers.lab.replay.loop_process import LoopProcess
+from gridpeers.lab.replay.recorded_process import RecordedStep
+from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.replayed_process import Message, agent_again, instance_of, plant_again, recorded_links
 from gridpeers.netem.fault_schedule import Heal
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EVERYTHING, LinkCommand
 from gridpeers.scenarios.record.record_info import RecordInfo
-from gridpeers.scenarios.replay.changed_faults import lossless
-from gridpeers.scenarios.replay.changes import ChangedRule
-from gridpeers.scenarios.replay.loop_process import LoopProcess
-from gridpeers.scenarios.replay.recorded_process import RecordedStep
-from gridpeers.scenarios.replay.replay_error import ReplayError
-from gridpeers.scenarios.replay.replayed_process import Message, agent_again, instance_of, plant_again, recorded_links
 from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Command, LinkRequest

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.realtime_agent import RealtimeAgent
+from gridpeers.lab.replay.recorded_process import RecordedProcess, RecordedStep
+from gridpeers.lab.replay.replayed_process import Message, ReplayedProcess, tick_message
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
-from gridpeers.scenarios.replay.recorded_process import RecordedProcess, RecordedStep
-from gridpeers.scenarios.replay.replayed_process import Message, ReplayedProcess, tick_message
 from gridpeers.wire.journal import MessageReference, ReceivedMessage, stream_of
 
 

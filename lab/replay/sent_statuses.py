@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 
-from gridpeers.scenarios.replay.replayed_process import Message
+from gridpeers.lab.replay.replayed_process import Message
 
 KEPT = 16
 """Latest statuses of an agent that are kept, of some seconds: one may be long on its way."""

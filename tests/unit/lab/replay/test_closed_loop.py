@@ -13,13 +13,13 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import Control, LawChoice
+from gridpeers.lab.replay.changes import ChangedRule, Changes
+from gridpeers.lab.replay.closed_loop import ClosedLoop
+from gridpeers.lab.replay.replay import replay
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changes import ChangedRule, Changes
-from gridpeers.scenarios.replay.closed_loop import ClosedLoop
-from gridpeers.scenarios.replay.replay import replay
 from gridpeers.wire.messages import LinkReport, PlantEvent, Telemetry
 from tests.record.fake_clock import FakeClockRun, at_once, fake_clock_record
 from tests.toy.toy_configs import ALL_FULL

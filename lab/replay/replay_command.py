@@ -12,8 +12,8 @@ import typer
 from gridpeers.cli.usage import BAD_INPUT, CLAIM_FAILED, fail, require, terminal
 
 if TYPE_CHECKING:
+    from gridpeers.lab.replay.changes import Changes
     from gridpeers.scenarios.record.record_reader import RunRecord
-    from gridpeers.scenarios.replay.changes import Changes
 
 
 CHANGES = "--without, --without-loss, --without-link-commands, --law or --set"
@@ -62,9 +62,9 @@ def replay(
     require({"mcap": "the record of a run", "numba": "the plant"})
 
     from gridpeers.cli.usage import ended_by_signals
+    from gridpeers.lab.replay.changes import Changes
+    from gridpeers.lab.replay.replay_error import ReplayError
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
-    from gridpeers.scenarios.replay.changes import Changes
-    from gridpeers.scenarios.replay.replay_error import ReplayError
     from gridpeers.scenarios.results.run_files import FolderError, refusal
 
     with ended_by_signals("nothing was written"):
@@ -110,7 +110,7 @@ def _replay(record: RunRecord, since: float, out: Path | None) -> bool:
         fail([f"--out {out}: {text}"], BAD_INPUT)
 
     from gridpeers.cli.progress import explained
-    from gridpeers.scenarios.replay.replay import replay as replay_record
+    from gridpeers.lab.replay.replay import replay as replay_record
 
     typer.echo(f"{_about(record)}: {record.t_end:.2f} s recorded")
     span = f"{record.t_end:.0f} s of {len(record.agents)} agents"
@@ -146,11 +146,11 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
 
     from gridpeers.cli.progress import progress
     from gridpeers.cli.usage import ended_by_signals
-    from gridpeers.scenarios.replay.changes import changed_rule
+    from gridpeers.lab.replay.changes import changed_rule
+    from gridpeers.lab.replay.replaying import counterfactual_in
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole
     from gridpeers.scenarios.schema.plugin_keys import judges_laws
-    from gridpeers.studies.replaying import counterfactual_in
 
     rule = changed_rule(record, changes)  # whatever is wrong is told before a folder is made
 

@@ -16,15 +16,15 @@ from math import inf
 
 from gridpeers.agents.agent_config import nameplate_of
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
+from gridpeers.lab.replay.changed_processes import ChangedProcesses
+from gridpeers.lab.replay.changes import ChangedRule
+from gridpeers.lab.replay.link_delays import LinkDelays
+from gridpeers.lab.replay.loop_process import LoopProcess, is_arrival
+from gridpeers.lab.replay.recorded_process import RecordedStep, processes_of
+from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
+from gridpeers.lab.replay.sent_statuses import SentStatuses
 from gridpeers.scenarios.record.record_reader import RunRecord
-from gridpeers.scenarios.replay.changed_processes import ChangedProcesses
-from gridpeers.scenarios.replay.changes import ChangedRule
-from gridpeers.scenarios.replay.link_delays import LinkDelays
-from gridpeers.scenarios.replay.loop_process import LoopProcess, is_arrival
-from gridpeers.scenarios.replay.recorded_process import RecordedStep, processes_of
-from gridpeers.scenarios.replay.replay_error import ReplayError
-from gridpeers.scenarios.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
-from gridpeers.scenarios.replay.sent_statuses import SentStatuses
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import (
     EACH_TICK,
