@@ -24,7 +24,6 @@ OWN_COMMANDS = {
         ("check", "show:check", "Check a scenario file and its feeder for problems."),
         ("doc", "show:doc", "Print a reference page that is made from the code."),
         ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
-        ("chaos", "chaos_command:chaos", "Disturb a scenario at random; judge and shrink what fails."),
         ("compare", "results_commands:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "results_commands:metrics", "Measure a run from its record, also one that was killed."),
         ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),

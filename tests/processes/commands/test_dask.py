@@ -9,13 +9,13 @@ import msgspec
 import pytest
 
 import gridpeers as gp
-from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+from gridpeers.lab.chaos.campaign import Campaign, run_campaign
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.chaos_run import ChaosRow
 from gridpeers.scenarios.sweep import workers
-from tests.chaos.bases import base_in
-from tests.chaos.small_campaign import small
 from tests.command_line import invoke
+from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.small_campaign import small
 
 SHORT = {"time.end_s": 1.5, "event": [{"label": "event1", "t_s": 1.0, "open": ["13-152"]}], "paper": ""}
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 
-from gridpeers.scenarios.chaos.chaos_run import ChaosRow
-from gridpeers.scenarios.chaos.disturbance import counted_kinds
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.chaos.schedule_report import schedule_lines
+from gridpeers.lab.chaos.chaos_run import ChaosRow
+from gridpeers.lab.chaos.disturbance import counted_kinds
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.schedule_report import schedule_lines
 from gridpeers.wire.wording import printable
 
 _CHECK = re.compile(r"\w{1,200}")

@@ -11,14 +11,14 @@ from typing import Any
 
 from msgspec.structs import replace
 
+from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
+from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
+from gridpeers.lab.chaos.feasible_supply import FeasibleSupply
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder
-from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S, chaos_checks
-from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
-from gridpeers.scenarios.chaos.feasible_supply import FeasibleSupply
 from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
 from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, netem_of

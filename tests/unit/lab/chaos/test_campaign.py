@@ -9,18 +9,18 @@ from pathlib import Path
 
 import pytest
 
+from gridpeers.lab.chaos import schedule_search
+from gridpeers.lab.chaos.campaign import Campaign, run_campaign
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.chaos_run import ChaosRow, run_scenario
+from gridpeers.lab.chaos.disturbance import counted_kinds
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.chaos import schedule_search
-from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-from gridpeers.scenarios.chaos.chaos_run import ChaosRow, run_scenario
-from gridpeers.scenarios.chaos.disturbance import counted_kinds
 from gridpeers.scenarios.checks.check_registry import ALWAYS
 from gridpeers.scenarios.schema import load_scenario
-from tests.chaos.bases import base_in, base_named
-from tests.chaos.small_campaign import SMALL, rows_of, small
 from tests.command_line import invoke
+from tests.unit.lab.chaos.bases import base_in, base_named
+from tests.unit.lab.chaos.small_campaign import SMALL, rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

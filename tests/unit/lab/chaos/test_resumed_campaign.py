@@ -8,18 +8,18 @@ from typing import Any
 
 import pytest
 
-from gridpeers.scenarios.chaos import campaign as campaigns
-from gridpeers.scenarios.chaos import chaos_run
-from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, kept_rows
-from gridpeers.scenarios.chaos.chaos_run import ChaosRow
-from gridpeers.scenarios.chaos.disturbance import Disturbance
+from gridpeers.lab.chaos import campaign as campaigns
+from gridpeers.lab.chaos import chaos_run
+from gridpeers.lab.chaos.campaign import Campaign, run_campaign
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder, kept_rows
+from gridpeers.lab.chaos.chaos_run import ChaosRow
+from gridpeers.lab.chaos.disturbance import Disturbance
 from gridpeers.scenarios.results.run_files import LOCK, locked
 from gridpeers.scenarios.results.run_journal import journal_line
 from gridpeers.scenarios.run_request import BrokenRunError
-from tests.chaos.bases import base_in
-from tests.chaos.small_campaign import rows_of, small
 from tests.command_line import invoke
+from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.small_campaign import rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

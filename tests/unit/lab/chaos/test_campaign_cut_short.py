@@ -12,17 +12,17 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.scenarios.chaos import campaign as campaigns
-from gridpeers.scenarios.chaos import chaos_run
-from gridpeers.scenarios.chaos.campaign import Campaign, run_campaign
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-from gridpeers.scenarios.chaos.chaos_run import run_scenario
-from gridpeers.scenarios.chaos.machine_error import MachineError
-from gridpeers.scenarios.chaos.numbered_run import shrink_number
+from gridpeers.lab.chaos import campaign as campaigns
+from gridpeers.lab.chaos import chaos_run
+from gridpeers.lab.chaos.campaign import Campaign, run_campaign
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.chaos_run import run_scenario
+from gridpeers.lab.chaos.machine_error import MachineError
+from gridpeers.lab.chaos.numbered_run import shrink_number
 from gridpeers.scenarios.run_case import run_case
-from tests.chaos.bases import base_in
-from tests.chaos.small_campaign import rows_of, small
 from tests.command_line import invoke
+from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.small_campaign import rows_of, small
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

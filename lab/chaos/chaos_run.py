@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import msgspec
 
-from gridpeers.scenarios.chaos.chaos_checks import RESTORED, WITHIN_S
-from gridpeers.scenarios.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
-from gridpeers.scenarios.chaos.disturbance import Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
+from gridpeers.lab.chaos.chaos_checks import RESTORED, WITHIN_S
+from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
+from gridpeers.lab.chaos.disturbance import Schedule
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase

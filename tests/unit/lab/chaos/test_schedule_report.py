@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.scenarios.chaos.campaign import Campaign, Summary
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-from gridpeers.scenarios.chaos.chaos_run import ChaosRow, run_schedule
-from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
-from gridpeers.scenarios.chaos.schedule_report import effective, schedule_lines
-from tests.chaos.bases import base_in
-from tests.chaos.small_campaign import SMALL
+from gridpeers.lab.chaos.campaign import Campaign, Summary
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
+from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
+from gridpeers.lab.chaos.schedule_report import effective, schedule_lines
+from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.small_campaign import SMALL
 
 AWAY = Disturbance(table="event", entry={"t_s": 0.3, "leave": ["inv4"]}, back={"t_s": 0.6, "join": ["inv4"]})
 

@@ -27,9 +27,9 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from gridpeers.scenarios.chaos.campaign import Campaign, Summary, Tell
-    from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-    from gridpeers.scenarios.chaos.chaos_run import ChaosRow
+    from gridpeers.lab.chaos.campaign import Campaign, Summary, Tell
+    from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+    from gridpeers.lab.chaos.chaos_run import ChaosRow
     from gridpeers.scenarios.schema import ScenarioModel
 
 _CampaignStart: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
@@ -92,9 +92,9 @@ def chaos(
         _PACKAGES | ({"distributed": "--dask"} if dask else {}),
         "install what chaos needs: pip install 'gridpeers[chaos]'",
     )
-    from gridpeers.scenarios.chaos.campaign import Campaign
-    from gridpeers.scenarios.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
-    from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+    from gridpeers.lab.chaos.campaign import Campaign
+    from gridpeers.lab.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
+    from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
     from gridpeers.scenarios.results.run_files import RUNS as RUNS_FOLDER
     from gridpeers.scenarios.results.run_files import FolderError, set_broken, set_status, shown
     from gridpeers.scenarios.sweep.workers import cores
@@ -163,7 +163,7 @@ def _new_campaign(context: typer.Context, out: Path | None, campaign: Campaign) 
 
 def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) -> _CampaignStart:
     """Go on with a campaign in its folder."""
-    from gridpeers.scenarios.chaos.chaos_folder import kept_rows
+    from gridpeers.lab.chaos.chaos_folder import kept_rows
 
     if folder.is_dir():
         _lock(context, folder, "--resume")
@@ -192,7 +192,7 @@ def _refuse_unless_possible(scenario: str, spec: ScenarioModel, case: str | None
 def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     """Say what begins; end with a line for each check that the scenario violates by itself."""
     from gridpeers.cli.progress import TRYING, explained
-    from gridpeers.scenarios.chaos.campaign import undisturbed
+    from gridpeers.lab.chaos.campaign import undisturbed
     from gridpeers.scenarios.checks.check_registry import ALWAYS
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
@@ -224,7 +224,7 @@ def _work(campaign: Campaign) -> str:
 
 def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenario: str) -> Summary:
     """Do the campaign, showing how far it is; whatever ends it early ends the command."""
-    from gridpeers.scenarios.chaos.campaign import run_campaign
+    from gridpeers.lab.chaos.campaign import run_campaign
 
     with _kept_if_ended(campaign, folder.rows, folder.path, scenario), _stages(console) as tell:
         return run_campaign(campaign, folder, tell)
@@ -234,7 +234,7 @@ def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenar
 def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
     """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
     from gridpeers.cli.usage import exit_code, interruptible
-    from gridpeers.scenarios.chaos.machine_error import MachineError, machine_lack
+    from gridpeers.lab.chaos.machine_error import MachineError, machine_lack
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
     from gridpeers.wire.driver.command_line import command_line

@@ -6,8 +6,8 @@ before. A scenario may say that, and nothing happens then.
 
 from __future__ import annotations
 
-from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase, merged_events
+from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, merged_events
 from gridpeers.scenarios.schema.check_notes import AgentEvent, why_away
 from gridpeers.scenarios.schema.participants import inverters_of
 

@@ -12,11 +12,11 @@ from types import MappingProxyType
 
 import msgspec
 
-from gridpeers.scenarios.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.chaos.numbered_run import seed_of
-from gridpeers.scenarios.chaos.row_problem import row_problem
-from gridpeers.scenarios.chaos.schedule_report import schedule_lines
+from gridpeers.lab.chaos.chaos_run import SAME_IN_PROCESSES, ChaosRow
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.numbered_run import seed_of
+from gridpeers.lab.chaos.row_problem import row_problem
+from gridpeers.lab.chaos.schedule_report import schedule_lines
 from gridpeers.scenarios.results.run_files import FolderError, shown, write_whole
 from gridpeers.scenarios.results.run_journal import JOURNAL, journal_line, open_journal, rows_in
 from gridpeers.scenarios.run_request import Driver

@@ -10,16 +10,16 @@ import pytest
 from hypothesis import given, settings
 from msgspec import json
 
-from gridpeers.scenarios.chaos import schedule_search
-from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
-from gridpeers.scenarios.chaos.disturbance import KINDS, Disturbance, Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import base_of
-from gridpeers.scenarios.chaos.schedule_search import BATCH, drawn, shrunk
-from gridpeers.scenarios.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
+from gridpeers.lab.chaos import schedule_search
+from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
+from gridpeers.lab.chaos.disturbance import KINDS, Disturbance, Schedule
+from gridpeers.lab.chaos.disturbed_scenario import base_of
+from gridpeers.lab.chaos.schedule_search import BATCH, drawn, shrunk
+from gridpeers.lab.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_writing import to_toml
-from tests.chaos.bases import NAMES, base_named
 from tests.scenario_files import written
+from tests.unit.lab.chaos.bases import NAMES, base_named
 
 CUT = Disturbance(table="link", entry={"on": "* <-> *", "from_s": 2.0, "to_s": 3.0, "cut": True})
 KILL = Disturbance(table="node", entry={"name": "inv1", "from_s": 2.0, "kill": True})

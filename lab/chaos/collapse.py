@@ -7,9 +7,9 @@ from typing import NamedTuple
 
 import msgspec
 
+from gridpeers.lab.chaos.chaos_checks import RESTORED
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import bus_islands
-from gridpeers.scenarios.chaos.chaos_checks import RESTORED
 from gridpeers.scenarios.checks.check_verdict import SHOWN_VIOLATIONS, CheckVerdict
 from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.scenarios.results.recorded_events import tripped_by

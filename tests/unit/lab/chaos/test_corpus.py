@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.scenarios.chaos.chaos_run import run_scenario
-from tests.chaos.bases import base_in
+from gridpeers.lab.chaos.chaos_run import run_scenario
+from tests.unit.lab.chaos.bases import base_in
 
 CORPUS = Path(__file__).parent / "corpus"
 

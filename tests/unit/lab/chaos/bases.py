@@ -7,7 +7,7 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.schema import load_scenario
 
 NAMES = ("islanding", "plug-n-play", "microgrid-switching")

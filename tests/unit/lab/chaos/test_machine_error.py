@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from gridpeers.scenarios.chaos import campaign as campaigns
-from gridpeers.scenarios.chaos import chaos_run
-from gridpeers.scenarios.chaos.chaos_run import run_scenario
-from gridpeers.scenarios.chaos.disturbance import Disturbance
-from gridpeers.scenarios.chaos.machine_error import MachineError
+from gridpeers.lab.chaos import campaign as campaigns
+from gridpeers.lab.chaos import chaos_run
+from gridpeers.lab.chaos.chaos_run import run_scenario
+from gridpeers.lab.chaos.disturbance import Disturbance
+from gridpeers.lab.chaos.machine_error import MachineError
 from gridpeers.scenarios.drivers.children import Child
 from gridpeers.scenarios.run_request import BrokenRunError
-from tests.chaos.bases import base_in
-from tests.chaos.small_campaign import SMALL
 from tests.command_line import invoke
+from tests.unit.lab.chaos.bases import base_in
+from tests.unit.lab.chaos.small_campaign import SMALL
 
 pytestmark = pytest.mark.usefixtures("elsewhere")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gridpeers.scenarios.chaos.chaos_checks import chaos_checks
+from gridpeers.lab.chaos.chaos_checks import chaos_checks
 from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS, check_name
 from gridpeers.wire.plugins.plugin import table_of
 from gridpeers.wire.schema.table_schema import fields_of

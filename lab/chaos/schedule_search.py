@@ -9,9 +9,9 @@ import hypothesis
 import msgspec
 from hypothesis import HealthCheck, Phase
 
-from gridpeers.scenarios.chaos.disturbance import Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.chaos.schedule_strategy import schedules
+from gridpeers.lab.chaos.disturbance import Schedule
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.schedule_strategy import schedules
 
 BATCH = 25
 """Schedules that are drawn together, from a seed of their own: so that the first runs of a seed are the same however

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.scenarios.chaos.chaos_run import REPEATS, ChaosRow, run_schedule
-from gridpeers.scenarios.chaos.disturbance import Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import base_of
-from gridpeers.scenarios.chaos.machine_error import MachineError
-from gridpeers.scenarios.chaos.schedule_search import shrunk
+from gridpeers.lab.chaos.chaos_run import REPEATS, ChaosRow, run_schedule
+from gridpeers.lab.chaos.disturbance import Schedule
+from gridpeers.lab.chaos.disturbed_scenario import base_of
+from gridpeers.lab.chaos.machine_error import MachineError
+from gridpeers.lab.chaos.schedule_search import shrunk
 from gridpeers.scenarios.run_request import Driver
 
 SEEDS = 1_000_000

@@ -13,9 +13,9 @@ from typing import Any
 
 from hypothesis import strategies as st
 
+from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.plant.equipment.named_loads import named_loads
-from gridpeers.scenarios.chaos.disturbance import Disturbance, Schedule
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.schema.participants import with_agent
 
 MOST_DISTURBANCES = 10

@@ -7,9 +7,8 @@ from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from gridpeers.plant.request_process import TransientFolder
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder, again
-from gridpeers.scenarios.chaos.chaos_run import (
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder, again
+from gridpeers.lab.chaos.chaos_run import (
     ASKED,
     REPEATS,
     SAME_IN_PROCESSES,
@@ -17,11 +16,12 @@ from gridpeers.scenarios.chaos.chaos_run import (
     compared,
     run_schedule,
 )
-from gridpeers.scenarios.chaos.disturbance import Schedule, counted_kinds
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
-from gridpeers.scenarios.chaos.numbered_run import run_number, seed_of, shrink_number
-from gridpeers.scenarios.chaos.schedule_report import effective, schedule_lines
-from gridpeers.scenarios.chaos.schedule_search import BATCH, drawn
+from gridpeers.lab.chaos.disturbance import Schedule, counted_kinds
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.numbered_run import run_number, seed_of, shrink_number
+from gridpeers.lab.chaos.schedule_report import effective, schedule_lines
+from gridpeers.lab.chaos.schedule_search import BATCH, drawn
+from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
 from gridpeers.scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
 from gridpeers.scenarios.run_request import Driver

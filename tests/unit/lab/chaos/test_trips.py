@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.scenarios.chaos import chaos_run
-from gridpeers.scenarios.chaos.chaos_checks import JUDGED_S, WITHIN_S
-from gridpeers.scenarios.chaos.chaos_folder import ChaosFolder
-from gridpeers.scenarios.chaos.chaos_run import (
+from gridpeers.lab.chaos import chaos_run
+from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+from gridpeers.lab.chaos.chaos_run import (
     LONGER_RUNS,
     ChaosRow,
     JudgedRun,
@@ -18,15 +18,15 @@ from gridpeers.scenarios.chaos.chaos_run import (
     run_scenario,
     run_schedule,
 )
-from gridpeers.scenarios.chaos.collapse import Collapse, collapses_at_changes, unexcused
-from gridpeers.scenarios.chaos.disturbance import Disturbance
-from gridpeers.scenarios.chaos.disturbed_scenario import ChaosBase
+from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, unexcused
+from gridpeers.lab.chaos.disturbance import Disturbance
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
-from tests.chaos.bases import base_in, base_named
-from tests.chaos.small_campaign import SMALL
+from tests.unit.lab.chaos.bases import base_in, base_named
+from tests.unit.lab.chaos.small_campaign import SMALL
 
 TRIPS = """[protection]
 enter_service_s = 1.0
