@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from gridpeers.lab.chaos.chaos_folder import ChaosFolder, again
+import msgspec
+
+from gridpeers.lab.chaos.chaos_folder import ChaosFolder, again, seed_of
 from gridpeers.lab.chaos.chaos_run import (
     ASKED,
     REPEATS,
     SAME_IN_PROCESSES,
     ChaosRow,
+    MachineError,
     compared,
     run_schedule,
 )
 from gridpeers.lab.chaos.disturbance import Schedule, counted_kinds
-from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
-from gridpeers.lab.chaos.numbered_run import run_number, seed_of, shrink_number
-from gridpeers.lab.chaos.schedule_report import effective, schedule_lines
-from gridpeers.lab.chaos.schedule_search import BATCH, drawn
+from gridpeers.lab.chaos.disturbed_scenario import ChaosBase, base_of
+from gridpeers.lab.chaos.schedules import BATCH, drawn, shrunk
 from gridpeers.plant.request_process import TransientFolder
 from gridpeers.scenarios.checks.check_registry import RETURNS, chosen_checks
 from gridpeers.scenarios.results.run_files import refusal, set_broken, set_complete, write_whole
@@ -83,7 +84,7 @@ class Summary:
         """Yield the report."""
         base, rows = self.campaign.base, self.rows.values()
         how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
-        drawn = counted_kinds(effective(base, row.schedule) for row in rows)
+        drawn = counted_kinds(base.effective(row.schedule) for row in rows)
         head = f"{base.scenario.name}, case {base.case}: {len(rows)} of {self.campaign.runs} runs {how}"
         yield f"{head}, seed {self.campaign.seed}; disturbances: {drawn}"
         yield f"{'asked':18} {'judged':>7} {'violated':>9}  first"
@@ -98,7 +99,7 @@ class Summary:
         yield f"{self.violated} of {len(rows)} runs violated anything; {sum(row.trips for row in rows)} trips{beyond}"
         for failure in self.failures:
             yield f"{failure.violated}, run {failure.row.number}: {failure.sentence}"
-            yield from (f"    {line}" for line in schedule_lines(base, failure.simplest.schedule))
+            yield from (f"    {line}" for line in base.lines(failure.simplest.schedule))
             yield f"    {again(failure.file)}"
 
 
@@ -108,28 +109,17 @@ def undisturbed(campaign: Campaign) -> ChaosRow:
 
 
 def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary:
-    """Do the runs, shrink what fails, and write all of it; what came until an interruption is written, too.
+    """Do the runs that the folder lacks, shrink what fails, and write all of it, also what came until an interruption.
 
-    Parameters
-    ----------
-    campaign : Campaign
-        What to do.
-    folder : ChaosFolder
-        Its folder; runs of which it has the results are not done again.
-    tell : Tell
-        Takes the progress: runs, then failures that are shrunk.
-
-    Raises
-    ------
-    MachineError
-        If the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
+    MachineError if the machine lacks what a run needs: that is no failure of the scenario, and nothing is shrunk.
     """
     failures: dict[str, Failure] = {}
     try:
         with closing(TransientFolder("gridpeers-chaos-")) as temporary:  # workers that are ended leave theirs in it
-            _do_runs(campaign, folder, tell, temporary.path)
+            within = None if campaign.dask else temporary.path
+            _do_runs(campaign, folder, tell, within)
             _add_failures(failures, folder)
-            _shrink_all(campaign, folder, failures, tell, temporary.path)
+            _shrink_all(campaign, folder, failures, tell, within)
         summary = _concluded(campaign, folder, failures)
         set_complete(folder.path)
     except BaseException as error:
@@ -143,51 +133,21 @@ def run_campaign(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> Summary
     return summary
 
 
-def _do_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell, within: Path) -> None:
-    """Do the runs that have no results, and add these as they come."""
+def _do_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell, within: Path | None) -> None:
+    text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
+    calls = ((text, seed, number, it, driver, within) for number, it in _numbered(campaign, dict(folder.rows)))
+    jobs = 1 if driver == "processes" else campaign.jobs
     _tell_runs(campaign, folder, tell)
-    with closing(_results(campaign, folder.rows, within)) as results:
+    with closing(on_workers(calls, jobs, run_number, campaign.dask)) as results:
         for row in results:
             first = folder.rows.get(row.number)
             folder.add(row if first is None else compared(first, row, REPEATS))
             _tell_runs(campaign, folder, tell)
 
 
-def _shrink_all(
-    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], tell: Tell, within: Path
-) -> None:
-    """Shrink each kind of failure, and write its scenario in place of the one that was drawn."""
-    kinds = counted(len(failures), "kind of failure", "kinds of failure")
-    if failures:
-        tell(f"shrinking, 0 of {kinds}", 0, len(failures))
-    with closing(_shrunk(campaign, tuple(failures.values()), within)) as simpler:
-        for i, (violated, simplest) in enumerate(simpler):
-            row = failures[violated].row
-            file = folder.write_failure(violated, row, simplest)
-            failures[violated] = Failure(violated=violated, row=row, simplest=simplest, file=file)
-            tell(f"shrinking, {i + 1} of {kinds}", i + 1, len(failures))
-
-
 def _tell_runs(campaign: Campaign, folder: ChaosFolder, tell: Tell) -> None:
-    """Tell how many of the runs are done, and how many of them violated anything."""
     done, bad = len(folder.rows), sum(bool(row.violated) for row in folder.rows.values())
     tell(f"{campaign.base.scenario.name}, {done} of {campaign.runs} runs, {bad} violated", done, campaign.runs)
-
-
-def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
-    """Write the table in the order of the runs, and the report."""
-    folder.write_table()
-    summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
-    write_whole(folder.path / "report.txt", "\n".join(summary.lines()) + "\n")
-    return summary
-
-
-def _results(campaign: Campaign, rows: Mapping[int, ChaosRow], within: Path) -> Generator[ChaosRow, None, None]:
-    """Yield the results of all runs that have none, and those of the repeated ones once more."""
-    text, seed, driver = campaign.base.text, campaign.seed, campaign.driver
-    place = None if campaign.dask else within
-    calls = ((text, seed, number, schedule, driver, place) for number, schedule in _numbered(campaign, dict(rows)))
-    yield from on_workers(calls, 1 if driver == "processes" else campaign.jobs, run_number, campaign.dask)
 
 
 def _numbered(campaign: Campaign, known: Mapping[int, ChaosRow]) -> Iterator[tuple[int, Schedule]]:
@@ -214,26 +174,83 @@ def _add_failures(failures: dict[str, Failure], folder: ChaosFolder) -> None:
         failures[violated] = Failure(violated=violated, row=row, simplest=row, file=file)
 
 
-def _shrunk(
-    campaign: Campaign, failures: tuple[Failure, ...], within: Path
-) -> Generator[tuple[str, ChaosRow], None, None]:
-    """Yield for each failure the run of the simplest schedule found."""
+def _shrink_all(
+    campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure], tell: Tell, within: Path | None
+) -> None:
+    """Shrink each kind of failure, and write its scenario in place of the one that was drawn."""
     if not failures:
         return
-    place = None if campaign.dask else within
+    kinds = counted(len(failures), "kind of failure", "kinds of failure")
+    tell(f"shrinking, 0 of {kinds}", 0, len(failures))
     calls = [
-        (campaign.base.text, campaign.seed, it.row.number, it.violated, _driver(campaign, it.violated), place)
-        for it in failures
+        (campaign.base.text, campaign.seed, it.row.number, name, _shrinking_driver(campaign, name), within)
+        for name, it in failures.items()
     ]
-    yield from on_workers(calls, min(campaign.jobs, len(calls)), _shrink, campaign.dask)
+    with closing(on_workers(calls, min(campaign.jobs, len(calls)), _shrink, campaign.dask)) as simpler:
+        for done, (violated, simplest) in enumerate(simpler, start=1):
+            found = failures[violated]
+            file = folder.write_failure(violated, found.row, simplest)
+            failures[violated] = replace(found, simplest=simplest, file=file)
+            tell(f"shrinking, {done} of {kinds}", done, len(failures))
 
 
-def _driver(campaign: Campaign, violated: str) -> Driver:
+def _shrinking_driver(campaign: Campaign, violated: str) -> Driver:
     """Return the driver with which a failure is shrunk: processes only for what one process cannot show."""
     return campaign.driver if violated in (SAME_IN_PROCESSES, REPEATS) else "inprocess"
+
+
+def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
+    """Write the table in the order of the runs, and the report."""
+    folder.write_table()
+    summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
+    write_whole(folder.path / "report.txt", "\n".join(summary.lines()) + "\n")
+    return summary
+
+
+# -------------------------------------------------------------------- on a worker
+
+
+def run_number(
+    text: str, seed: int, number: int, schedule: Schedule, driver: Driver, within: Path | None = None
+) -> ChaosRow:
+    """Do a run of the campaign with a seed; `text` is that of its base, so that any process can do it."""
+    return run_schedule(base_of(text), schedule, seed_of(seed, number), number, driver, within=within)
 
 
 def _shrink(
     text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None
 ) -> tuple[str, ChaosRow]:
     return violated, shrink_number(text, seed, number, violated, driver, within)
+
+
+def shrink_number(
+    text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
+) -> ChaosRow:
+    """Return the run of the simplest schedule found that violates what a run violates."""
+    base = base_of(text)
+    rows: dict[bytes, ChaosRow] = {}
+
+    def row_of(schedule: Schedule) -> ChaosRow:
+        again = violated == REPEATS
+        row = run_schedule(base, schedule, seed_of(seed, number), number, driver, again=again, within=within)
+        return rows.setdefault(msgspec.json.encode(schedule), row)
+
+    def fails(schedule: Schedule) -> bool:
+        try:
+            return violated in row_of(schedule).violated
+        except MachineError as error:
+            raise _SearchEnd(error) from error
+
+    try:
+        simplest = shrunk(base, seed, number, fails)
+    except _SearchEnd as end:
+        raise end.why from None
+    return rows.get(msgspec.json.encode(simplest)) or row_of(simplest)  # that of the run itself is not run to shrink it
+
+
+class _SearchEnd(BaseException):
+    """Ends a search at once: hypothesis would take an `Exception` for a failure, and shrink it."""
+
+    def __init__(self, why: MachineError) -> None:
+        super().__init__(str(why))
+        self.why = why

@@ -45,18 +45,10 @@ _ALWAYS: Mapping[str, Mapping[str, Any]] = {"heal": {"within_s": REJOINED_S}, "o
 def chaos_checks(
     own: Iterable[str | Mapping[str, Any]], changed_s: float, since_s: float
 ) -> list[str | dict[str, Any]]:
-    """Return the checks of a run with disturbances, as entries of its scenario.
+    """Return the checks of a run with disturbances, as entries of its scenario, from its own entries.
 
-    What the scenario itself says of a check stays: its limits, but for those above, and that it is off.
-
-    Parameters
-    ----------
-    own : Iterable[str | Mapping[str, Any]]
-        Entries of the scenario.
-    changed_s : float
-        Run time of the last change (s).
-    since_s : float
-        Run time from which on a run is to be restored (s): the same, or later if inverters trip.
+    What the scenario itself says of a check stays: its limits, but for those above, and that it is off. The run is to
+    be restored from the last change (s of run time) on, or from later if inverters trip.
 
     Examples
     --------
@@ -64,9 +56,7 @@ def chaos_checks(
     >>> of["steady"], of["mine:Calm".partition(":")[2]], of["voltage"]["since_s"]
     ({'use': 'steady', 'off': True}, 'mine:Calm', 9.0)
     """
-    entries: dict[str, str | dict[str, Any]] = {}
-    for entry in own:
-        entries[check_name(entry)] = entry if isinstance(entry, str) else dict(entry)
+    entries = {check_name(entry): entry if isinstance(entry, str) else dict(entry) for entry in own}
     limits_of: dict[str, Mapping[str, Any]] = {
         **{name: {**limits, "since_s": round(since_s, 9)} for name, limits in _AFTER.items()},
         "stale_values": {"since_s": round(changed_s + LATEST_S, 9)},

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -27,13 +27,9 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from gridpeers.lab.chaos.campaign import Campaign, Summary, Tell
-    from gridpeers.lab.chaos.chaos_folder import ChaosFolder
+    from gridpeers.lab.chaos.campaign import Campaign, Tell
     from gridpeers.lab.chaos.chaos_run import ChaosRow
     from gridpeers.scenarios.schema import ScenarioModel
-
-_CampaignStart: TypeAlias = "tuple[dict[int, ChaosRow], Callable[[], Path]]"
-"""Runs that a campaign has already, and a function that returns its folder, made and locked."""
 
 _PACKAGES = {"hypothesis": "the schedules", "joblib": "the runs over all cores"}
 
@@ -92,82 +88,56 @@ def chaos(
         _PACKAGES | ({"distributed": "--dask"} if dask else {}),
         "install what chaos needs: pip install 'gridpeers[chaos]'",
     )
-    from gridpeers.lab.chaos.campaign import Campaign
-    from gridpeers.lab.chaos.chaos_folder import RUNS, ChaosFolder, asked_of
+    from datetime import datetime
+
+    from gridpeers.lab.chaos.campaign import Campaign, run_campaign
+    from gridpeers.lab.chaos.chaos_folder import RUNS, ChaosFolder, asked_of, kept_rows
     from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
-    from gridpeers.scenarios.results.run_files import RUNS as RUNS_FOLDER
-    from gridpeers.scenarios.results.run_files import FolderError, set_broken, set_status, shown
+    from gridpeers.scenarios.results.run_files import (
+        FolderError,
+        broken_if_ended,
+        new_folder,
+        require_folder,
+        set_status,
+        shown,
+    )
     from gridpeers.scenarios.sweep.workers import cores
     from gridpeers.wire.driver.command_line import command_line
 
     if out is not None and resume is not None:
         fail([f"--out {out}: --resume {resume} goes on in that folder; leave one of them out"], BAD_INPUT)
     base = ChaosBase(spec, feeder)
-    first_seed, first_runs = (None, None) if resume is None else asked_of(resume)
-    seed = next(it for it in (seed, first_seed, 1) if it is not None)
-    runs = runs or first_runs or RUNS
-    campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores(), dask=dask)
+    name, console = f"{spec.name}-chaos", terminal()
     try:
-        rows, opened = (
-            _new_campaign(context, out, campaign) if resume is None else _resumed_campaign(context, resume, campaign)
-        )
+        first_seed, first_runs = (1, RUNS) if resume is None else asked_of(resume)
+        seed, runs = first_seed if seed is None else seed, runs or first_runs
+        campaign = Campaign(base=base, seed=seed, runs=runs, driver=driver, jobs=jobs or cores(), dask=dask)
+        rows: dict[int, ChaosRow] = {}
+        if resume is None:
+            require_folder(out, name)
+        else:
+            _lock(context, resume, "--resume")
+            rows = kept_rows(resume, base, seed, driver, runs)
+        with _kept_if_ended(campaign, rows, resume, scenario):
+            _try_undisturbed(console, campaign)
+        if resume is None:  # the folder is made only once the scenario has passed without disturbances
+            path = new_folder(out, name, datetime.now().astimezone())
+            _lock(context, path, "--out")
+        else:
+            path = resume
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        if resume is not None:
-            fail(
-                [f"--resume {resume}: {error.strerror}; a campaign goes on where its folder can be written"], BAD_INPUT
-            )
-        fail([f"--out {out or RUNS_FOLDER}: {error.strerror}; give another folder"], BAD_INPUT)
-    console = terminal()
-    with _kept_if_ended(campaign, rows, resume, scenario):
-        _try_undisturbed(console, campaign)
     words = ["chaos", scenario, "--case", base.case, "--runs", str(runs), "--seed", str(seed), "--driver", driver]
-    path: Path | None = None
-    try:
-        path = opened()
+    with _kept_if_ended(campaign, rows, path, scenario):
         set_status(path, "running")
-        folder = ChaosFolder(path, base, seed, command_line(*words), rows, runs)
-    except FolderError as error:
-        fail([str(error)], BAD_INPUT)
-    except OSError as error:
-        where = shown(path) if path else f"--out {out or RUNS_FOLDER}" if resume is None else f"--resume {resume}"
-        why = f"{where}: the folder of the campaign cannot be written: {error.strerror}"
-        if path:
-            set_broken(path, why)
-        kept = "the runs that it has are kept" if rows else "it has no run: remove it, and begin again"
-        fail([f"{why}; mend that, or make room; {kept}"], BROKEN)
-    summary = _carry_out(console, campaign, folder, scenario)
+        with broken_if_ended(path):
+            folder = ChaosFolder(path, base, seed, command_line(*words), rows, runs)
+    with _kept_if_ended(campaign, folder.rows, path, scenario), _stages(console) as tell:
+        summary = run_campaign(campaign, folder, tell)
     for line in summary.lines():
         typer.echo(line)
     typer.echo(f"\nResults: {shown(path)}/")
     raise typer.Exit(CLAIM_FAILED if summary.violated else PASSED)
-
-
-def _new_campaign(context: typer.Context, out: Path | None, campaign: Campaign) -> _CampaignStart:
-    """Begin a campaign in a new folder, which is made only once the scenario has passed without disturbances."""
-    from datetime import datetime
-
-    from gridpeers.scenarios.results.run_files import new_folder, require_folder
-
-    name = f"{campaign.base.scenario.name}-chaos"
-    require_folder(out, name)
-
-    def opened() -> Path:
-        path = new_folder(out, name, datetime.now().astimezone())
-        _lock(context, path, "--out")
-        return path
-
-    return {}, opened
-
-
-def _resumed_campaign(context: typer.Context, folder: Path, campaign: Campaign) -> _CampaignStart:
-    """Go on with a campaign in its folder."""
-    from gridpeers.lab.chaos.chaos_folder import kept_rows
-
-    if folder.is_dir():
-        _lock(context, folder, "--resume")
-    return kept_rows(folder, campaign.base, campaign.seed, campaign.driver, campaign.runs), lambda: folder
 
 
 def _lock(context: typer.Context, folder: Path, option: str) -> None:
@@ -222,23 +192,14 @@ def _work(campaign: Campaign) -> str:
     return f"{runs}, {campaign.jobs} at a time, once {counted(campaign.jobs, 'worker')} have started"
 
 
-def _carry_out(console: Console, campaign: Campaign, folder: ChaosFolder, scenario: str) -> Summary:
-    """Do the campaign, showing how far it is; whatever ends it early ends the command."""
-    from gridpeers.lab.chaos.campaign import run_campaign
-
-    with _kept_if_ended(campaign, folder.rows, folder.path, scenario), _stages(console) as tell:
-        return run_campaign(campaign, folder, tell)
-
-
 @contextmanager
 def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | None, scenario: str) -> Iterator[None]:
     """End the command with what went wrong, how many runs are kept and how to go on, if the work is ended early."""
     from gridpeers.cli.usage import exit_code, interruptible
-    from gridpeers.lab.chaos.machine_error import MachineError, machine_lack
+    from gridpeers.lab.chaos.machine_error import MachineError, machine_error
     from gridpeers.scenarios.results.run_files import refusal, shown
     from gridpeers.scenarios.sweep.workers import WorkersError
     from gridpeers.wire.driver.command_line import command_line
-    from gridpeers.wire.driver.machine import too_few_files
 
     try:
         with interruptible():
@@ -254,9 +215,8 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
         left = f"{kept} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {left}"], exit_code(error))
-        why = str(machine_lack(["MemoryError"]) if isinstance(error, MemoryError) else error)
-        if isinstance(error, OSError):
-            why = too_few_files(error) or (refusal(folder, error) if folder else why)
+        of_a_folder = isinstance(error, OSError) and folder
+        why = refusal(folder, error) if of_a_folder else str(machine_error(error) or error)
         fail([why, left], BROKEN)
 
 

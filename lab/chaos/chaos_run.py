@@ -14,7 +14,7 @@ from gridpeers.lab.chaos.chaos_checks import RESTORED, WITHIN_S
 from gridpeers.lab.chaos.collapse import Collapse, collapses_at_changes, excused_inverters, unexcused
 from gridpeers.lab.chaos.disturbance import Schedule
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
-from gridpeers.lab.chaos.machine_error import MachineError, machine_error, machine_lack, unwritten
+from gridpeers.lab.chaos.machine_error import MachineError, machine_error
 from gridpeers.scenarios.checks.check_registry import LAW_FAILED
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
@@ -29,18 +29,9 @@ from gridpeers.scenarios.sweep.sweep_case import plant_at_start
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import utf8
 
-ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = (
-    "ends",
-    "no_error",
-    "links",
-    "repeats",
-    "same_in_processes",
-)
+ASKED = ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = "ends", "no_error", "links", "repeats", "same_in_processes"
 """Questions about every run beside the checks: it reaches its end; no error of the program; accounts of links balance;
 it repeats to the byte; processes give the bytes of one process."""
-
-ASKED = (ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES)
-"""All of them."""
 
 LONGER_RUNS = 6
 """Most times that a run with trips is done, each longer than the one before: inverters stay off after three trips
@@ -51,9 +42,7 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     """The result of one run."""
 
     number: int
-    """Its number, from 0."""
     schedule: Schedule
-    """Its disturbances."""
     passed: tuple[str, ...] = ()
     """Checks, and what else is asked, that it passed."""
     violated: dict[str, str] = {}
@@ -73,6 +62,11 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     took_s: float = 0.0
     """Wall-clock time (s)."""
 
+    @property
+    def status(self) -> str:
+        """In a word: what it violates comes before what a collapse excuses."""
+        return "violated" if self.violated else "collapse" if self.collapse else "passed"
+
 
 def run_schedule(
     base: ChaosBase,
@@ -84,29 +78,10 @@ def run_schedule(
     again: bool = False,
     within: Path | None = None,
 ) -> ChaosRow:
-    """Run a scenario with a schedule, and judge it.
+    """Run a scenario with a schedule and a seed of its own, and judge it; MachineError if the machine is to blame.
 
-    Parameters
-    ----------
-    base : ChaosBase
-        The scenario.
-    schedule : Schedule
-        The disturbances.
-    seed : int
-        Seed of the scenario.
-    number : int, optional
-        Number of the run.
-    driver : {"inprocess", "processes"}
-        With processes, it runs in one process too, and both must give the same bytes.
-    again : bool, optional
-        Whether to run it twice: both must give the same bytes.
-    within : Path, optional
-        Folder of the campaign for temporary folders; that of the system when left out.
-
-    Raises
-    ------
-    MachineError
-        If the machine lacks what the run needs.
+    With processes it runs in one process too, and with `again` once more: both must give the same bytes. Temporary
+    folders are made `within` that of the campaign.
     """
     began = monotonic()
     row = _once_restored(base, schedule, seed, number, driver, within)
@@ -143,14 +118,7 @@ def restored_from(events: Iterable[PlantEvent], enter_service_s: float) -> float
     """Return the run time (s) from which on a run with trips is to be restored; 0 for one without.
 
     It is that of the last trip or return. While inverters are off, it is later by the time in which voltage and
-    frequency are to become normal, and by that for which they must be.
-
-    Parameters
-    ----------
-    events : Iterable[PlantEvent]
-        Events of the plant.
-    enter_service_s : float
-        How long voltage and frequency must be normal before an inverter returns (s).
+    frequency are to become normal, and by that for which they must be before an inverter returns.
     """
     events = tuple(events)
     last = max((event.t for event in events if event.kind == "trip"), default=0.0)
@@ -208,40 +176,37 @@ class JudgedRun(NamedTuple):
     restored_s: float = 0.0
     """Run time from which on it is to be restored (s)."""
     collapses: tuple[Collapse, ...] = ()
-    """See `collapses_at_changes`."""
     off: frozenset[str] = frozenset()
     """Inverters that are out of service at its end."""
     verdicts: tuple[CheckVerdict, ...] = ()
-    """Of its checks."""
 
 
 def _judged(
     base: ChaosBase, scenario: ScenarioModel, row: ChaosRow, driver: Driver, within: Path | None = None
 ) -> JudgedRun:
     """Run a scenario once in a temporary folder."""
-    disk = Path(tempfile.gettempdir()) if within is None else within.parent
     try:
         temporary = tempfile.TemporaryDirectory(prefix="gridpeers-chaos-", dir=within, ignore_cleanup_errors=True)
     except OSError as error:
-        raise machine_error(error, disk, disk) or unwritten(error.strerror or str(error), disk) from None
+        raise MachineError(str(error)) from None
     with temporary as name:
         folder = Path(name)
         request = Request(scenario=scenario, feeder=base.feeder, driver=driver, folder=folder, lasting=False)
         at_start = plant_at_start if scenario.plant.simulator == "gridpeers" and driver == "inprocess" else None
         try:
-            recorded, outcome = run_case(request, base.case, "", _ignore, at_start)
+            recorded, outcome = run_case(request, base.case, "", lambda case, t, end: None, at_start)
             if recorded.record_failure:  # its checks could not judge it
-                raise unwritten(recorded.record_failure, disk)
+                raise MachineError(recorded.record_failure)
             record = CaseRecord.of(scenario, base.feeder, base.case, recorded)
             verdicts = judge_case(CheckedCase.of(scenario, base.feeder, base.case, record, folder / base.case))
             told = [event.text for event in recorded.events if event.kind == "law"]
             told += [*outcome.notes, *(it.reason for it in verdicts if it.status == "failed")]
-            if lack := machine_lack(told, disk):  # an agent may die, a law or a check fail, and the run goes on
+            if lack := machine_error(*told):  # an agent may die, a law or a check fail, and the run goes on
                 raise lack
         except MachineError:
             raise
         except Exception as error:
-            if lack := machine_error(error, folder, disk):
+            if lack := machine_error(error):
                 raise lack from error
             if isinstance(error, BrokenRunError):
                 violated = LAW_FAILED if isinstance(error, LawStopError) else ENDS
@@ -274,7 +239,3 @@ def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdi
         links_sha256=recorded.links.sha256,
         trips=sum(bool(tripped_by(event)) for event in recorded.events),
     )
-
-
-def _ignore(case: str, t: float, end: float) -> None:
-    """Take no notice of the progress of one run."""

@@ -37,15 +37,6 @@ def collapses_at_changes(scenario: ScenarioModel, feeder: Feeder, events: Iterab
     """Return the collapses of a run, one for each change that makes inverters trip within `PERIODS`.
 
     The first trip of an inverter counts alone: who has tripped before may trip again for the reason of that time.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        The scenario: its events are the changes.
-    feeder : Feeder
-        Its feeder.
-    events : Iterable[PlantEvent]
-        Events of the plant, in the order of time.
     """
     rows = (*feeder.inverters, *feeder.spares)
     bus_of = {row.name: row.bus for row in rows}
@@ -77,19 +68,9 @@ def excused_inverters(collapses: Iterable[Collapse], plain: Iterable[Collapse]) 
 
 
 def unexcused(verdicts: Iterable[CheckVerdict], excused: frozenset[str]) -> dict[str, str]:
-    """Return the failed checks of what control restores, with the sentence of what other inverters violate.
+    """Return the failed checks of what control restores, with the sentence of what inverters violate that count.
 
-    Parameters
-    ----------
-    verdicts : Iterable[CheckVerdict]
-        Of one run.
-    excused : frozenset[str]
-        Inverters whose violations do not count. A violation that names none counts.
-
-    Returns
-    -------
-    dict[str, str]
-        Empty sentences are of checks that only excused inverters violate.
+    A sentence is empty if only excused inverters violate the check. A violation that names no inverter counts.
     """
     found = {}
     for verdict in verdicts:

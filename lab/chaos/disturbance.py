@@ -74,14 +74,7 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
     @property
     def kind(self) -> str:
-        """Key of its kind in `KINDS`: its table, or the first key of its entry that is one.
-
-        Examples
-        --------
-        >>> both = {"on": "* <-> *", "from_s": 1.0, "to_s": 2.0, "corrupt": 0.1, "duplicate": 0.3}
-        >>> Disturbance(table="link", entry=both).kind
-        'corrupt'
-        """
+        """Key of its kind in `KINDS`: its table, or the first key of its entry that is one."""
         return next(key for key in (self.table, *self.entry) if key in KINDS)
 
     def __str__(self) -> str:
@@ -96,21 +89,12 @@ Schedule = tuple[Disturbance, ...]
 
 
 def counted_kinds(schedules: Iterable[Schedule]) -> str:
-    """Return how many disturbances of each kind schedules have, in words.
-
-    Examples
-    --------
-    >>> kill = Disturbance(table="node", entry={"name": "inv1", "from_s": 1.0, "kill": True})
-    >>> lie = Disturbance(table="node", entry={"name": "inv2", "from_s": 1.0, "lies": {"model": "extreme"}})
-    >>> counted_kinds([(kill, lie), (lie,)]), counted_kinds([()])
-    ('1 kill, 2 lies', 'none')
-    """
+    """Return how many disturbances of each kind schedules have: "1 kill, 2 lies"; "none"."""
     numbers = Counter(disturbance.kind for schedule in schedules for disturbance in schedule)
     return ", ".join(counted(numbers[key], *nouns) for key, nouns in KINDS.items() if numbers[key]) or "none"
 
 
 def _word(value: Any) -> str:
-    """Return a value of an entry in few letters."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {_word(of)}" for key, of in value.items()) + "}"
     if isinstance(value, list | tuple):

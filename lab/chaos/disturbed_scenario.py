@@ -19,9 +19,10 @@ from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.partition import Partition
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.tables import read_feeder
+from gridpeers.scenarios.schema.check_notes import AgentEvent, why_away
 from gridpeers.scenarios.schema.checks import check_switches, check_times
 from gridpeers.scenarios.schema.loading import check_tables, read_tables
-from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, netem_of
+from gridpeers.scenarios.schema.participants import check_agentless, check_netem, check_schedule, inverters_of, netem_of
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -40,20 +41,12 @@ _LONGEST_NAME = 24
 
 @dataclass(frozen=True)
 class ChaosBase:
-    """A scenario of one case, to be disturbed.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        Checked, with one case.
-    feeder : Feeder
-        Its feeder.
-    """
+    """A checked scenario of one case, to be disturbed."""
 
     scenario: ScenarioModel
     feeder: Feeder
     tree: Mapping[str, Any] = field(init=False, repr=False)
-    """Its tables."""
+    """The scenario as the tables of its file."""
     supply: FeasibleSupply = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -61,8 +54,7 @@ class ChaosBase:
         name = f"{self.scenario.name[:_LONGEST_NAME]}-chaos"
         plain = replace(self.scenario, name=name, paper="", claims=(), metrics=())
         object.__setattr__(self, "tree", tomllib.loads(to_toml(plain, {}, terse=True)))
-        everybody = [row.name for row in (*self.feeder.inverters, *self.feeder.spares)]
-        object.__setattr__(self, "supply", FeasibleSupply(self.feeder, everybody))
+        object.__setattr__(self, "supply", FeasibleSupply(self.feeder))
 
     @property
     def text(self) -> str:
@@ -71,7 +63,6 @@ class ChaosBase:
 
     @property
     def case(self) -> str:
-        """Name of the case."""
         return next(iter(self.scenario.cases))
 
     @property
@@ -93,21 +84,9 @@ class ChaosBase:
         return max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
 
     def disturbed(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> ScenarioModel:
-        """Return the scenario with a schedule that `is_possible`, and with a seed.
+        """Return the scenario with a schedule that `is_possible`, and with a seed of the messages' fates.
 
-        Parameters
-        ----------
-        schedule : Schedule
-            The disturbances.
-        seed : int
-            Seed of the messages' fates.
-        since_s : float, optional
-            Run time (s) from which on it is to be restored, if that is later than the last change.
-
-        Raises
-        ------
-        ScenarioError
-            If the schedule is not possible, with the reasons.
+        It is to be restored from a run time (s) on, that of the last change or later.
         """
         problems = Problems("chaos")
         scenario, _ = check_tables(self._tree(schedule, seed, since_s), Path("chaos.toml"), problems, _read_feeder)
@@ -137,8 +116,30 @@ class ChaosBase:
                 kept = (*kept, disturbance)
         return kept
 
+    def lines(self, schedule: Schedule) -> list[str]:
+        """Return a sentence for each disturbance, in the order of time, with why nothing happens where that is so."""
+        lines = []
+        for disturbance in sorted(schedule, key=lambda it: it.begins_s):
+            why = self._why_idle(schedule, disturbance)
+            lines.append(f"{disturbance} (nothing happens: {why})" if why else str(disturbance))
+        return lines
+
+    def effective(self, schedule: Schedule) -> Schedule:
+        """Return the disturbances of a schedule without those that only meet an agent that is away."""
+        return tuple(it for it in schedule if not self._why_idle(schedule, it))
+
+    def _why_idle(self, schedule: Schedule, disturbance: Disturbance) -> str:
+        """Return why a disturbance has no effect, as a lie of an agent that has left before; "" if it may have one."""
+        if disturbance.table != "node":
+            return ""
+        name = str(disturbance.entry["name"])
+        events = merged_events(self.tree.get("event", ()), schedule)
+        agent_events = [AgentEvent(float(it["t_s"]), it.get("leave", ()), it.get("join", ())) for it in events]
+        at_start = any(row.name == name and not row.spare for row in inverters_of(self.scenario, self.feeder))
+        why = why_away(name, disturbance.begins_s, disturbance.ends_s, agent_events, at_start=at_start)
+        return f"{name} {why}" if why else ""
+
     def _tree(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> dict[str, Any]:
-        """Return the tables of the scenario with a schedule."""
         changed, T_c = self.changed_s(schedule), self.scenario.time.T_c_s
         since = max(changed, since_s)
         end = rounded_up(since + WITHIN_S + JUDGED_S, T_c)
@@ -185,7 +186,6 @@ def merged_events(own: Iterable[Mapping[str, Any]], schedule: Schedule) -> list[
 
 
 def _faultless(netem: Netem) -> Netem:
-    """Return the tables of faults without any entry."""
     return replace(netem, links=(), partitions=(), nodes=())
 
 

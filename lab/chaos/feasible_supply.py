@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from typing import NamedTuple
 
@@ -30,7 +30,6 @@ class _Part(NamedTuple):
     """Real power (W) of its loads, as in the feeder's tables."""
     buses: frozenset[str]
     has_substation: bool
-    """Whether the substation feeds it."""
     alive: bool
     """Whether anything feeds it."""
 
@@ -50,19 +49,11 @@ class _State(NamedTuple):
 
 
 class FeasibleSupply:
-    """Judge the islands of scenarios on one feeder; the parts of each state of the switches are found once.
+    """Judges the islands of scenarios on one feeder; the parts of each state of the switches are found once."""
 
-    Parameters
-    ----------
-    feeder : Feeder
-        The feeder.
-    inverters : Collection[str]
-        Names of the inverters that may ever be on the network.
-    """
-
-    def __init__(self, feeder: Feeder, inverters: Collection[str]) -> None:
+    def __init__(self, feeder: Feeder) -> None:
         self._feeder, self._graph = feeder, Connectivity(feeder)
-        self._rows = tuple(row for row in (*feeder.inverters, *feeder.spares) if row.name in inverters)
+        self._rows = (*feeder.inverters, *feeder.spares)
         self._switches = {name: switch.name for switch in feeder.switches for name in switch.names}
         self._loads = named_loads(feeder)
         self._demands = tuple(feeder.demands())
@@ -70,15 +61,7 @@ class FeasibleSupply:
         self._parts_of = cache(self._parts)
 
     def objection(self, scenario: ScenarioModel, case: str) -> str:
-        """Return why an island cannot be fed or controlled at some time, "" if all can.
-
-        Parameters
-        ----------
-        scenario : ScenarioModel
-            Checked.
-        case : str
-            Name of the case.
-        """
+        """Return why an island cannot be fed or controlled at some time, "" if all can."""
         leaders = self._leaders(scenario, case)
         both = (state for closes in (True, False) for state in self._states(scenario, case, waiting_closes=closes))
         for state in both:
@@ -115,7 +98,6 @@ class FeasibleSupply:
             yield _State(t_s, closed, present, killed, powers)
 
     def _load(self, part: _Part, powers: Mapping[str, complex]) -> float:
-        """Return the real power (W) of the loads of a part."""
         set_here = [(S, self._loads[name]) for name, S in powers.items() if self._loads[name].bus in part.buses]
         return part.load + sum(S.real - load.S.real for S, load in set_here)
 
@@ -130,7 +112,6 @@ class FeasibleSupply:
 
 
 def _objection(part: _Part, load: float, state: _State, leaders: frozenset[str]) -> str:
-    """Return why a part of the feeder cannot be fed or controlled."""
     there = [row for row in part.inverters if row.name in state.present]
     if part.has_substation or not there:
         return ""

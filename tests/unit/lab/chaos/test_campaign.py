@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.lab.chaos import schedule_search
+from gridpeers.lab.chaos import schedules as schedules_of_chaos
 from gridpeers.lab.chaos.campaign import Campaign, run_campaign
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_scenario
@@ -46,7 +46,7 @@ class Breaks(Consensus):
 
 def test_a_planted_bug_is_found_and_shrunk(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A law that breaks after a cut: the failure is a file with at most three disturbances, which shows it again."""
-    monkeypatch.setattr(schedule_search, "TRIES", 8)
+    monkeypatch.setattr(schedules_of_chaos, "TRIES", 8)
     others = [f'{{ use = "{name}", off = true }}' for name in ALWAYS if name != "frequency"]
     (elsewhere / "breaks.py").write_text(BREAKS, encoding="utf-8")
     base = base_in(small(elsewhere, f'law = "breaks:Breaks"\nchecks = [{", ".join(others)}]'))
@@ -123,7 +123,7 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
 def test_every_disturbance_is_counted_by_a_noun_of_its_kind() -> None:
     """`KINDS` has a noun for each kind of disturbance that is drawn."""
     base = base_named("plug-n-play")
-    schedules = [schedule for batch in range(2) for schedule in schedule_search.drawn(base, 3, batch)]
+    schedules = [schedule for batch in range(2) for schedule in schedules_of_chaos.drawn(base, 3, batch)]
     kinds = {disturbance.kind for schedule in schedules for disturbance in schedule}
 
     assert len(kinds) >= 10

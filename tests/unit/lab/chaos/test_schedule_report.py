@@ -8,7 +8,6 @@ from gridpeers.lab.chaos.campaign import Campaign, Summary
 from gridpeers.lab.chaos.chaos_folder import ChaosFolder
 from gridpeers.lab.chaos.chaos_run import ChaosRow, run_schedule
 from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
-from gridpeers.lab.chaos.schedule_report import effective, schedule_lines
 from tests.unit.lab.chaos.bases import base_in
 from tests.unit.lab.chaos.small_campaign import SMALL
 
@@ -44,5 +43,5 @@ def test_only_who_is_away_all_the_time_does_nothing(tmp_path: Path) -> None:
     schedule: Schedule = (late, idle, AWAY, early, _lie("inv1", 0.3, 0.5))
 
     assert base.is_possible(schedule)
-    assert effective(base, schedule) == tuple(it for it in schedule if it is not idle)
-    assert ["nothing happens" in line for line in schedule_lines(base, schedule)] == [False, False, False, True, False]
+    assert base.effective(schedule) == tuple(it for it in schedule if it is not idle)
+    assert ["nothing happens" in line for line in base.lines(schedule)] == [False, False, False, True, False]

@@ -10,12 +10,11 @@ import pytest
 from hypothesis import given, settings
 from msgspec import json
 
-from gridpeers.lab.chaos import schedule_search
+from gridpeers.lab.chaos import schedules as schedules_of_chaos
 from gridpeers.lab.chaos.chaos_checks import JUDGED_S, WITHIN_S
 from gridpeers.lab.chaos.disturbance import KINDS, Disturbance, Schedule
 from gridpeers.lab.chaos.disturbed_scenario import base_of
-from gridpeers.lab.chaos.schedule_search import BATCH, drawn, shrunk
-from gridpeers.lab.chaos.schedule_strategy import MOST_DISTURBANCES, schedules
+from gridpeers.lab.chaos.schedules import BATCH, MOST_DISTURBANCES, drawn, schedules, shrunk
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from tests.scenario_files import written
@@ -130,7 +129,7 @@ def test_a_run_without_disturbances_that_fails_stays_empty() -> None:
     """A base for which hypothesis draws nothing more has runs without any: their schedule is the simplest there is."""
     base = base_named("islanding")
 
-    with patch.object(schedule_search, "_search"):
+    with patch.object(schedules_of_chaos, "_search"):
         assert drawn(base, 1, 0) == [()] * BATCH
         assert shrunk(base, 1, BATCH - 1, lambda schedule: True) == ()
 
@@ -138,7 +137,7 @@ def test_a_run_without_disturbances_that_fails_stays_empty() -> None:
 def test_shrinking_runs_each_schedule_once_and_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
     """The disturbances that are left out one by one at the end count, too, and have a part of the runs for them."""
     base, tries = base_named("islanding"), 20
-    monkeypatch.setattr(schedule_search, "TRIES", tries)
+    monkeypatch.setattr(schedules_of_chaos, "TRIES", tries)
     asked: list[Schedule] = []
 
     def fails(schedule: Schedule) -> bool:

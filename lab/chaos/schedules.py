@@ -1,4 +1,4 @@
-"""Schedules of disturbances as a strategy of hypothesis: what may happen, and when.
+"""Schedules of disturbances: hypothesis draws them by a seed, and shrinks one that fails.
 
 A schedule is drawn as a list of disturbances, each with its beginning and its end, not step by step beside a running
 system: a run takes place between its first and its last tick, so a stateful test would have nothing to look at in
@@ -8,15 +8,29 @@ between. As each disturbance brings its end along, hypothesis can leave out any 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from math import ceil
 from typing import Any
 
+import hypothesis
+import msgspec
+from hypothesis import HealthCheck, Phase
 from hypothesis import strategies as st
 
 from gridpeers.lab.chaos.disturbance import Disturbance, Schedule
 from gridpeers.lab.chaos.disturbed_scenario import ChaosBase
 from gridpeers.plant.equipment.named_loads import named_loads
 from gridpeers.scenarios.schema.participants import with_agent
+
+BATCH = 25
+"""Schedules that are drawn together, from a seed of their own: so that the first runs of a seed are the same however
+many follow, and few are drawn again to shrink one."""
+
+TRIES = 150
+"""Most runs to shrink one failure, in all."""
+
+IDLE_PART = 5
+"""A fifth of these runs is kept for leaving out disturbances one by one, once hypothesis is done."""
 
 MOST_DISTURBANCES = 10
 """Most disturbances of a schedule, of which some may not be possible together."""
@@ -43,14 +57,100 @@ Pick = Callable[[int], int]
 Make = Callable[["_Draw"], Disturbance]
 
 
-def schedules(base: ChaosBase) -> st.SearchStrategy[Schedule]:
-    """Return the strategy of the schedules that are possible in a scenario.
+class _FailsError(Exception):
+    """A schedule fails."""
 
-    Parameters
-    ----------
-    base : ChaosBase
-        The scenario.
+
+def drawn(base: ChaosBase, seed: int, batch: int) -> list[Schedule]:
+    """Return the schedules of a batch (from 0); a seed gives the same ones with the same version of hypothesis."""
+    found: list[Schedule] = []
+    _search(base, seed, batch, found.append, (Phase.generate,))
+    return found + [()] * (BATCH - len(found))  # there are fewer where hardly anything is possible
+
+
+def shrunk(base: ChaosBase, seed: int, number: int, fails: Callable[[Schedule], bool]) -> Schedule:
+    """Return the simplest schedule found that fails, begun with that of a run: few disturbances, short and early.
+
+    `fails` is asked once for each schedule, and `TRIES` times at most. A run beyond those that hypothesis draws had no
+    disturbances, and its schedule stays empty.
     """
+    batch, place = divmod(number, BATCH)
+    asked = _Asked(fails)
+    simplest: Schedule = ()
+    passed = 0
+
+    def attempt(schedule: Schedule) -> None:
+        nonlocal passed, simplest
+        if passed <= place:
+            passed += 1
+            if passed <= place:
+                return
+            asked.note_failure(schedule)
+        if asked.fails(schedule, TRIES - TRIES // IDLE_PART):
+            simplest = schedule
+            raise _FailsError
+
+    with suppress(_FailsError):  # of the simplest one, which hypothesis tries again at the end
+        _search(base, seed, batch, attempt, (Phase.generate, Phase.shrink))
+    return _without_idle_ones(base, simplest, asked)
+
+
+class _Asked:
+    """Tell of schedules if they fail: each is run once, and all together no more often than they may."""
+
+    def __init__(self, fails: Callable[[Schedule], bool]) -> None:
+        self._fails = fails
+        self._known: dict[bytes, bool] = {}
+        self._runs = 0
+
+    def note_failure(self, schedule: Schedule) -> None:
+        self._known[msgspec.json.encode(schedule)] = True
+
+    def fails(self, schedule: Schedule, most: int) -> bool:
+        """Return whether a schedule is known to fail, after a run of it unless there were `most` runs already."""
+        key = msgspec.json.encode(schedule)
+        if key not in self._known and self._runs < most:
+            self._runs += 1
+            self._known[key] = self._fails(schedule)
+        return self._known.get(key, False)
+
+
+def _without_idle_ones(base: ChaosBase, schedule: Schedule, asked: _Asked) -> Schedule:
+    """Return a failing schedule without the disturbances that it fails without.
+
+    hypothesis leaves out few numbers in a row, which a disturbance of many is not.
+    """
+    for disturbance in schedule:
+        rest = tuple(it for it in schedule if it is not disturbance)
+        if base.is_possible(rest) and asked.fails(rest, TRIES):
+            return _without_idle_ones(base, rest, asked)
+    return schedule
+
+
+def _search(
+    base: ChaosBase, seed: int, batch: int, attempt: Callable[[Schedule], None], phases: tuple[Phase, ...]
+) -> None:
+    """Have hypothesis draw the schedules of a batch; a seed of a batch is no other batch's."""
+    given = hypothesis.given(schedules(base))(lambda schedule: attempt(schedule))
+    settings = hypothesis.settings(
+        max_examples=BATCH,
+        phases=phases,
+        database=None,
+        deadline=None,
+        derandomize=False,
+        report_multiple_bugs=False,
+        print_blob=False,
+        suppress_health_check=list(HealthCheck),
+        verbosity=hypothesis.Verbosity.quiet,
+    )
+    hypothesis.seed(seed * 1_000_003 + batch)(settings(given))()
+
+
+# -------------------------------------------------------------------- what may happen, and when
+
+
+def schedules(base: ChaosBase) -> st.SearchStrategy[Schedule]:
+    """Return the strategy of the schedules that are possible in a scenario."""
     return st.lists(_disturbances(base), max_size=MOST_DISTURBANCES).map(base.kept)
 
 
@@ -60,33 +160,22 @@ def _disturbances(draw: st.DrawFn, base: ChaosBase) -> Disturbance:
 
 
 class _Draw:
-    """Draw one disturbance of a scenario.
-
-    Parameters
-    ----------
-    base : ChaosBase
-        The scenario.
-    pick : Pick
-        Draws numbers.
-    """
+    """Draws one disturbance of a scenario."""
 
     def __init__(self, base: ChaosBase, pick: Pick) -> None:
         scenario, feeder = base.scenario, base.feeder
         self._base, self._pick = base, pick
-        rows = [row for row in with_agent(scenario, feeder, base.case)]
-        self._rows = {row.name: row for row in rows}
-        self._names = [row.name for row in rows]
-        self._microgrids = list(dict.fromkeys(row.microgrid for row in rows if row.microgrid))
+        self._rows = {row.name: row for row in with_agent(scenario, feeder, base.case)}
+        self._names = list(self._rows)
+        self._microgrids = list(dict.fromkeys(row.microgrid for row in self._rows.values() if row.microgrid))
         self._spares = [row.name for row in feeder.spares if row.name not in self._rows]
         self._switches = [switch.alias or switch.name for switch in feeder.switches if len(switch.phases) == 3]
         self._loads = list(named_loads(feeder))
         time = scenario.time
-        step = time.T_c_s * ceil(1.5 * time.record_s / time.T_c_s - 1e-9)
-        self._step = step
+        self._step = time.T_c_s * ceil(1.5 * time.record_s / time.T_c_s - 1e-9)
         """Distance (s) of the times that are drawn: events apart by it have a recorded row between them."""
 
     def disturbance(self) -> Disturbance:
-        """Draw one."""
         kinds: list[Make] = [_Draw._cut, _Draw._partition, _Draw._delay, _Draw._loss, _Draw._noise, _Draw._pause]
         kinds += [_Draw._slow, _Draw._lie, _Draw._kill, _Draw._leave]
         kinds += [_Draw._join] if self._spares else []
@@ -101,13 +190,11 @@ class _Draw:
         return these[self._pick(len(these))]
 
     def _begin(self) -> float:
-        """Draw when it begins (s)."""
         first = ceil(BEGIN_S / self._step - 1e-9)
         last = int((self._base.settled_s + AFTER_S) / self._step)
         return self._time(first + self._pick(max(1, last - first + 1)))
 
     def _end(self, begin: float) -> float:
-        """Draw when what begins at a time ends (s)."""
         return self._time(round(begin / self._step) + 1 + self._pick(round(LONGEST_S / self._step)))
 
     def _time(self, steps: int) -> float:
@@ -120,7 +207,6 @@ class _Draw:
     # ---------------------------------------------------------------- links
 
     def _on(self) -> str:
-        """Draw which links."""
         name = self._one_of(self._names)
         other = self._one_of([it for it in self._names if it != name] or [name])
         patterns = [f"{name} <-> {other}", f"{name} -> {other}", f"{name} -> *", f"* -> {name}", f"plant -> {name}"]
@@ -198,7 +284,7 @@ class _Draw:
     # ---------------------------------------------------------------- events
 
     def _event(self, there: dict[str, Any], back: dict[str, Any]) -> Disturbance:
-        """Draw an event, and whether and when it is taken back."""
+        """Draw an event, and mostly another one that takes it back."""
         begin = self._begin()
         end = {"t_s": self._end(begin), **back} if self._pick(3) else {}
         return Disturbance(table="event", entry={"t_s": begin, **there}, back=end)
