@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from gridpeers.agents.laws.law import Law, Neighbour, Own, SetPoints, Term, Terms
     from gridpeers.feeder import Feeder
     from gridpeers.lab.predict.prediction import Prediction, predict
-    from gridpeers.lab.replay.replaying import Counterfactual, counterfactual, replay
+    from gridpeers.lab.replay.counterfactual import Counterfactual, counterfactual
+    from gridpeers.lab.replay.replay import replay
     from gridpeers.netem.models.own_fault import FAULTS, LinkFault
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read

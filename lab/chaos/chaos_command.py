@@ -215,8 +215,9 @@ def _kept_if_ended(campaign: Campaign, rows: Collection[int], folder: Path | Non
         left = f"{kept} of {campaign.runs} runs are kept {where}"
         if isinstance(error, KeyboardInterrupt):
             fail([f"interrupted; {left}"], exit_code(error))
-        of_a_folder = isinstance(error, OSError) and folder
-        why = refusal(folder, error) if of_a_folder else str(machine_error(error) or error)
+        if isinstance(error, OSError) and folder:
+            fail([refusal(folder, error), left], BROKEN)
+        why = str(machine_error(error) or error)
         fail([why, left], BROKEN)
 
 

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-import copy
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import isfinite
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import msgspec
+from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.lab.replay.changed_faults import spliced, without_loss
-from gridpeers.lab.replay.changed_scenario import with_links, with_title
-from gridpeers.lab.replay.recorded_process import require_arrivals
-from gridpeers.lab.replay.replay_error import ReplayError
-from gridpeers.netem.schema.fault import Fault
+from gridpeers.lab.replay.recorded_process import ReplayError, require_arrivals
+from gridpeers.netem.schema.fault import KINDS, Fault
 from gridpeers.netem.schema.netem import Netem
+from gridpeers.netem.schema.partition import Partition
 from gridpeers.netem.schema.pattern import objections
 from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
@@ -38,6 +35,8 @@ OF_CASE = ("secondary", "graph", "links", "without")
 OF_BOTH = ("law", "gains", "degraded_communication", "link", "partition")
 """Keys of agents and links that a case may have, and the whole scenario."""
 
+Entry = TypeVar("Entry", Fault, Partition)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Changes:
@@ -46,9 +45,9 @@ class Changes:
     without: tuple[str, ...] = ()
     """Links that are cut, as patterns: "inv4 -> inv7"."""
     without_loss: bool = False
-    """Whether no message is lost by chance."""
+    """No message is lost by chance."""
     without_link_commands: bool = False
-    """Whether the commands that people gave to emulated links are left out."""
+    """The commands that people gave to emulated links are left out."""
     law: str = ""
     """Another law; "" keeps that of the record."""
     keys: Mapping[str, Any] = field(default_factory=dict)
@@ -85,27 +84,27 @@ class ChangedRule:
     scenario: ScenarioModel
     """The scenario as changed, links too; the title of its case says what is changed."""
     links_written: bool
-    """Whether it has the changes of links, as far as a scenario can say them."""
+    """It has the changes of links, as far as a scenario can say them."""
     feeder: Feeder
-    """Its feeder."""
     case: str
-    """The case."""
     control: Control | None
     """Rule of control of every agent; None keeps that of the record."""
     links: dict[str, Any] | None
     """Configuration of the emulated links, of the whole run; None keeps that of the record."""
     changes: Changes
-    """The changes."""
+
+    def unwritten(self, *, clock: str) -> Iterator[str]:
+        """Yield sentences on what the scenario file of what would have been does not say."""
+        if not self.links_written:
+            yield "The changes of links are not in this file: their entries would contradict others."
+        if self.control is not None and (since := self.changes.since) > 0.0:
+            yield f"Law, gains and graph hold from the start here; in what would have been, from {since:g} s on."
+        if clock == "wall":
+            yield "Not in this file: delays and losses on the wire, and what people did; a run of it has its own."
 
 
 def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
-    """Return a record's run under changes.
-
-    Raises
-    ------
-    ReplayError
-        If it cannot be run again, a link, a law, a key or a value is wrong, or the time is outside of the record.
-    """
+    """Return a record's run under changes; ReplayError with all that is wrong with these, or with the record."""
     require_arrivals(record)
     _require_own_plant(record)
     before, feeder = _checked(record, _tables(record), frozenset())
@@ -126,18 +125,19 @@ def changed_rule(record: RunRecord, changes: Changes) -> ChangedRule:
     netem = spliced(netem_before, netem_after, changes.since)
     if changes.without:
         cuts = (Fault(on=pattern, cut=True, from_s=changes.since) for pattern in changes.without)
-        netem = msgspec.structs.replace(netem, links=(*netem.links, *cuts))
+        netem = replace(netem, links=(*netem.links, *cuts))
     control, as_it_was = (configs(scenario, feeder, case)[1][0].control for scenario in (after, before))
     if control != as_it_was and changes.since > 0.0 and record.info.simulated:
         raise ReplayError(
             "in simulated time the law, its gains and the graph change from the start of the run only: leave the time "
             "out, or take a record of a run in wall-clock time; links can change at any time"
         )
-    written = after if netem == netem_before else _written(record, with_links(after, case, netem))
+    written = after if netem == netem_before else _written(record, _with_links(after, case, netem))
     title = f"what would have been, {changes}" if changes else after.cases[case].title
+    scenario = written or after
     return ChangedRule(
         recorded=before,
-        scenario=with_title(written or after, case, title),
+        scenario=replace(scenario, cases={case: replace(scenario.cases[case], title=title)}),
         links_written=written is not None,
         feeder=feeder,
         case=case,
@@ -165,7 +165,7 @@ def _tables(record: RunRecord) -> Tree:
     if not info.toml:
         raise ReplayError(f"{record.path}: it has no scenario, so that nothing in it can be changed")
     try:
-        tables = copy.deepcopy(tomllib.loads(info.toml))
+        tables = tomllib.loads(info.toml)
         tables["case"] = {info.case: tables["case"][info.case]}
     except (ValueError, KeyError, RecursionError) as error:
         raise ReplayError(f"{record.path}: its scenario cannot be read: {error}") from None
@@ -194,8 +194,7 @@ def _written(record: RunRecord, scenario: ScenarioModel) -> ScenarioModel | None
 
 def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:
     """Return what is wrong with links and time."""
-    rows = (*feeder.inverters, *feeder.spares)
-    microgrids = {row.name: row.microgrid for row in rows}
+    microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
     wrong = [text for pattern in changes.without for text in objections(pattern, tuple(microgrids), microgrids)]
     if not isfinite(changes.since) or not 0.0 <= changes.since < record.t_end:
         wrong.append(f"from {changes.since:g} s: is outside of the record, which has 0 to {record.t_end:.2f} s")
@@ -203,13 +202,7 @@ def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:
 
 
 def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
-    """Set a key of agents or links; return its path from the top.
-
-    Raises
-    ------
-    ValueError
-        If it is a key of something else, or leads nowhere.
-    """
+    """Set a key of agents or links, and return its path from the top; ValueError if it is a key of something else."""
     way = [str(step) for step in steps(path)]
     own = tables["case"][case]
     prefix = f"case.{case}."
@@ -219,8 +212,7 @@ def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
         path, way = path.removeprefix(prefix), way[2:]
     first = way[0] if way else ""
     if first not in (*OF_CASE, *OF_BOTH):
-        known = (*OF_BOTH, *OF_CASE)
-        raise ValueError(f"is no key of agents or links; {suggestion(first, known, 'keys')}")
+        raise ValueError(f"is no key of agents or links; {suggestion(first, (*OF_BOTH, *OF_CASE), 'keys')}")
     if first in OF_CASE or own.get(first) or whole:
         put(own, path, value)
         return prefix + path
@@ -231,8 +223,56 @@ def _put(tables: Tree, case: str, path: str, value: Any, *, whole: bool) -> str:
 # -------------------------------------------------------------------- links
 
 
+def lossless(fault: Fault) -> Fault | None:
+    """Return a fault without its loss; None if nothing is left of it."""
+    models = fault.models()
+    if "loss" not in models:
+        return fault
+    left = {kind: model for kind, model in models.items() if kind in KINDS and kind != "loss"}
+    if not (left or fault.own):
+        return None
+    return Fault(on=fault.on, from_s=fault.from_s, to_s=fault.to_s, own=fault.own, **left)
+
+
+def without_loss(netem: Netem) -> Netem:
+    """Return faults without the loss of each; those that were loss alone are gone."""
+    links = (lossless(fault) for fault in netem.links)
+    return replace(netem, links=tuple(fault for fault in links if fault is not None))
+
+
+def spliced(before: Netem, after: Netem, since: float) -> Netem:
+    """Return faults that are those of one configuration up to a time (s), and those of another one from then on."""
+    if before == after or since <= 0.0:
+        return after
+    return replace(
+        before,
+        links=_spliced(before.links, after.links, since),
+        partitions=_spliced(before.partitions, after.partitions, since),
+    )
+
+
+def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) -> tuple[Entry, ...]:
+    """Return entries of both, those that both have once and whole."""
+    found = [entry for entry in before if entry in after]
+    for entry in before:
+        if entry not in after and entry.from_s < since:
+            until = since if entry.to_s is None else min(entry.to_s, since)
+            found.append(replace(entry, to_s=until))
+    for entry in after:
+        if entry not in before and (entry.to_s is None or entry.to_s > since):
+            found.append(replace(entry, from_s=max(entry.from_s, since)))
+    return tuple(found)
+
+
 def _resolved(scenario: ScenarioModel, feeder: Feeder, case: str) -> Netem:
     return setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=True).netem
+
+
+def _with_links(scenario: ScenarioModel, case: str, netem: Netem) -> ScenarioModel:
+    """Return a scenario whose case has all faults of links, with their times, as entries of its own."""
+    common = replace(scenario.netem, links=(), partitions=())
+    own = replace(scenario.cases[case].netem, links=netem.links, partitions=netem.partitions)
+    return replace(scenario, netem=common, cases={case: replace(scenario.cases[case], netem=own)})
 
 
 def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Netem) -> dict[str, Any]:
@@ -240,4 +280,4 @@ def _setup(record: RunRecord, scenario: ScenarioModel, feeder: Feeder, netem: Ne
     was = record.info.plant.links
     setup = EmulationConfig.of_tree(was) if was else setup_of(netem, scenario, feeder, real_nodes=True)
     nodes = setup.netem.nodes if was else ()
-    return msgspec.structs.replace(setup, netem=msgspec.structs.replace(netem, nodes=nodes)).to_tree()
+    return replace(setup, netem=replace(netem, nodes=nodes)).to_tree()

@@ -2,28 +2,25 @@
 
 Calls and arrivals come when they came in the record. So without a change every process does what it did. Under a change
 a message takes as long as that of its number took in the record, and one that was lost stays lost. A message that the
-record does not have takes a delay of its link (`link_delays`). Processes start, stop, freeze and die as they did, and
+record does not have takes a delay of its link (`LinkDelays`). Processes start, stop, freeze and die as they did, and
 what people asked of the plant happens again.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections import OrderedDict, deque
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 from itertools import count
 from math import inf
+from statistics import median
 
 from gridpeers.agents.agent_config import nameplate_of
 from gridpeers.agents.graphs import GraphError, in_neighbours, rule_of
-from gridpeers.lab.replay.changed_processes import ChangedProcesses
 from gridpeers.lab.replay.changes import ChangedRule
-from gridpeers.lab.replay.link_delays import LinkDelays
-from gridpeers.lab.replay.loop_process import LoopProcess, is_arrival
-from gridpeers.lab.replay.recorded_process import RecordedStep, processes_of
-from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.loop_process import ChangedProcesses, LoopProcess, is_arrival
+from gridpeers.lab.replay.recorded_process import Input, RecordedStep, ReplayError, processes_of
 from gridpeers.lab.replay.replayed_process import MakePlant, Message, message_of, start_plant_of, tick_message
-from gridpeers.lab.replay.sent_statuses import SentStatuses
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import (
@@ -44,6 +41,9 @@ from gridpeers.wire.messages import PLANT, AnyMessage, LinkReport, Measurement, 
 MOST_SENT = 100_000
 """Messages that are kept for those that are yet to hear them: minutes of nine agents."""
 
+KEPT_DELAYS, KEPT_STATUSES = 1000, 16
+"""Latest delays of a link, and latest statuses of an agent, that are kept: one may be some seconds on its way."""
+
 CUT_OFF = 1.0
 """Time (s of wall time) before the end of a record that is cut off within which a process belongs to its end."""
 
@@ -55,19 +55,7 @@ _NOT_YET = Message("", b"not yet")
 
 
 class ClosedLoop:
-    """A run again, from its start, under changes from a time on.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The run, in wall-clock time.
-    rule : ChangedRule or None
-        The changes; None changes nothing.
-    take : Callable[[Telemetry | LinkReport], None]
-        Takes the rows, events and link reports of the replay.
-    make_plant : MakePlant
-        Starts the plant.
-    """
+    """A run again, from its start, under changes from a time on."""
 
     def __init__(
         self,
@@ -85,7 +73,8 @@ class ClosedLoop:
         self._sent: OrderedDict[tuple[str, int, int], tuple[float, Message]] = OrderedDict()
         """Messages that were sent in the replay, by stream, epoch and number, and when."""
         self._delays = LinkDelays()
-        self._statuses = SentStatuses()
+        self._statuses: dict[str, deque[Message]] = {}
+        """Latest statuses of each agent, by key."""
         self._listens = _listeners(record)
         self._lost = frozenset(_lost(record)) if rule is not None and rule.changes.without_loss else frozenset()
         self._number = -1
@@ -96,13 +85,7 @@ class ClosedLoop:
         """Sentences on what the replay leaves out."""
 
     def run(self) -> None:
-        """Run until the record ends.
-
-        Raises
-        ------
-        ReplayError
-            If the record has no arrivals, or what it needs is not here.
-        """
+        """Run until the record ends."""
         found = [LoopProcess(process) for process in processes_of(self._record)]
         first = found[0]
         if first.name != PLANT:
@@ -195,17 +178,14 @@ class ClosedLoop:
         if kind not in EACH_TICK:
             recorded = message_of(process.recorded, step)
             if kind == "status" and recorded is not None and not entry.rejected:
-                return self._statuses.as_sent(recorded)
+                sent = self._statuses.get(recorded.key)  # without a change, the status of the record is among them
+                return recorded if not sent or recorded in sent else sent[-1]
             is_command = kind in TO_LINKS and not entry.rejected
             return self._making.command(recorded) if is_command and recorded is not None else recorded
-        if isinstance(entry, MessageReference):
-            epoch, number = entry.epoch, entry.seq
-        else:
-            known = tick_message(Message(entry.key, entry.payload))
-            if known is None:  # no sound message
-                return Message(entry.key, entry.payload)
-            epoch, number = known.epoch, known.seq
-        of, src = stream_of(entry.key), sender_of(entry.key)
+        named = _named(entry)
+        if named is None:  # no sound message
+            return message_of(process.recorded, step)
+        src, of, epoch, number = named
         found, by = self._sent.get((of, epoch, number)), self._processes.get((src, epoch))
         if found is not None:
             at, message = found
@@ -232,7 +212,7 @@ class ClosedLoop:
                     self._sent.popitem(last=False)
                 self._send_new(process, message, decoded, theirs, due)
             elif kind_of(message.key) == "status":
-                self._statuses.sent(message)
+                self._statuses.setdefault(message.key, deque(maxlen=KEPT_STATUSES)).append(message)
 
     def _send_new(
         self,
@@ -285,21 +265,50 @@ def _listeners(record: RunRecord) -> dict[str, frozenset[str]]:
     return found
 
 
+def _named(entry: Input) -> tuple[str, str, int, int] | None:
+    """Return sender, stream, epoch and number of a state, or a measurement, that arrives; None if none does."""
+    if not isinstance(entry, MessageReference | ReceivedMessage) or kind_of(entry.key) not in EACH_TICK:
+        return None
+    named = entry if isinstance(entry, MessageReference) else tick_message(Message(entry.key, entry.payload))
+    return None if named is None else (sender_of(entry.key), stream_of(entry.key), named.epoch, named.seq)
+
+
 def _lost(record: RunRecord) -> Iterator[tuple[str, str, int, int]]:
     """Yield sender, receiver, epoch and number of messages that a receiver missed on the wire between two others."""
     for process in processes_of(record):
         last: dict[tuple[str, int], int] = {}
         for step in process.steps():
-            entry = step.entry
-            if not isinstance(entry, MessageReference | ReceivedMessage) or kind_of(entry.key) not in EACH_TICK:
-                continue
-            if isinstance(entry, MessageReference):
-                epoch, number = entry.epoch, entry.seq
-            elif (message := tick_message(Message(entry.key, entry.payload))) is not None:
-                epoch, number = message.epoch, message.seq
-            else:
-                continue
-            of = stream_of(entry.key), epoch
-            before = last.get(of, number)
-            yield from ((sender_of(entry.key), process.name, epoch, missed) for missed in range(before + 1, number))
-            last[of] = max(before, number)
+            if (named := _named(step.entry)) is not None:
+                src, of, epoch, number = named
+                before = last.get((of, epoch), number)
+                yield from ((src, process.name, epoch, missed) for missed in range(before + 1, number))
+                last[of, epoch] = max(before, number)
+
+
+class LinkDelays:
+    """Delays of messages (s of wall time) by sender and receiver, as they are met, for messages that the record lacks.
+
+    A link on which nothing was heard takes those of the other links to its receiver.
+    """
+
+    def __init__(self) -> None:
+        self._delays: dict[tuple[str, str], deque[float]] = {}
+        self._drawn: dict[tuple[str, str], int] = {}
+
+    def note(self, src: str, dst: str, delay: float) -> None:
+        """Note the delay of a message of the record."""
+        self._delays.setdefault((src, dst), deque(maxlen=KEPT_DELAYS)).append(delay)
+
+    def draw(self, src: str, dst: str) -> float:
+        """Return a delay: those of the link in their order, again and again."""
+        known = self._known(src, dst)
+        number = self._drawn[src, dst] = self._drawn.get((src, dst), -1) + 1
+        return known[number % len(known)]
+
+    def typical(self, src: str, dst: str) -> float:
+        """Return the median delay of a link."""
+        return median(self._known(src, dst))
+
+    def _known(self, src: str, dst: str) -> list[float]:
+        of_others = (delay for (_, to), known in self._delays.items() if to == dst for delay in known)
+        return list(self._delays.get((src, dst), ())) or list(of_others) or [0.0]

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import tempfile
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from msgspec.structs import replace
+import msgspec
+import pandas as pd
 
-from gridpeers.lab.replay.changed_scenario import unwritten
-from gridpeers.lab.replay.changes import ChangedRule
+from gridpeers.lab.replay.changes import ChangedRule, Changes, changed_rule
 from gridpeers.lab.replay.closed_loop import ClosedLoop
-from gridpeers.lab.replay.difference import Difference
-from gridpeers.lab.replay.no_difference import no_difference
-from gridpeers.lab.replay.replay import ComparedRows
-from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.recorded_process import ReplayError
+from gridpeers.lab.replay.replay import ComparedRows, Difference, record_of
 from gridpeers.lab.replay.replayed_process import MakePlant, start_plant_of
 from gridpeers.plant.build import start_plant
+from gridpeers.runs.result import Result, shown_in_notebooks
+from gridpeers.runs.run_folder import RunFolder, new_home
+from gridpeers.runs.running import read, warn_of_laws
+from gridpeers.scenario import plain
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.live.live_report import write_report
 from gridpeers.scenarios.record.record_info import LIVE
@@ -29,7 +34,142 @@ from gridpeers.scenarios.run_request import Other, Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
+from gridpeers.studies.comparison import Comparison
 from gridpeers.wire.messages import Telemetry
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Take = Callable[[Telemetry | Other], None]
+
+MISSING = (
+    "-: no number: not steady at the end of the window, or never restored (f, and MPSI where it counts); metrics.json "
+    "has the reasons. Where there are several islands, each shares for itself and has rows of its own"
+)
+"""Line below a table in which numbers are missing."""
+
+
+def counterfactual(
+    run: Result | RunRecord | str | Path,
+    *,
+    without: str | Iterable[str] = (),
+    without_loss: bool = False,
+    without_link_commands: bool = False,
+    law: Any = "",
+    replace: Mapping[str, Any] | None = None,
+    since: float = 0.0,
+    folder: str | Path | None = None,
+) -> Counterfactual:
+    """Run a recorded run again, closed on our plant, with something changed.
+
+    Parameters
+    ----------
+    run : Result, RunRecord, str or Path
+        The run, of any driver.
+    without : str or Iterable[str], optional
+        Links to cut, as in scenarios: "inv4 -> inv7", "inv4 <-> inv7", "* -> inv2".
+    without_loss : bool, optional
+        Whether no message is lost by chance.
+    without_link_commands : bool, optional
+        Whether the commands that people gave to emulated links are left out.
+    law : optional
+        Another law: its name, `module:Class`, or a class.
+    replace : Mapping[str, Any], optional
+        Values of keys of agents and links, by their paths: `{"gains.k_p": 0.001}`.
+    since : float, optional
+        Run time (s) from which on; up to it everything is as it was.
+    folder : str or Path, optional
+        New or empty; takes the run folder. When left out, the files live as long as the result.
+
+    Raises
+    ------
+    RecordFileError, ReplayError
+        As `replay`; also if a link, a law, a key or a value is wrong, or the time is outside of the record.
+    FolderError
+        If there is something in the folder, or it cannot be written.
+    """
+    record = record_of(run)
+    try:
+        changes = Changes(
+            without=(without,) if isinstance(without, str) else tuple(without),
+            without_loss=without_loss,
+            without_link_commands=without_link_commands,
+            law=law if isinstance(law, str) else plain(law),
+            keys={key: plain(value) for key, value in (replace or {}).items()},
+            since=float(since),
+        )
+    except (ValueError, TypeError) as error:
+        raise ReplayError(f"a change cannot be read: {error}") from None
+    rule = changed_rule(record, changes)
+    home = _temporary() if folder is None else new_home(folder)
+    done = counterfactual_in(record, rule, home, temporary=folder is None)
+    first = done.would_be.failures[:1]
+    warn_of_laws({f"what would have been, {row.agent}": row.why for row in first.itertuples()}, depth=1)
+    return done
+
+
+def counterfactual_in(
+    record: RunRecord, rule: ChangedRule, folder: Path, *, temporary: bool = False, tell: Progress | None = None
+) -> Counterfactual:
+    """Run a counterfactual into an empty folder, which goes with it if it is temporary; see `counterfactual`."""
+    would_be, was = RunFolder(folder, temporary=temporary), RunFolder(_temporary(), temporary=True)
+    done = run_counterfactual(record, rule, was.path, would_be.path, tell=tell)
+    return Counterfactual(was, would_be, rule.changes, done)
+
+
+def _temporary() -> Path:
+    return Path(tempfile.mkdtemp(prefix="gridpeers-"))
+
+
+class Counterfactual:
+    """A recorded run and the run under changes, side by side; `gridpeers.counterfactual` makes it."""
+
+    def __init__(self, was: RunFolder, would_be: RunFolder, changes: Changes, done: CounterfactualRun) -> None:
+        self._folders = was, would_be  # they go with this
+        self.was, self.would_be = _result(was.path), _result(would_be.path)
+        self.changes = changes
+        self.difference, self.compared, self.notes = done.difference, done.compared, done.notes
+        """First difference from the record before the change, None if there is none; rows compared; what is left."""
+
+    @property
+    def folder(self) -> Path:
+        """Run folder of what would have been."""
+        return self._folders[1].path
+
+    @cached_property
+    def table(self) -> pd.DataFrame:
+        """Metrics of both and their difference, a row per (window, metric)."""
+        return self._comparison.table
+
+    @property
+    def _comparison(self) -> Comparison:
+        return Comparison({"": (self.was, self.would_be)}, ("was", "would be"))
+
+    def plot(self) -> Figure:
+        """Draw f, P of every inverter and MPSI: what was in faint lines, what would have been in strong ones."""
+        from gridpeers.lab.replay.counterfactual_figure import counterfactual_figure
+
+        shown_in_notebooks()
+        since = self.changes.since if self.changes else 0.0
+        return counterfactual_figure(self.was.drawing(), self.would_be.drawing(), str(self.changes), since)
+
+    def __str__(self) -> str:
+        """Return the table as text; above it a line for each of both in which a law failed."""
+        text: str = self.table.to_string(float_format=lambda value: f"{value:.5g}", na_rep="-")
+        missing = [MISSING] if self.table.isna().any(axis=None) else []
+        return "\n".join((*self._comparison.failures(), text, *missing))
+
+    def __repr__(self) -> str:
+        return f"<Counterfactual of {self.was.spec.name} {self.was.case}: {self.changes}>"
+
+
+def _result(folder: Path) -> Result:
+    found = read(folder)
+    assert isinstance(found, Result)
+    return found
+
+
+# -------------------------------------------------------------------- the run
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,7 +183,7 @@ class CounterfactualRun:
     t_end: float
     """Run time of its last row (s)."""
     notes: tuple[str, ...]
-    """Sentences on what it leaves out, and why the change made no difference if it made none."""
+    """Sentences on what it leaves out; one says so if the change made no difference."""
 
 
 def run_counterfactual(
@@ -54,28 +194,7 @@ def run_counterfactual(
     make_plant: MakePlant = start_plant,
     tell: Progress | None = None,
 ) -> CounterfactualRun:
-    """Run a counterfactual, and write two run folders.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The run, of any driver.
-    rule : ChangedRule
-        The run under changes, as `changed_rule` gives it.
-    was, would_be : Path
-        Empty folders: for what was, without figures, and for what would have been.
-    make_plant : MakePlant, optional
-        Starts the plant.
-    tell : Progress, optional
-        Takes the progress.
-
-    Raises
-    ------
-    ReplayError
-        If the record cannot be replayed.
-    RecordFileError
-        If the record cannot be read.
-    """
+    """Run a counterfactual, and write two run folders: for what was, without figures, and for what would have been."""
     with broken_if_ended(would_be):
         try:
             return _both(record, rule, was, would_be, make_plant, tell)
@@ -86,7 +205,6 @@ def run_counterfactual(
 def _both(
     record: RunRecord, rule: ChangedRule, was: Path, would_be: Path, make_plant: MakePlant, tell: Progress | None
 ) -> CounterfactualRun:
-    """Run the record under the rule; write what was and what would have been."""
     changes = rule.changes
     rows, effect = ComparedRows(record, changes.since if changes else inf), ComparedRows(record)
     run = _in_simulated_time if record.info.simulated else _in_real_time
@@ -104,13 +222,10 @@ def _both(
         notes = run(record, rule, take, make_plant)
         recorded = recorder.finish(recorder.ended, recorder.record_step)
     if changes and effect.difference is None:
-        notes = [*notes, no_difference(record, rule, effect.t)]
+        notes = [*notes, f"the change made no difference: every row up to {effect.t:.2f} s is as recorded"]
     _write(record, rule, rule.scenario, would_be, recorded, would_be=True)
     _write(record, rule, rule.recorded, was, _as_recorded(record, was / rule.case, recorded.ended), would_be=False)
     return CounterfactualRun(difference=rows.difference, compared=rows.count, t_end=recorded.ended, notes=tuple(notes))
-
-
-Take = Callable[[Telemetry | Other], None]
 
 
 def _in_real_time(record: RunRecord, rule: ChangedRule, take: Take, make_plant: MakePlant) -> list[str]:
@@ -127,8 +242,8 @@ def _in_simulated_time(record: RunRecord, rule: ChangedRule, take: Take, make_pl
     plant = start_plant_of(info, make_plant)
     try:
         outcome = run_inprocess(
-            replace(info.plant, record="physics", **links),
-            [replace(agent, record="physics", **links, **control) for agent in info.agents],
+            msgspec.structs.replace(info.plant, record="physics", **links),
+            [msgspec.structs.replace(agent, record="physics", **links, **control) for agent in info.agents],
             take,
             on_other=take,
             plant=plant,
@@ -146,7 +261,7 @@ def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
         for message in record.telemetry():
             rows = tuple(row for row in message.rows if row[0] <= until + 1e-9)
             events = tuple(event for event in message.events if event.t <= until + 1e-9)
-            recorder(replace(message, rows=rows, events=events))
+            recorder(msgspec.structs.replace(message, rows=rows, events=events))
         return recorder.finish(recorder.ended, recorder.record_step)
 
 
@@ -157,7 +272,7 @@ def _write(
     info = record.info
     made = {"replayed": str(record.path.resolve()), "changes": str(rule.changes) if would_be else ""}
     as_run = {"driver": info.driver, "clock": info.clock, **made}
-    remarks = unwritten(record, rule) if would_be else ()
+    remarks = rule.unwritten(clock=info.clock) if would_be else ()
     write_whole(folder / "scenario.toml", to_toml(scenario, as_run | versions(), remarks))
     metrics = RunMetrics(
         scenario=scenario,

@@ -37,17 +37,7 @@ KINDS = {True: BLUE, False: GREEN}
 
 
 def counterfactual_figure(was: Drawing, would_be: Drawing, words: str, since: float) -> Figure:
-    """Draw two runs, each with one history of the same inverters.
-
-    Parameters
-    ----------
-    was, would_be : Drawing
-        As recorded, and as replayed under changes.
-    words : str
-        The changes, in words.
-    since : float
-        When they begin (s).
-    """
+    """Draw two runs, each with one history of the same inverters."""
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 6.4), layout="constrained")
         top, middle, bottom = figure.subplots(3, 1, sharex=True)

@@ -40,22 +40,6 @@ def recomputed(record: RunRecord, agent: str, law: Law | None = None) -> Iterato
 
     A law may have a memory, so this begins with the first decision. It ends with the first that is not whole, as where
     the record is cut off.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    agent : str
-        Name of the agent.
-    law : Law, optional
-        Law to decide with; by default that of the record, made anew.
-
-    Raises
-    ------
-    RecordFileError
-        If there was no such agent, or no decision was recorded.
-    ValueError
-        If the law is not here.
     """
     with closing(_Recomputation(record, agent, law)) as again:
         for decision in record.decisions(agent):

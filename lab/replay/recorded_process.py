@@ -7,7 +7,6 @@ from functools import lru_cache
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.lab.replay.replay_error import ReplayError
 from gridpeers.scenarios.record.message_index import MessageIndex
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.codec import sound
@@ -32,37 +31,30 @@ Input = Token | MessageReference | ReceivedMessage | RejectedCount | WakeUp | Pr
 """An entry that is a call of the node."""
 
 
+class ReplayError(ValueError):
+    """A record that cannot be replayed, or a change that cannot be made to it; each problem is one sentence."""
+
+    def __init__(self, *problems: str) -> None:
+        super().__init__("\n".join(problems))
+        self.problems = problems
+
+
 class RecordedStep(NamedTuple):
     """One call of a node."""
 
     due: float
     """When it was called (s, monotonic): a message waits from its arrival until the calls before are done."""
     entry: Input
-    """The call."""
     sent: tuple[SentMessage, ...]
     """Measurements and states that it sent in this call."""
     t: float
     """Run time at which its journal was sent (s); 0 before the run begins."""
     last: bool = False
-    """Whether the journal ends with it, so that some of what it sent may be missing."""
+    """The journal ends with it, so that some of what it sent may be missing."""
 
 
 class RecordedProcess:
-    """One process of a run.
-
-    Parameters
-    ----------
-    parts : JournalParts
-        Journals of the record.
-    name : str
-        Its agent, or "plant".
-    epoch : int
-        Its epoch.
-    first : int
-        The part of the file in which its journal begins.
-    last_t : float
-        Run time of the last part of its journal (s).
-    """
+    """One process of a run, by its name and epoch; its journal begins in a part of the file, and ends at `last_t`."""
 
     def __init__(self, parts: JournalParts, name: str, epoch: int, first: int, last_t: float) -> None:
         self._parts, self.name, self.epoch, self._first, self.last_t = parts, name, epoch, first, last_t
@@ -111,13 +103,7 @@ class RecordedProcess:
 
 
 class JournalParts:
-    """The journals of a record by process, a part of the file at a time.
-
-    Parameters
-    ----------
-    index : MessageIndex
-        Of the record.
-    """
+    """The journals of a record by process, a part of the file at a time."""
 
     def __init__(self, index: MessageIndex) -> None:
         self.index, self.count = index, len(index.file.spans)
@@ -147,13 +133,7 @@ class JournalParts:
 
 
 def processes_of(record: RunRecord) -> tuple[RecordedProcess, ...]:
-    """Return the processes of a run in wall-clock time, the plant first.
-
-    Raises
-    ------
-    ReplayError
-        If the record has no arrivals, or nothing at all.
-    """
+    """Return the processes of a run in wall-clock time, the plant first."""
     require_arrivals(record)
     found = sorted(JournalParts(record.index).processes(), key=lambda each: each.name != PLANT)
     if not found:

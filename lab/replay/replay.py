@@ -12,16 +12,22 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from heapq import merge
-from math import inf
+from math import inf, isnan
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from msgspec.structs import replace
 
 from gridpeers.agents.carriers.law_registry import close_laws
 from gridpeers.agents.laws.law import Law
-from gridpeers.lab.replay.difference import Difference, message_difference, row_difference
 from gridpeers.lab.replay.recomputation import recomputed
-from gridpeers.lab.replay.recorded_process import RecordedProcess, RecordedStep, processes_of, require_arrivals
-from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.recorded_process import (
+    RecordedProcess,
+    RecordedStep,
+    ReplayError,
+    processes_of,
+    require_arrivals,
+)
 from gridpeers.lab.replay.replayed_process import (
     MakePlant,
     Message,
@@ -37,10 +43,20 @@ from gridpeers.lab.replay.replayed_process import (
 from gridpeers.plant.build import start_plant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.short_texts import in_order
 from gridpeers.wire.codec import decode
 from gridpeers.wire.journal import MessageReference, ReceivedMessage
-from gridpeers.wire.messages import PLANT, AnyMessage, Telemetry
+from gridpeers.wire.messages import PLANT, AnyMessage, Measurement, Telemetry
+
+if TYPE_CHECKING:
+    from gridpeers.runs.result import Result
+
+TOLERANCE = 1e-9
+"""Largest difference of two numbers that count as the same, in their units: set-points in W and V."""
+
+UNITS = {"P": "W", "Q": "var", "V": "V", "f": "Hz", "P_set": "W", "V_set": "V", "t": "s"}
+"""Units of the fields of measurements and states."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,7 +70,6 @@ class ReplayedPart:
     t_end: float
     """Run time of the last of them (s)."""
     difference: Difference | None
-    """The first difference; None if there is none."""
     note: str = ""
     """Why not everything was compared; "" if it was."""
 
@@ -78,33 +93,107 @@ class Replay:
         return tuple(dict.fromkeys(part.note for part in self.parts if part.note))
 
 
-def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Replay:
-    """Replay a record.
+def replay(run: Result | RunRecord | str | Path, make_plant: MakePlant = start_plant) -> Replay:
+    """Give the cores of a recorded run again what they got, and compare what they decide.
 
     Parameters
     ----------
-    record : RunRecord
-        The record, of any driver.
-    make_plant : MakePlant, optional
-        Starts the plant; None leaves the physics out.
+    run : Result, RunRecord, str or Path
+        The run, of any driver; its record may be cut off.
+    make_plant : Callable[[PlantConfig], LivePlant], optional
+        Starts the plant.
+
+    Returns
+    -------
+    Replay
+        `difference` is the first one, with agent, time, quantity, both values and unit; None if everything is the same
+        within 1e-9.
 
     Raises
     ------
-    ReplayError
-        If it has no arrivals, or its law, graph or feeder is not here.
     RecordFileError
-        If it cannot be read.
+        If there is no record, or it cannot be read.
+    ReplayError
+        If it does not have what the cores got, or its law, graph or feeder is not here.
     """
+    record = record_of(run)
     require_arrivals(record)
-    settings, notes = record.info.plant.settings, []
-    if settings.simulator != "gridpeers" or record.info.plant.bridged:
-        make_plant = None
+    own = record.info.plant.settings.simulator == "gridpeers" and not record.info.plant.bridged
+    found = list((_in_simulated_time if record.info.simulated else _in_real_time)(record, make_plant if own else None))
+    if not own:
         note = "the physics was not replayed: it was not that of our plant alone"
-        notes.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
-    parts = _in_simulated_time(record, make_plant) if record.info.simulated else _in_real_time(record, make_plant)
-    found = [*notes, *parts]
+        found.append(ReplayedPart(name=PLANT, count=0, t_end=0.0, difference=None, note=note))
     names = [PLANT, *in_order({part.name for part in found} - {PLANT})]
     return Replay(parts=tuple(sorted(found, key=lambda part: names.index(part.name))))
+
+
+def record_of(run: Result | RunRecord | str | Path) -> RunRecord:
+    """Return the record of a result, or that in the folder of a case."""
+    if isinstance(run, RunRecord):
+        return run
+    return RunRecord.open(run) if isinstance(run, str | Path) else run.run_record
+
+
+# -------------------------------------------------------------------- differences
+
+
+class Difference(NamedTuple):
+    """Two values that are not the same, of an agent, an inverter or the plant, at a run time (s)."""
+
+    name: str
+    t: float
+    quantity: str
+    recorded: Any
+    replayed: Any
+    unit: str = ""
+    """Unit of both; "" if they have none."""
+
+    def __str__(self) -> str:
+        unit = f" {self.unit}" if self.unit else ""
+        recorded, replayed = (repr(it) if isinstance(it, float | str) else str(it) for it in self[3:5])
+        return (
+            f"{self.name} at t = {self.t:.2f} s: {self.quantity} is {recorded}{unit} in the record "
+            f"and {replayed}{unit} in the replay"
+        )
+
+
+def same(a: Any, b: Any) -> bool:
+    """Return whether two values are the same, numbers within `TOLERANCE`."""
+    if isinstance(a, float) and isinstance(b, float):
+        return a == b or abs(a - b) <= TOLERANCE or (isnan(a) and isnan(b))
+    if isinstance(a, dict) and isinstance(b, dict):
+        return a.keys() == b.keys() and all(same(a[name], b[name]) for name in a)
+    return bool(a == b)
+
+
+def message_difference(recorded: AnyMessage | None, replayed: AnyMessage | None) -> Difference | None:
+    """Return the first field in which two states, or two measurements, differ; None if there is none."""
+    known = recorded or replayed
+    if known is None:
+        return None
+    name = known.to if isinstance(known, Measurement) else known.sender
+    if recorded is None or replayed is None or type(recorded) is not type(replayed):
+        there = ("missing" if message is None else "there" for message in (recorded, replayed))
+        return Difference(name, known.t, f"the {type(known).__name__} {known.seq}", *there)
+    for field in recorded.__struct_fields__:
+        a, b = getattr(recorded, field), getattr(replayed, field)
+        if not same(a, b):
+            return Difference(name, recorded.t, field, a, b, UNITS.get(field, ""))
+    return None
+
+
+def row_difference(
+    inverters: tuple[str, ...], recorded: tuple[float, ...], replayed: tuple[float, ...]
+) -> Difference | None:
+    """Return the first quantity in which two rows of the plant differ; None if there is none."""
+    if len(recorded) != len(replayed):
+        return Difference("plant", recorded[0], "the number of columns", len(recorded), len(replayed))
+    columns = ((name, quantity) for name in inverters for quantity in QUANTITIES)
+    for (name, quantity), a, b in zip(columns, recorded[1:], replayed[1:], strict=True):
+        if not same(a, b):
+            symbol, _, unit = quantity.rpartition("_")
+            return Difference(name, recorded[0], symbol, a, b, unit)
+    return None
 
 
 # -------------------------------------------------------------------- wall-clock time
@@ -112,11 +201,12 @@ def replay(record: RunRecord, make_plant: MakePlant | None = start_plant) -> Rep
 
 def _in_real_time(record: RunRecord, make_plant: MakePlant | None) -> Iterator[ReplayedPart]:
     """Replay all processes side by side, so that the file is read once."""
-    replays = [
-        _PlantReplay(record, process, make_plant) if process.name == PLANT else _AgentReplay(record, process)
-        for process in processes_of(record)
-        if process.name != PLANT or make_plant is not None
-    ]
+    replays: list[_PlantReplay | _AgentReplay] = []
+    for process in processes_of(record):
+        if process.name != PLANT:
+            replays.append(_AgentReplay(record, process))
+        elif make_plant is not None:
+            replays.append(_PlantReplay(record, process, make_plant))
     try:
         for _, number, step in merge(*(_by_time(number, each) for number, each in enumerate(replays))):
             replays[number].take(step)
@@ -134,8 +224,6 @@ def _by_time(number: int, replay: _PlantReplay | _AgentReplay) -> Iterator[tuple
 
 
 class _AgentReplay:
-    """The replay of one process of an agent."""
-
     def __init__(self, record: RunRecord, process: RecordedProcess) -> None:
         self.process, self._info = process, record.info
         self._again: ReplayedProcess | None = None
@@ -145,7 +233,6 @@ class _AgentReplay:
 
     @property
     def is_over(self) -> bool:
-        """Whether no further step is of use."""
         return bool(self._note) or self._difference is not None
 
     def take(self, step: RecordedStep) -> None:
@@ -173,7 +260,6 @@ class _AgentReplay:
             self._count, self._t = self._count + 1, b.t
 
     def result(self) -> ReplayedPart:
-        """Return what came of it."""
         return ReplayedPart(
             name=self.process.name,
             count=self._count,
@@ -183,15 +269,13 @@ class _AgentReplay:
         )
 
     def close(self) -> None:
-        """Release what its law has opened."""
         close_laws(self._laws)
 
 
 class _PlantReplay:
     """The replay of the plant: its physics, given the states that it heard when it heard them."""
 
-    def __init__(self, record: RunRecord, process: RecordedProcess, make_plant: MakePlant | None) -> None:
-        assert make_plant is not None
+    def __init__(self, record: RunRecord, process: RecordedProcess, make_plant: MakePlant) -> None:
         self.process = process
         self._plant = start_plant_of(record.info, make_plant)
         self._rows = ComparedRows(record)
@@ -199,7 +283,6 @@ class _PlantReplay:
 
     @property
     def is_over(self) -> bool:
-        """Whether no further step is of use."""
         return self._rows.difference is not None
 
     def take(self, step: RecordedStep) -> None:
@@ -207,7 +290,6 @@ class _PlantReplay:
         self._compare(self._again.take(step, message_of(self.process, step)))
 
     def result(self) -> ReplayedPart:
-        """Return what came of it."""
         self._compare(self._again.end())
         rows = self._rows
         return ReplayedPart(
@@ -220,7 +302,6 @@ class _PlantReplay:
                 self._rows.take(decode(message.payload))
 
     def close(self) -> None:
-        """End the plant."""
         self._plant.close()
 
 
@@ -228,15 +309,7 @@ class _PlantReplay:
 
 
 class ComparedRows:
-    """The rows of the plant beside those of the record, as they come.
-
-    Parameters
-    ----------
-    record : RunRecord
-        The record.
-    until : float, optional
-        Run time (s) up to which they are compared.
-    """
+    """The rows of the plant beside those of the record, as they come, up to a run time (s)."""
 
     def __init__(self, record: RunRecord, until: float = inf) -> None:
         self._until = until

@@ -63,7 +63,7 @@ def replay(
 
     from gridpeers.cli.usage import ended_by_signals
     from gridpeers.lab.replay.changes import Changes
-    from gridpeers.lab.replay.replay_error import ReplayError
+    from gridpeers.lab.replay.recorded_process import ReplayError
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
     from gridpeers.scenarios.results.run_files import FolderError, refusal
 
@@ -147,7 +147,7 @@ def _counterfactual(record: RunRecord, changes: Changes, out: Path | None) -> bo
     from gridpeers.cli.progress import progress
     from gridpeers.cli.usage import ended_by_signals
     from gridpeers.lab.replay.changes import changed_rule
-    from gridpeers.lab.replay.replaying import counterfactual_in
+    from gridpeers.lab.replay.counterfactual import counterfactual_in
     from gridpeers.scenarios.results.plots.style import save
     from gridpeers.scenarios.results.run_files import broken_if_ended, new_folder, shown, write_whole
     from gridpeers.scenarios.schema.plugin_keys import judges_laws

@@ -12,8 +12,7 @@ from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.lab.replay.recorded_process import Input, RecordedProcess, RecordedStep
-from gridpeers.lab.replay.replay_error import ReplayError
+from gridpeers.lab.replay.recorded_process import RecordedProcess, RecordedStep, ReplayError
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
@@ -36,58 +35,42 @@ from gridpeers.wire.journal import (
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Measurement, State
 
-UNREAD = ("excess", "oversized")
-"""Kinds of messages that are dropped unread: without bytes they are noted, and not rejected for having none."""
-
 MakePlant = Callable[[PlantConfig], LivePlant]
 """Starts the plant of a configuration."""
 
 
 class Message(NamedTuple):
-    """A message that a node has sent."""
+    """A message that a node has sent; the key is without `gridpeers/<run>/`."""
 
     key: str
-    """Key, without `gridpeers/<run>/`."""
     payload: bytes
-    """Its bytes."""
 
 
 class _Outbox:
-    """Takes what a node sends (`gridpeers.wire.traffic.Traffic`)."""
+    """Takes what a node sends (`gridpeers.wire.traffic.Traffic`); of the rest the record has a note."""
 
     def __init__(self, cut: int) -> None:
         self._cut = cut
         self.messages: list[Message] = []
 
     def sent(self, key: str, payload: bytes) -> None:
-        """Take a message that the node sends."""
         self.messages.append(Message(key[self._cut :], payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
-        """Take no note: the record has it."""
+        pass
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Take no note: the record has it."""
+        pass
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
-        """Take no note: the record has it."""
+        pass
 
     def line(self, text: str) -> None:
-        """Take no note: the record has it."""
+        pass
 
 
 class ReplayedProcess:
-    """One process, made again.
-
-    Parameters
-    ----------
-    recorded : RecordedProcess
-        The process.
-    node : RealtimeAgent or RealtimePlant
-        Its node, which has not started.
-    links : Links or None
-        The emulated links into it.
-    """
+    """One process, made again: its node, which has not started, with the emulated links into it."""
 
     def __init__(self, recorded: RecordedProcess, node: RealtimeAgent | RealtimePlant, links: Links | None) -> None:
         self.recorded, self.node, self.links = recorded, node, links
@@ -106,22 +89,13 @@ class ReplayedProcess:
         self.node.use_links(links)
 
     def hears(self, key: str) -> bool:
-        """Return whether it listens on a key."""
         return self._root + key in self.node.routes and not self.node.finished
 
     def take(self, step: RecordedStep, message: Message | None = None) -> list[Message]:
-        """Call the node as in a recorded step; return what it sent.
-
-        Parameters
-        ----------
-        step : RecordedStep
-            The call.
-        message : Message, optional
-            The message that it hears in this step, if it hears one.
-        """
+        """Call the node as in a recorded step, with the message that it hears there, if any; return what it sent."""
         node, entry = self.node, step.entry
-        if (loss := _loss_of(entry)) is not None:
-            node.lost(loss._replace(key=self._root + loss.key), entry.at or 0.0)
+        if isinstance(entry, RejectedCount) and entry.kind in KINDS:  # the record has their number alone
+            node.lost(Loss(self._root + entry.key, entry.kind, "as recorded", entry.count), entry.at or 0.0)
         elif isinstance(entry, MessageReference | ReceivedMessage):
             assert message is not None
             return self.hear(message, entry.at or 0.0)
@@ -164,25 +138,10 @@ class ReplayedProcess:
         return sent
 
 
-def _loss_of(entry: Input) -> Loss | None:
-    """Return the messages that a process rejected in a step, if the record has their number alone."""
-    if isinstance(entry, RejectedCount) and entry.kind in KINDS:
-        return Loss(entry.key, entry.kind, "as recorded", entry.count)
-    if isinstance(entry, ReceivedMessage) and entry.rejected in UNREAD and not entry.payload:
-        return Loss(entry.key, entry.rejected, "as recorded", 1)  # records until 2026-11 have no number
-    return None
-
-
 def agent_again(
     recorded: RecordedProcess, config: AgentConfig, instance: str, laws: list[Law], links: Links | None
 ) -> ReplayedProcess:
-    """Make the process of an agent again; its law is added to a list, to be closed.
-
-    Raises
-    ------
-    ReplayError
-        If its law or its graph is not here.
-    """
+    """Make the process of an agent again; its law is added to a list, to be closed."""
     try:
         law = make_law(config.control)
     except ValueError as error:
@@ -209,13 +168,7 @@ def as_run(info: RecordInfo, epoch: int) -> PlantConfig:
 
 
 def recorded_links(info: RecordInfo, name: str) -> Links | None:
-    """Return the emulated links into an agent or the plant, as they were at its start.
-
-    Raises
-    ------
-    ReplayError
-        If they have a fault that is not here.
-    """
+    """Return the emulated links into an agent or the plant, as they were at its start."""
     config = info.agent(name)
     tree = info.plant.links if name == PLANT else {} if config is None else config.links
     try:
@@ -248,13 +201,7 @@ def tick_message(message: Message | SentMessage) -> State | Measurement | None:
 
 
 def start_plant_of(info: RecordInfo, make_plant: MakePlant) -> LivePlant:
-    """Start the plant of a run.
-
-    Raises
-    ------
-    ReplayError
-        If its feeder is not here, or it cannot start.
-    """
+    """Start the plant of a run."""
     try:
         return make_plant(info.plant)
     except (ValueError, RuntimeError, OSError) as error:

@@ -7,7 +7,7 @@ from math import inf
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.lab.replay.changed_faults import lossless, spliced, without_loss
+from gridpeers.lab.replay.changes import lossless, spliced, without_loss
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.partition import Partition
