@@ -11,7 +11,6 @@ SWEEPS = CATALOGUE / "sweeps"
 
 
 def names_in(folder: Path) -> tuple[str, ...]:
-    """Names of the files of a catalogue."""
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 

@@ -49,8 +49,6 @@ from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys,
 
 
 class FieldDoc(NamedTuple):
-    """The documentation of one field."""
-
     name: str
     type: str
     """The annotation as written in the source."""
@@ -82,7 +80,6 @@ def field_table(cls: type, *, left_out: Iterable[str] = ()) -> Iterator[str]:
 
 
 def markdown_table(header: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> Iterator[str]:
-    """Yield the lines of a table."""
     yield f"| {' | '.join(header)} |"
     yield f"|{'---|' * len(header)}"
     for row in rows:
@@ -101,12 +98,10 @@ def alias_docs(module: ModuleType) -> tuple[tuple[str, str], ...]:
 
 
 def class_doc(cls: type) -> str:
-    """Return the docstring of a class on one line."""
     return _one_line(inspect.getdoc(cls) or "")
 
 
 def _written_in(cls: type) -> dict[str, FieldDoc]:
-    """Return the fields in the body of one class, by name."""
     try:
         definition = ast.parse(textwrap.dedent(inspect.getsource(cls))).body[0]
     except (OSError, TypeError):  # of a class that was made, or written in a notebook

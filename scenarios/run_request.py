@@ -13,8 +13,6 @@ from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, Pacing, Pl
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """The outcome of a run. Its rows went to the callback as they came."""
-
     broke: str
     """With the last log lines of the process that broke it; "" if the run reached its end."""
     reproducible: bool

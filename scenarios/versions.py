@@ -16,7 +16,6 @@ def versions() -> dict[str, str]:
 
 @cache
 def version_of(package: str) -> str:
-    """Version of an installed package; one process does not need all of them."""
     try:
         return metadata.version(package)
     except metadata.PackageNotFoundError:

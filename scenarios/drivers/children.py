@@ -87,7 +87,6 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     @property
@@ -158,11 +157,9 @@ class Children:
         self._children.append(child)
 
     def running(self) -> list[Child]:
-        """Return those that have not ended."""
         return [child for child in self._children if child.status is None]
 
     def wait(self, seconds: float) -> None:
-        """Let them leave by themselves."""
         until = monotonic() + seconds
         for child in self.running():
             child.join(until)

@@ -58,7 +58,6 @@ class ForkServer:
 
     @property
     def lives(self) -> bool:
-        """Whether it has not ended."""
         return self._server.poll() is None
 
     def fork(self, words: Sequence[str], log: IO[bytes], *, speaks: bool) -> ForkedProcess:
@@ -97,7 +96,6 @@ class ForkServer:
         self.close()
 
     def close(self) -> None:
-        """End the server."""
         self._control.close()
         self._server.kill()  # it may still import; it has nothing to put in order
         self._server.wait()
@@ -121,7 +119,6 @@ class ForkedProcess:
             return self.returncode
 
     def wait(self) -> int:
-        """Wait for its end; return the exit status."""
         with contextlib.suppress(ChildProcessError):  # another thread has asked for its status meanwhile
             os.waitid(os.P_PID, self.pid, os.WEXITED | os.WNOWAIT)  # without the lock, and it stays for `poll`
         status = self.poll()

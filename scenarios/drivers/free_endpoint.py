@@ -45,18 +45,15 @@ class ZenohEndpoint(NamedTuple):
 
     @property
     def connects(self) -> bool:
-        """Whether its protocol has TCP connections."""
         return self.protocol in ("tcp", "tls")
 
 
 def parse_endpoint(text: str) -> ZenohEndpoint | None:
-    """Return the endpoint of a text; None if the text has not the form of one."""
     match = _FORM.fullmatch(text)
     return match and ZenohEndpoint(match["protocol"], match["host"], int(match["port"]), match["rest"] or "")
 
 
 def local_endpoint(port: int) -> str:
-    """Return the endpoint at a port of this host's loopback."""
     return f"tcp/127.0.0.1:{port}"
 
 
@@ -95,7 +92,6 @@ def _listen_for_a_moment(host: str, port: int) -> None:
 
 
 def _way_out(host: str, error: OSError) -> str:
-    """Return what to do when an address cannot be listened on."""
     if isinstance(error, socket.gaierror):
         return f"no address is known of {host}; give one of this host's own, or 0.0.0.0 for all of them"
     if error.errno == errno.EADDRNOTAVAIL:

@@ -134,7 +134,6 @@ class _ProcessDriver:
         return AFTERMATH if self._broke else LEAVING
 
     def run(self, supervisor: Supervisor) -> None:
-        """Take in everything until the last telemetry, or until the run cannot go on."""
         client, since = self.client, self._began
         while not self._ended:
             deadline = self._plant_deadline if self._plant_ready else BUILD_DEADLINE
@@ -213,7 +212,6 @@ class _ProcessDriver:
                 self._notes[child.name] = child.report(self._when)
 
     def outcome(self) -> Outcome:
-        """Return how the run ended, once all processes have."""
         last, started = self.client.latest, self._started or monotonic()
         return Outcome(
             broke=self._broke,

@@ -23,8 +23,6 @@ from gridpeers.wire.messages import PLANT
 
 
 class ProcessFault(NamedTuple):
-    """One signal to one process."""
-
     t: float
     """Run time (s)."""
     name: str
@@ -57,7 +55,6 @@ class FaultInjector:
 
     @property
     def names(self) -> set[str]:
-        """Agents that a fault concerns."""
         return {fault.name for fault in self._due}
 
     def note_time(self, t: float, at: float) -> None:
@@ -72,7 +69,6 @@ class FaultInjector:
         return max(0.0, (self._due[0].t - self._offset) / self._speed - monotonic())
 
     def inject(self, children: Children) -> None:
-        """Inject the faults that are due."""
         while self._due and self.wait == 0.0:
             fault = self._due.pop(0)
             try:
@@ -165,7 +161,6 @@ class Supervisor:
         return Child(name, ["-m", module], process, log, self._on_exit, server=agent_server(module, start=several))
 
     def _mates(self, name: str) -> tuple[str, ...]:
-        """Return the agents that share the process of one, itself included."""
         return self._shared.get(name, (name,))
 
     def start_when_gone(self, names: Iterable[str]) -> None:

@@ -70,12 +70,10 @@ class TelemetryClient:
 
     @property
     def t(self) -> float:
-        """Run time that the run has reached (s)."""
         return 0.0 if self.latest is None else self.latest.t
 
     @property
     def ended(self) -> bool:
-        """Whether the last telemetry is here."""
         return self.latest is not None and self.latest.final
 
     def say(self, word: str) -> None:

@@ -127,7 +127,6 @@ class TelemetryEndpoint(PlantFollower):
         return tuple(self.routes)
 
     def appeared(self, key: str) -> None:
-        """Note a token."""
         match self.keys.parts(key):
             case ("alive", "plant", part):
                 self._plant_appeared(part)
@@ -149,7 +148,6 @@ class TelemetryEndpoint(PlantFollower):
         return (self._stream.acknowledges and key == self.keys.telemetry) or super().is_known(key, payload)
 
     def take(self) -> list[Recordable]:
-        """Take out the messages that can be recorded now, in order."""
         messages, self._recordable = self._recordable, []
         return messages
 

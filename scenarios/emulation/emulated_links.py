@@ -94,7 +94,6 @@ class EmulatedLinks:
         return () if self._pauses and self.stalled(now) else self._receiver.due(now)
 
     def stalled(self, t: float) -> bool:
-        """Return whether the receiver itself is paused at t (s of run time)."""
         return bool(self._pauses) and any(at.holds(t) for at in self._pauses)
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
@@ -127,7 +126,6 @@ class EmulatedLinks:
         return [link for link in links if self._schedules.of(link).at(t).active]
 
     def impaired(self, t: float) -> tuple[str, ...]:
-        """Return the senders whose links have a fault at t (s of run time)."""
         return tuple(src for src in self._senders if self._receiver.holding(src, t))
 
     def status(self, t: float) -> bytes:

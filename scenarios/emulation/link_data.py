@@ -48,8 +48,6 @@ class EmulationConfig(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_
 
 
 class LinkReportData(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The data of one `LinkReport`."""
-
     traces: tuple[LinkTrace, ...] = ()
     counts: dict[Name, LinkCounts] = {}
     """Counts of the messages of each sender so far."""
@@ -169,7 +167,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
     @property
     def on(self) -> str:
-        """Pattern of the links."""
         return self._change.on
 
     @property
@@ -180,7 +177,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return change
 
     def at(self, t: float) -> Change:
-        """Return the change of links if it holds from t (s of run time) on."""
         to_s = None if self.for_s is None else round(t + self.for_s, 9)
         times = {"from_s": t, "to_s": to_s} if self.fault else {"from_s": t}
         return msgspec.structs.replace(self._change, **times)
@@ -202,7 +198,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return problems
 
     def __str__(self) -> str:
-        """Return it in words."""
         where = "all links" if self.on == EVERYTHING else self.on
         if self.fault is None:
             return f"{where}: heal"
@@ -218,7 +213,6 @@ class LinkCommand(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
         return f"{_listed(impaired)}: healed"
 
     def to_tree(self) -> dict[str, Any]:
-        """Return it as it travels in a message."""
         tree: dict[str, Any] = msgspec.to_builtins(self)
         return tree
 

@@ -149,7 +149,6 @@ _SHOWN = 3
 
 
 def few(lines: Sequence[str]) -> str:
-    """Return the first lines, and the number of the others."""
     more = f", and {len(lines) - _SHOWN} more (metrics.json)" if len(lines) > _SHOWN else ""
     return f"{'; '.join(lines[:_SHOWN])}{more}"
 
@@ -167,7 +166,6 @@ class Departures:
     """By label, the operations of each event that people made."""
 
     def lines(self, end: float = inf) -> list[str]:
-        """Return the departures before a time (s), one line each."""
         return [line_of(event).strip() for event in self.events if event.t < end]
 
     @property

@@ -11,8 +11,6 @@ from gridpeers.wire.codec import decode_foreign
 
 
 class MapSwitch(msgspec.Struct, frozen=True):
-    """A switch on the map."""
-
     name: str
     alias: str
     a: int
@@ -21,8 +19,6 @@ class MapSwitch(msgspec.Struct, frozen=True):
 
 
 class MapInverter(msgspec.Struct, frozen=True):
-    """An inverter on the map."""
-
     name: str
     bus: int
     kind: str
@@ -31,8 +27,6 @@ class MapInverter(msgspec.Struct, frozen=True):
 
 
 class MapLoad(msgspec.Struct, frozen=True):
-    """A load on the map."""
-
     name: str
     bus: int
     P: float
@@ -61,7 +55,6 @@ class FeederMap(msgspec.Struct, frozen=True):
 
 
 def feeder_map(feeder: Feeder) -> FeederMap:
-    """Return the one-line diagram of a feeder."""
     at = places(feeder)
     number = {bus.name: i for i, bus in enumerate(feeder.buses)}
     return FeederMap(

@@ -82,8 +82,6 @@ def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel
 
 @dataclass(frozen=True)
 class Folders:
-    """Folders of a live run."""
-
     logs: Path
     record: Path | None = None
     """For the files of the record, a folder in the run folder; None if nothing is recorded."""
@@ -100,7 +98,6 @@ class Folders:
             _write_scenario(self.whole, *ended_scenario(scenario, ended))
 
     def broken(self, why: str) -> None:
-        """Write to status.txt why the folder is not complete."""
         if self.whole is not None:
             set_broken(self.whole, why)
 
@@ -203,11 +200,9 @@ class LinkLog:
 
     @property
     def changes(self) -> tuple[Change, ...]:
-        """Changes by commands, in their order."""
         return tuple(change for _, change in sorted(self._commands.items()))
 
     def __call__(self, message: LinkRequest) -> None:
-        """Take a command to links."""
         self._commands[message.seq] = LinkCommand.of_tree(message.link_command).at(message.t)
         count = len(self._commands)
         if count >= self._due:

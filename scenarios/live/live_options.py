@@ -86,8 +86,6 @@ def check_alone(
 
 
 class LiveOptions(msgspec.Struct, frozen=True, kw_only=True):
-    """Options of `gridpeers plant` and `gridpeers up`."""
-
     run: str
     case: str = ""
     speed: float = 1.0

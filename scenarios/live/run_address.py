@@ -50,7 +50,6 @@ def objection(option: str, endpoint: str, *, keys: bool, insecure: bool) -> str:
 
 
 def is_loopback_host(host: str) -> bool:
-    """Return whether an endpoint's host is this host's loopback."""
     try:
         return host == "localhost" or ip_address(host.strip("[]")).is_loopback
     except ValueError:  # a name that only begins like an address, as anybody may register it
@@ -82,8 +81,6 @@ class UsageError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class RunAddress:
-    """A run and where to find it."""
-
     run: str
     connect: tuple[str, ...]
     """Endpoints to connect to; one that answers is enough."""
@@ -101,7 +98,6 @@ class RunAddress:
         return [*run, *connect, *self.access.words]
 
     def __str__(self) -> str:
-        """Return it as messages name it."""
         return f"run {self.run} at {', '.join(self.connect)}"
 
 
@@ -187,7 +183,6 @@ def return_path(connect: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def is_loopback(connect: tuple[str, ...]) -> bool:
-    """Return whether all endpoints are on this host's loopback."""
     return all(map(is_loopback_host, _hosts(connect)))
 
 
@@ -201,7 +196,6 @@ def loopback_of(listen: str) -> str:
 
 
 def next_port(listen: str) -> str:
-    """Return the same endpoint at the port beside."""
     endpoint = parse_endpoint(listen)
     assert endpoint is not None
     return str(endpoint._replace(port=endpoint.port + 1 if endpoint.port < 65535 else endpoint.port - 1, rest=""))

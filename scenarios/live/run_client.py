@@ -17,8 +17,6 @@ from gridpeers.wire.trust.tls_refusal import tls_refusal
 
 
 class PlantSearch:
-    """The search of one session for the plant of a run."""
-
     def __init__(self, where: RunAddress, session: Session) -> None:
         self._where, self._session = where, session
         self._told: set[str] = set()
@@ -158,7 +156,6 @@ class RunClient:
 
     @property
     def moved(self) -> bool:
-        """Whether this host has another address than the session knows."""
         return self._session.moved
 
     def renew(self) -> None:
@@ -173,27 +170,22 @@ class RunClient:
         self.close()
 
     def close(self) -> None:
-        """Close the session."""
         self._session.close()
 
     @property
     def plant(self) -> bool:
-        """Whether the plant's token is there."""
         return bool(self.epochs)
 
     @property
     def epochs(self) -> set[int]:
-        """Epochs of the plants of this run whose tokens are there."""
         return self._tokens.epochs
 
     @property
     def present(self) -> list[str]:
-        """Inverters whose agents have a token."""
         return list(self._tokens.agents)
 
     @property
     def runs(self) -> set[str]:
-        """Names of the runs whose plants are there."""
         return self._tokens.runs
 
     def read(self, key: str, payload: bytes) -> AnyMessage | None:
@@ -225,7 +217,6 @@ class RunClient:
         return self._session.id
 
     def listen(self, key: str) -> None:
-        """Subscribe to a key."""
         self._heard.append(key)
         self._session.subscribe(key)
 
@@ -234,7 +225,6 @@ class RunClient:
         self._session.fetch(key)
 
     def publish(self, key: str, payload: bytes) -> None:
-        """Publish bytes."""
         self._session.publish(key, payload)
 
     def take(self, seconds: float) -> Iterator[tuple[str, bytes, float]]:

@@ -33,7 +33,6 @@ class RunTokens:
 
     @property
     def runs(self) -> set[str]:
-        """Names of the runs whose plants are there, this one included."""
         runs = set(map(run_of_plant, self._others))
         return runs | {self._run} if self.epochs else runs
 
@@ -57,7 +56,6 @@ class RunTokens:
         self._noted.add(key)
 
     def vanished(self, key: str) -> None:
-        """Note that a token is gone."""
         if key not in self._noted:
             return
         self._noted.discard(key)
@@ -93,7 +91,6 @@ class PlantStatus(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def inverters(self) -> tuple[str, ...]:
-        """All inverters of the plant."""
         return self.agents + self.absent
 
 
@@ -137,8 +134,6 @@ class InverterStatus:
 
 @dataclass(frozen=True, kw_only=True)
 class Snapshot:
-    """A run at one moment."""
-
     run: str
     t: float | None = None
     pace: str = ""
@@ -164,8 +159,6 @@ _KEPT = 100
 
 
 class RunMonitor:
-    """Collect the state of a run."""
-
     def __init__(self, run: str) -> None:
         self._run = run
         self._configs: dict[str, AgentConfig] = {}
@@ -199,11 +192,9 @@ class RunMonitor:
         return self._configs.keys() >= set(self._inverters)
 
     def config(self, config: AgentConfig) -> None:
-        """Note the configuration of an agent."""
         self._configs[config.name] = config
 
     def plant_status(self, status: PlantStatus) -> None:
-        """Note the plant's status."""
         self._plant_status, self._impaired = status, status.impaired
         self.members = set(status.agents)
         if status.phase != "gathering":
@@ -235,7 +226,6 @@ class RunMonitor:
                 self._count_member(event)
 
     def _count_member(self, event: PlantEvent) -> None:
-        """Note an agent that joins, leaves or dies."""
         match = re.match(r"(\S+) (joined|left|died)\b", event.text)
         if event.kind != "roster" or match is None or match[1] != event.subject:
             return
@@ -245,7 +235,6 @@ class RunMonitor:
             self.members.discard(event.subject)
 
     def status(self, message: AgentStatus, now: float) -> None:
-        """Note the status of an agent."""
         self._status[message.sender] = (message, now)
 
     def snapshot(self, present: Collection[str], now: float, *, current: bool = True) -> Snapshot:
@@ -301,7 +290,6 @@ class RunMonitor:
         )
 
     def _pace(self) -> str:
-        """Return in a few words how well the plant keeps real time."""
         pacing, plant = self._pacing, self._plant_status
         if pacing is None or pacing.steps == 0:
             return "waits for its agents" if plant is not None and plant.phase == "gathering" else ""

@@ -102,7 +102,6 @@ def request(
 def _of_number(
     answer: Answer, acknowledgements: Mapping[int, dict[str, LinkAcknowledgement]]
 ) -> dict[str, LinkAcknowledgement]:
-    """Return the acknowledgements of the number that an answer names."""
     number = answer.data.get("number")
     return acknowledgements.get(number, {}) if isinstance(number, int) else {}
 
@@ -262,8 +261,6 @@ class _LinkReply(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, kw_only=True)
 class LinkCommandResult:
-    """The receivers' answers to a link command."""
-
     t: float
     text: str
     """Its effect in words: a heal names only links that had a fault."""
@@ -276,7 +273,6 @@ class LinkCommandResult:
 
     @property
     def changes_links(self) -> bool:
-        """Whether it changes any link."""
         return bool(self.acknowledged or self.silent or self.absent or self.refused)
 
 

@@ -71,13 +71,11 @@ links to it have an emulated fault."""
 
 
 def _columns(snapshot: Snapshot) -> tuple[_Column, ...]:
-    """Return the columns that have something to show."""
     calm = not any(inverter.impaired for inverter in snapshot.inverters)
     return tuple(column for column in _COLUMNS if not (calm and column.head == "impaired"))
 
 
 def head(snapshot: Snapshot) -> str:
-    """Return one line on the whole run."""
     t = "has not begun" if snapshot.t is None else f"t = {snapshot.t:.2f} s"
     islands = list(dict.fromkeys(inverter.island for inverter in snapshot.inverters if inverter.island))
     parts = [f"run {snapshot.run}", t, snapshot.pace, f"islands: {', '.join(islands)}" if islands else ""]
@@ -228,7 +226,6 @@ class RunSubscriber:
             self._client.listen(self._client.keys.status(name))
 
     def take_until(self, end: float) -> None:
-        """Feed the messages that come until a time (s, monotonic)."""
         while (left := end - monotonic()) > 0.0:
             self.take(left)
 

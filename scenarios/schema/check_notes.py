@@ -17,8 +17,6 @@ from gridpeers.wire.driver.command_line import command_line
 
 
 class AgentEvent(NamedTuple):
-    """An event at which agents leave and join."""
-
     t_s: float
     """Run time (s)."""
     leave: Collection[str]
@@ -52,7 +50,6 @@ def why_away(name: str, begin_s: float, end_s: float, events: Iterable[AgentEven
 
 
 def _absences(name: str, events: Iterable[AgentEvent], *, at_start: bool) -> Iterator[tuple[float, float, str]]:
-    """Yield the run times (s) between which an agent has not joined yet, or has left, and why."""
     away, why = (inf, "") if at_start else (0.0, "has not joined")
     for event in events:
         if name in event.leave:

@@ -53,7 +53,6 @@ ReadFeeder = Callable[[str, str], Feeder]
 
 
 def catalogue() -> tuple[str, ...]:
-    """Names of the scenarios that come with gridpeers."""
     return names_in(CATALOGUE)
 
 
@@ -185,7 +184,6 @@ def _with_feeder_path(scenario: ScenarioModel, folder: Path) -> ScenarioModel:
 
 
 def _feeder_of(scenario: ScenarioModel, problems: Problems, read_feeder: ReadFeeder) -> Feeder | None:
-    """The feeder's tables, or None after noting what is wrong with them."""
     if problems.touch("plant.feeder"):
         return None
     name, load_set = scenario.plant.feeder, scenario.plant.load_set

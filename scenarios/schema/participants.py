@@ -167,12 +167,10 @@ def setup_of(netem: Netem, scenario: ScenarioModel, feeder: Feeder, *, real_node
 
 
 def deaths_of(netem: Netem) -> tuple[ScheduledAction, ...]:
-    """Return the agents that die on schedule."""
     return tuple(ScheduledAction(t=node.from_s, inverter=node.name, action="die") for node in netem.nodes if node.kill)
 
 
 def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[float, dict[str, str]]]:
-    """Return from when on (s) each inverter stands in which island."""
     times = [0.0, *(event.t_s for event in scenario.events)]
     operations: list[SwitchOperations] = [((), ()), *((event.open, event.close) for event in scenario.events)]
     timeline = []
@@ -184,7 +182,6 @@ def _islands_over_time(scenario: ScenarioModel, feeder: Feeder) -> list[tuple[fl
 
 
 def is_calm(netem: Netem) -> bool:
-    """Return whether there is no entry at all."""
     return not any(getattr(netem, list_.name) for list_ in LISTS)
 
 

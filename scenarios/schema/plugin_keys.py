@@ -41,13 +41,11 @@ def law_of(scenario: ScenarioModel, case: str) -> LawChoice:
 
 
 def graph_of(case: Case) -> tuple[str, Plugin | None]:
-    """Return the name of a case's rule, and the rule if it is one's own."""
     plugin = plugin_of(case.graph)
     return (plugin.use, None) if plugin.use in OUR_GRAPHS else (plugin.name, plugin)
 
 
 def metrics_of(scenario: ScenarioModel) -> list[tuple[str, Plugin]]:
-    """Return a scenario's own metrics: the name of each in tables, and the metric."""
     found = []
     for key in scenario.metrics:
         table = table_of(key)
@@ -58,7 +56,6 @@ def metrics_of(scenario: ScenarioModel) -> list[tuple[str, Plugin]]:
 
 
 def claims_of(scenario: ScenarioModel) -> list[Plugin]:
-    """Return a scenario's own claims."""
     return [plugin_of(key) for key in scenario.claims]
 
 

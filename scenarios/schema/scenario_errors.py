@@ -77,12 +77,10 @@ class Problems:
         return any(path in self._paths for path in paths)
 
     def below(self, path: str) -> bool:
-        """Whether a problem was noted anywhere in a table."""
         return any(noted.startswith(f"{path}.") for noted in self._paths)
 
     @property
     def paths(self) -> frozenset[str]:
-        """Every key with a problem."""
         return frozenset(self._paths)
 
     def read(self, struct: type[T], data: Mapping[str, Any]) -> T:
@@ -93,7 +91,6 @@ class Problems:
 
     @property
     def any(self) -> bool:
-        """Whether anything was noted."""
         return bool(self._found)
 
     def raise_if_any(self) -> None:

@@ -17,7 +17,6 @@ from gridpeers.wire.messages import LoadSetting
 
 
 def load_events(scenario: ScenarioModel) -> tuple[LoadEvent, ...]:
-    """Return the changes of loads in the order of time, in SI units."""
     return tuple(
         LoadEvent(t=event.t_s, load=name, setting=_setting(change))
         for event in scenario.events

@@ -105,12 +105,10 @@ def of_values(values: Mapping[str, Sequence[Any]]) -> Sequence[Setting]:
 
 
 def value_axis(values: Mapping[str, Sequence[Any]], table: str) -> Axis:
-    """Return the axis of keys of one table that go together."""
     return Axis({path: f"{table}.{path}" for path in values}, lambda: of_values(values))
 
 
 def grid_axes(table: Mapping[str, Any], problems: Problems) -> list[Axis]:
-    """Return an axis for each key of `[grid]`."""
     return [value_axis({path: values}, "grid") for path, values in _values_of(table, "grid", problems).items()]
 
 
@@ -193,7 +191,6 @@ def _twice(items: Sequence[Any]) -> Any:
 
 
 def is_number(value: Any) -> bool:
-    """Return whether a value of the file is a finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
@@ -213,7 +210,6 @@ class Distribution:
     """Bounds, or the choices."""
 
     def at(self, u: float) -> Any:
-        """Return the quantile at a number u from [0, 1)."""
         if self.name == "choice":
             return self.of[int(u * len(self.of))]
         low, high = self.of

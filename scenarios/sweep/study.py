@@ -82,14 +82,12 @@ class SweepFolder:
         return len(self._kept_rows())
 
     def add(self, done: SweepRow) -> None:
-        """Keep a finished run."""
         self._journal.write(journal_line(done))
         self._journal.flush()
         os.fsync(self._journal.fileno())
         self.done[done.number] = done
 
     def _kept_rows(self) -> dict[int, SweepRow]:
-        """Return the finished runs in the journal."""
         journal = self.path / JOURNAL
         if journal.exists() and not journal.is_file():  # to read a pipe would take for ever
             raise FolderError(f"{shown(journal)}: is no file; remove it, or give another folder by --out")
@@ -141,8 +139,6 @@ def _versions() -> dict[str, str]:
 
 @dataclass(frozen=True, kw_only=True)
 class Summary:
-    """Counts and files of a sweep."""
-
     runs: int
     before: int
     broke: Counter[str]

@@ -50,8 +50,6 @@ _feeder = lru_cache(maxsize=8)(read_feeder)
 
 
 class SweepRow(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one run."""
-
     number: int
     """Its place in the plan, from 0."""
     status: Literal["ran", "broke", "law failed"]
@@ -79,7 +77,6 @@ FATE = ("status", "why", "trips", "link_warnings", "history_sha256", "links_sha2
 
 
 def run_one(number: int, scenario: ScenarioModel, case: str) -> SweepRow:
-    """Run one case in this thread and measure it."""
     return run_with_history(number, scenario, case)[0]
 
 
@@ -159,7 +156,6 @@ def _accounts(links: LinkRecord) -> dict[str, float | None]:
 
 
 def flat(label: str, values: dict[str, Any]) -> dict[str, float | None]:
-    """Return the measures of one window as columns."""
     found: dict[str, float | None] = {}
     for name, value in values.items():
         if isinstance(value, dict):

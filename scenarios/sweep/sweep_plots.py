@@ -42,7 +42,6 @@ def is_number(column: pd.Series) -> bool:
 
 
 def is_drawn(column: pd.Series) -> bool:
-    """Return whether a column holds numbers that were drawn at random."""
     return is_number(column) and column.nunique() > MOST_VALUES
 
 
@@ -115,7 +114,6 @@ def draw_all(frame: pd.DataFrame, folder: Path) -> tuple[Path, ...]:
 
 
 def curves(frame: pd.DataFrame, window: str, x: str) -> Figure:
-    """Draw every index of a window against one parameter, a curve for each case."""
     indexes = indexes_of(frame)[window]
     figure, panels = _page(len(indexes))
     cases = list(frame.groupby("case", sort=False))
@@ -152,7 +150,6 @@ def _curve(panel: Axes, spread: pd.DataFrame, case: str, number: int, at: pd.Ser
 
 
 def _bars(panel: Axes, spread: pd.DataFrame, case: str, number: int, order: Sequence[Any]) -> None:
-    """Draw median and range of one case, for each text side by side."""
     colour = case_style(case, number)[0]
     x = [order.index(value) + 0.12 * number for value in spread.index]
     panel.vlines(x, spread["low"], spread["high"], color=colour, alpha=0.5, lw=3)
@@ -161,7 +158,6 @@ def _bars(panel: Axes, spread: pd.DataFrame, case: str, number: int, order: Sequ
 
 
 def heat_maps(frame: pd.DataFrame, window: str, x: str, y: str, case: str) -> Figure:
-    """Draw the median of every index of a window over two parameters."""
     indexes = indexes_of(frame)[window]
     figure, panels = _page(len(indexes))
     rows = frame[frame["case"] == case]

@@ -41,8 +41,6 @@ from gridpeers.wire.wording import suggestion
 
 @dataclass(frozen=True)
 class Run:
-    """One case of one sample."""
-
     sample: int
     """Number of the sample, from 0, in the order of the axes."""
     case: str
@@ -53,8 +51,6 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """A checked sweep."""
-
     name: str
     title: str
     text: str
@@ -65,7 +61,6 @@ class Plan:
 
     @property
     def parameters(self) -> tuple[str, ...]:
-        """Columns of the varied keys, in the order of the file."""
         return tuple(self.runs[0].shown)
 
 
@@ -84,8 +79,6 @@ MOST_LISTED = 20
 
 
 class BaseScenario(NamedTuple):
-    """The scenario that is varied."""
-
     tree: Tree
     path: Path
     """Its file: relative paths start there."""
@@ -94,8 +87,6 @@ class BaseScenario(NamedTuple):
 
 
 class _SampleProblems(Problems):
-    """Problems of one sample, by key."""
-
     def __init__(self) -> None:
         super().__init__("")
         self.noted: list[tuple[str, str]] = []
@@ -172,7 +163,6 @@ SECONDS_PER_SECOND = 0.05
 
 
 def sweeps() -> tuple[str, ...]:
-    """Return the names of the sweeps that come with gridpeers."""
     return names_in(SWEEPS)
 
 

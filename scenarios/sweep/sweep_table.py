@@ -23,8 +23,6 @@ _SUFFIXES = ("s", "Hz", "pu", "W", "var", "V")
 
 
 class IndexAxis(NamedTuple):
-    """The axis of an index."""
-
     label: str
     least: float
     """Least length, in the index's unit: smaller differences are rounding, or too small to see.
@@ -90,7 +88,6 @@ def _apart(name: str) -> tuple[str, str]:
 
 
 def _field_at(key: str) -> Field | None:
-    """Return the field of the scenario file at a key, None if there is none."""
     struct: Any = ScenarioModel
     found = None
     for step in key.split("."):

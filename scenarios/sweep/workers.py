@@ -32,7 +32,6 @@ class WorkersError(RuntimeError):
 
 
 def cores() -> int:
-    """Return the number of cores that this process may use."""
     from joblib import cpu_count
 
     return int(cpu_count())
