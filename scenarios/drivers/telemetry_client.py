@@ -99,7 +99,12 @@ class TelemetryClient:
         for loss in self._session.take_losses():
             self._core.lost(loss, monotonic())
         if not self._closed:
-            self._look_after()
+            now = monotonic()
+            if self._stream.is_astray(now):
+                self.renew_session()
+            question = self._core.question(now)
+            if question is not None:
+                self._session.publish(self._core.keys.request, question)
         return words
 
     def _pass_on(self, message: Recordable) -> None:
@@ -142,11 +147,3 @@ class TelemetryClient:
             session.subscribe(key)
         session.hold_token(keys.alive_recorder(self._name))
         return session
-
-    def _look_after(self) -> None:
-        now = monotonic()
-        if self._stream.is_astray(now):
-            self.renew_session()
-        question = self._core.question(now)
-        if question is not None:
-            self._session.publish(self._core.keys.request, question)

@@ -95,11 +95,6 @@ class LiveWindows:
     """Windows without numbers, as rows are missing at their end, where they are measured."""
 
 
-def live_events(done: Iterable[PlantEvent]) -> tuple[tuple[str, float], ...]:
-    """Return label and time (s) of each event that people made on switches and loads; those of one step are one."""
-    return tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in done))
-
-
 def live_windows(
     scenario: ScenarioModel,
     events: Iterable[PlantEvent],
@@ -209,7 +204,8 @@ def compare(
     commands = (event for event in events if event.kind == "link" and event.subject == "links")
     departures = sorted((*switched, *_moved(scenario, feeder, events, meant, ended), *commands), key=lambda one: one.t)
     first = departures[0].t if departures else ended
-    live = live_events(switched)
+    # label and time (s) of what people did on switches and loads; at one step it is one event
+    live = tuple((f"live at {round(t, 3):.12g} s", t) for t in dict.fromkeys(event.t for event in switched))
     opened = live_windows(scenario, events, live, ended, missing)
     measured = {window.label for window in opened.measured}
     return Departures(

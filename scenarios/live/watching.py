@@ -36,16 +36,8 @@ class _Column:
     right: bool = True
 
 
-def _number(value: float | None, digits: int) -> str:
+def _number(value: float | None, digits: int = 0) -> str:
     return "-" if value is None else f"{round(value, digits) + 0.0:.{digits}f}"  # + 0.0: no -0.0
-
-
-def _count(value: int | None) -> str:
-    return "-" if value is None else str(value)
-
-
-def _oldest(inverter: InverterStatus) -> str:
-    return _number(max(inverter.ages.values(), default=None), 2)
 
 
 _COLUMNS = (
@@ -59,10 +51,10 @@ _COLUMNS = (
     _Column("V", "pu", lambda inverter: _number(inverter.V, 4)),
     _Column("V_set", "pu", lambda inverter: _number(inverter.V_set, 4)),
     _Column("hears", "", lambda inverter: short(list(inverter.ages)), right=False),
-    _Column("age", "s", _oldest),
-    _Column("in", "", lambda inverter: _count(inverter.received)),
-    _Column("out", "", lambda inverter: _count(inverter.sent)),
-    _Column("lost", "", lambda inverter: _count(inverter.lost)),
+    _Column("age", "s", lambda inverter: _number(max(inverter.ages.values(), default=None), 2)),
+    _Column("in", "", lambda inverter: _number(inverter.received)),
+    _Column("out", "", lambda inverter: _number(inverter.sent)),
+    _Column("lost", "", lambda inverter: _number(inverter.lost)),
     _Column("impaired", "", lambda inverter: short(inverter.impaired) if inverter.impaired else "", right=False),
     _Column("", "", lambda inverter: inverter.note, right=False),
 )
@@ -108,13 +100,13 @@ def table(snapshot: Snapshot, keys: str = "q: quit") -> Group:
 
 
 def _style(column: _Column, inverter: InverterStatus) -> str:
-    if inverter.note and not inverter.note.startswith("apart") and column.head in ("agent", ""):
-        return "yellow"  # to be in another island is no fault
-    if column.head == "age" and inverter.late:
-        return "yellow"
-    if (column.head == "lost" and inverter.lost) or column.head == "impaired":
-        return "yellow"
-    return ""
+    wrong = {
+        "agent": inverter.note and not inverter.note.startswith("apart"),  # to be in another island is no fault
+        "age": inverter.late,
+        "lost": inverter.lost,
+        "impaired": True,
+    }
+    return "yellow" if wrong.get(column.head or "agent") else ""
 
 
 LOOK = 1.2
