@@ -62,21 +62,13 @@ def test_schedules_survive_the_runs_copy(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('leave = ["inv2"]', 'leave = ["inv22"]', r'event\[1\].leave: no inverter "inv22"; did you mean "inv2"\?'),
         ('leave = ["inv2"]', 'leave = ["inv2", "inv2"]', r'event\[1\].leave: "inv2" is named twice in event "leave"'),
-        ('leave = ["inv2"]', 'leave = "inv2"', r"event\[1\].leave: must be a list such as"),
         (
             'leave = ["inv2"]',
             'leave = ["inv10", "inv2"]',
             r'event\[1\].leave: "inv10" is not there at 2 s; leave it out',
         ),
         ('join = ["inv2"]', 'leave = ["inv2"]', r'event\[2\].leave: "inv2" is not there at 3 s; .* let it join before'),
-        (
-            'join = ["inv2"]',
-            'join = ["inv2", "inv3"]',
-            r'event\[2\].join: "inv3" is there already at 3 s; .* let it leave',
-        ),
-        ('join = ["inv2"]', "", r'event\[2\]: event "return" does nothing; give it open, close, leave, join, P_max_kW'),
         ("t_s = 2.0", "t_s = 2.01", r"event\[1\].t_s: 2.01 s is not a multiple of T_c_s = 0.02 s, .* nearest is 2"),
         ('join = ["inv2"]', 'joins = ["inv2"]', r'event\[2\].joins: unknown key; did you mean "join"\?'),
     ],

@@ -1,4 +1,4 @@
-"""Scenario files that cannot be run: what is said of each problem."""
+"""Scenario files that cannot be run: what is said of each problem, beside those of `tests/golden/problems`."""
 
 import csv
 import re
@@ -20,18 +20,11 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
     [
         ("seed = 1", "seeed = 1", r'mine.toml:\d+: seeed: unknown key; did you mean "seed"\?'),
         ("T_c_s = 0.02", "T_c = 0.02", r"time.T_c: unknown key; write T_c_s, in seconds"),
-        ("T_c_s = 0.02", "T_c_ms = 20", r"time.T_c_ms: unknown key; write T_c_s, in seconds"),
-        ("T_c_s = 0.02", "T_c_s = 20", r"time.T_c_s: 20 s is not plausible .* did you mean 0.02 \(20 ms\)\?"),
         ("T_c_s = 0.02", "T_c_s = 0", r"time.T_c_s: a control period must be above 0, got 0 s"),
         ("T_c_s = 0.02", "T_c_s = -0.02", r"time.T_c_s: a control period must be above 0, got -0.02 s"),
         ("T_c_s = 0.02", 'T_c_s = "20 ms"', r'time.T_c_s: must be a number, got "20 ms"; write 0.02'),
         ("T_c_s = 0.02", "T_c_s = true", r"time.T_c_s: must be a number, got true"),
         ("T_c_s = 0.02", "T_c_s = nan", r"time.T_c_s: a control period must be a finite number"),
-        (
-            "h_s = 0.002",
-            "h_s = 0.003",
-            r"time.h_s: 0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025",
-        ),
         (
             "h_s = 0.002",
             "h_s = 0.005",
@@ -43,62 +36,14 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
             r'time.method: there is no "second order"; did you mean "second-order"\?',
         ),
         ("h_s = 0.002", "h_s = 2", r"time.h_s: 2 s is not plausible .* did you mean 0.002 \(2 ms\)\?"),
-        ("record_s = 0.01", "record_s = 0.005", r"time.record_s: 0.005 s is not a multiple of h_s = 0.002 s"),
-        ("end_s = 7.0", "end_s = 7.01", r"time.end_s: 7.01 s is not a multiple of T_c_s = 0.02 s"),
         ("end_s = 7.0", "", r"time.end_s: is missing; write a number"),
-        ("P_set0_pu = 0.647", "P_set0_pu = 64.7", r"plant.P_set0_pu: 64.7 pu .* did you mean 0.647 \(64.7 %\)\?"),
-        ("P_set0_pu = 0.647", "P_set0_pu = 388200", r"plant.P_set0_pu: .* neither kW nor V"),
-        ("P_set0_pu = 0.647", "P_set0_kW = 388", r"plant.P_set0_kW: unknown key; write P_set0_pu, per unit"),
-        ("seed = 1 ", "seed = -1 ", r"seed: a seed must not be negative, got -1"),
-        (
-            'title = "no control"',
-            r'title = "no \u001b[31m"',
-            r"case.I.title: has characters that cannot be printed: 'no \\x1b",
-        ),
-        ("k_p = 0.0007", "k_p = 0", r"gains.k_p: gain k_p must be above 0, got 0"),
-        ("k_q = 0.25", "k_q = -1.0", r"gains.k_q: gain k_q must be above 0, got -1"),
-        ("alpha = 1.0", "alpha = -1.0", r"gains.alpha: gain alpha must not be negative, got -1"),
-        (
-            "[gains]",
-            "[degraded_communication]\nmax_age_s = 250\n[gains]",
-            r"degraded_communication.max_age_s: 250 s .* did you mean 0.25 \(250 ms\)",
-        ),
-        (
-            "[gains]",
-            "[degraded_communication]\nT_age = 0.2\n[gains]",
-            r"degraded_communication.T_age: unknown key; write T_age_s, in seconds",
-        ),
-        (
-            "[gains]",
-            '[degraded_communication]\nstale = "skp"\n[gains]',
-            r'degraded_communication.stale: there is no "skp"; did you mean "skip"\?',
-        ),
-        (
-            "[gains]",
-            "[gains]\nkappa_c = 9.0",
-            r"gains.kappa_c: unknown key here; it belongs into \[degraded_communication\]",
-        ),
         ("[gains]", "[gains]\nT_c_s = 0.02", r"gains.T_c_s: unknown key here; it belongs into \[time\]"),
-        ("t_s = 4.0", "t_s = 9.0", r"event\[1\].t_s: event \"event2\" at 9 s does not come before the end at 7 s"),
         ("t_s = 4.0", "t_s = 4.001", r"event\[1\].t_s: 4.001 s is not a multiple of h_s = 0.002 s"),
-        ("t_s = 4.0", "t_s = 0.5", r"event\[1\].t_s: .* write events in the order of time"),
-        ("t_s = 4.0", "t_s = 1.002", r"event\[1\].t_s: .* no recorded row lies between"),
-        ('"event2"           #', '"event1"           #', r'event\[1\].label: there is an event "event1" already'),
         ('"60-160"', '"60-161"', r'event\[1\].open: no switch "60-161"; did you mean "60-160"\?'),
-        ('"60-160"', '"60-999"', r'event\[1\].open: no switch "60-999" \(there is no bus 999\)'),
         ('"60-160"', '"13-152"', r'event\[1\].open: switch "13-152" is open already at 4 s'),
-        ('["60-160"]', '"60-160"', r'event\[1\].open: must be a list such as \["13-152"\], got "60-160"'),
-        ('open = ["60-160"]', "", r'event\[1\]: event "event2" does nothing'),
-        ('["60-160"]', '["60-160"]\nsynchronised = true', r"event\[1\].synchronised: .* closes no switch"),
-        ("[gains]", "[plant.sync_check]\nangle_deg = 200\n[gains]", r"plant.sync_check.angle_deg: 200 deg is not"),
         ('graph = "full"', 'graph = "mesh"', r'case.IV.graph: there is no graph "mesh"; the graphs are full, none'),
-        ('graph = "full"', 'graph = "links"', r'case.IV.graph: graph "links" needs the key links'),
-        ('graph = "full"', 'graph = "links"\nlinks = [["inv1", "inv12"]]', r'links\[0\]: no inverter "inv12"; did you'),
-        ('graph = "full"', 'graph = "full"\nlinks = [["inv1", "inv2"]]', r'the graph is "full"; write graph = "links"'),
         ('secondary = "all"', 'secondary = "GFMs"', r'case.IV.secondary: there is no "GFMs"; did you mean "GFM"\?'),
         ("[case.IV]", '[case."a/b"]', r'case.a/b: name "a/b" must be up to 31 letters'),
-        ("[case.IV]", "[case.log]", r"case.log: a case's folder stands beside log, plots, .*; name it otherwise"),
-        ('load_set = "event2"', 'load_set = "event3"', r'plant.load_set: load set "event3": no such set'),
         ('feeder = "microgrid123"', 'feeder = "microgrid"', r'plant.feeder: feeder "microgrid": no such feeder'),
         ('feeder = "microgrid123"', 'feeder = "standard123"', r"(?s)plant.(feeder|load_set): "),
         (
@@ -106,37 +51,10 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
             'paper = "islands"',
             r'paper: there is no benchmark "islands"; did you mean',
         ),
-        ("[plant]", "[plant.gfm]\nT_p = 0.01\n\n[plant]", r"plant.gfm.T_p: unknown key; write T_p_s, in seconds"),
-        ("[plant]", "[plant.gfm]\nP_max_pu = 100\n\n[plant]", r"plant.gfm.P_max_pu: .* did you mean 1 \(100 %\)\?"),
-        (
-            "[plant]",
-            "[plant.gfm]\nP_max_pu = 0.6\n\n[plant]",
-            r"plant.P_set0_pu: 0.647 pu is above plant.gfm.P_max_pu = 0.6 pu.*inv1 388.2 of 360, .* kW\); lower",
-        ),
-        (
-            "[plant]",
-            "[plant.gfl]\nP_max_pu = 0.6\n\n[plant]",
-            r"plant.P_set0_pu: 0.647 pu is above plant.gfl.P_max_pu = 0.6 pu.*inv2 226.45 of 210, .* kW\)",
-        ),
         (
             "[plant]",
             "[plant.gfm]\nP_min_pu = 0.7\n\n[plant]",
             r"plant.P_set0_pu: 0.647 pu is below plant.gfm.P_min_pu = 0.7 pu.*raise P_set0_pu",
-        ),
-        (
-            "[plant]",
-            '[protection]\ncategory = "IV"\n\n[plant]',
-            r'protection.category: there is no "IV"; .* II, III, off',
-        ),
-        (
-            "[plant]",
-            "[protection]\ntrips = { UV3 = [0.5, 0.1] }\n\n[plant]",
-            r'protection.trips: no trip function "UV3"; did you mean "UV[12]"',
-        ),
-        (
-            "[plant]",
-            "[protection]\ntrips = { UV2 = [1.2, 0.1] }\n\n[plant]",
-            r"protection.trips: UV2 must be between 0 and 1 pu, got 1.2 pu",
         ),
         (
             "[plant]",
@@ -148,7 +66,6 @@ ISLANDING = (CATALOGUE / "islanding.toml").read_text(encoding="utf-8")
             "[protection]\ntrips = { OF1 = [62.5, 1.0] }\n\n[plant]",
             r"protection.trips: OF2 = 62 Hz must be farther from nominal than OF1 = 62.5 Hz",
         ),
-        ("[plant]", "[plant.gfm]\nE_min_pu = 1.5\n\n[plant]", r"plant.gfm.E_min_pu: 1.5 must be below E_max_pu = 1.25"),
     ],
 )
 def test_each_problem_is_told_with_its_place_and_what_would_be_right(
@@ -285,7 +202,6 @@ def test_a_feeders_problems_are_passed_on(tmp_path: Path) -> None:
         ("seed = 1\nseed = 2\n", r"mine.toml:2: not valid TOML: Cannot overwrite a value"),
         ("", r"mine.toml: time: is missing"),
         ("time = 3\ncase = 4\nevent = 5\n", r"mine.toml:1: time: must be a table"),
-        ("[time]\nend_s = 1.0\n[case]\nIV = 1\n", r"case: must be written as tables \[case.NAME\]"),
         ("[time]\nend_s = 1.0\n", r"case: is missing; write at least one table \[case.NAME\]"),
         ("[time]\nend_s = 1.0\n[case]\n", r"case: there is no case; write at least one table"),
     ],
