@@ -43,11 +43,14 @@ class Problems:
         self._changed = changed
         self._lines = lines_of_keys(text)
         self._found: list[tuple[int, str]] = []
+        self.noted: list[tuple[str, str]] = []
+        """Key and text of each problem; "" is the key of one that says itself where it is."""
         self._paths: set[str] = set()
 
     def add(self, path: str, text: str) -> None:
         """Note a problem at a key, e.g. `time.T_c_s`; "" is the file as a whole."""
         self._paths.add(path)
+        self.noted.append((path, text))
         within = any(path == key or path.startswith((f"{key}.", f"{key}[")) for key in self._changed)
         around = path not in self._lines and any(key.startswith((f"{path}.", f"{path}[")) for key in self._changed)
         if within or around:
@@ -71,6 +74,7 @@ class Problems:
     def add_plain(self, text: str) -> None:
         """Note a problem that says itself where it is, as a feeder's do."""
         self._found.append((0, text))
+        self.noted.append(("", text))
 
     def touch(self, *paths: str) -> bool:
         """Whether a problem was noted at one of these keys, which makes a check that relates them idle."""

@@ -86,20 +86,6 @@ class BaseScenario(NamedTuple):
     feeder: Feeder
 
 
-class _SampleProblems(Problems):
-    def __init__(self) -> None:
-        super().__init__("")
-        self.noted: list[tuple[str, str]] = []
-
-    def add(self, path: str, text: str) -> None:
-        super().add(path, text)
-        self.noted.append((path, text))
-
-    def add_plain(self, text: str) -> None:
-        super().add_plain(text)
-        self.noted.append(("", text))
-
-
 def checked_runs(
     base: BaseScenario,
     fixed: Mapping[str, Any],
@@ -117,7 +103,7 @@ def checked_runs(
     wrong: dict[tuple[str, str], list[int]] = {}
     reader = lru_cache(maxsize=None)(read_feeder)
     for i, setting in enumerate(settings):
-        tree, noted = copy.deepcopy(base.tree), _SampleProblems()
+        tree, noted = copy.deepcopy(base.tree), Problems("")
         for path, value in {**fixed, **setting.put}.items():
             try:
                 put(tree, path, copy.deepcopy(value))
