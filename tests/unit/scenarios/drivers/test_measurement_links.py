@@ -1,4 +1,4 @@
-"""Faults on the link from the plant to an agent, in simulated time: an agent that has no measurement stands still."""
+"""Agents without measurements over bad links, and newcomers after a predecessor."""
 
 from __future__ import annotations
 
@@ -7,11 +7,17 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.agents.agent import Agent
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import Netem
+from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
+from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
-from tests.toy.toy_configs import Schedule, toy_configs
+from gridpeers.wire.codec import encode
+from gridpeers.wire.keys import Keys
+from gridpeers.wire.messages import State
+from tests.toy.toy_configs import Schedule, agent_config, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
 Rows = list[tuple[float, ...]]
@@ -81,3 +87,79 @@ def test_the_neighbours_of_a_standing_agent_do_not_use_what_it_says_for_the_lock
     run_inprocess(plant, muted, lambda message: silent.extend(message.rows), plant=ToyPlant(plant))
 
     assert standing == silent
+
+
+LATE = EmulationConfig(
+    netem=Netem(links=(Fault(on="inv2 -> plant", delay=0.3),)),
+    microgrids={f"inv{i}": "mg1" for i in range(1, 4)},
+).to_tree()
+"""States of inv2 take 0.3 s to the plant."""
+
+KEYS = Keys("toy")
+
+
+class Holding(ToyPlant):
+    """A plant that remembers whose set-points it was told to hold, and when."""
+
+    held: list[tuple[float, str, float]]
+
+    def hold(self, name: str, P_set: float, V_set: float) -> None:
+        """Note it."""
+        self.held = [*getattr(self, "held", []), (self._t, name, P_set)]
+        super().hold(name, P_set, V_set)
+
+
+def test_in_simulated_time_a_newcomer_is_not_given_its_predecessors_set_points() -> None:
+    """inv2 leaves at 0.2 s and is back at 0.3 s; what its former life said until 0.2 s is due till 0.5 s."""
+    plant, agents = toy_configs(3, end=1.0, schedule=((0.2, "inv2", "leave"), (0.3, "inv2", "join")))
+    plant, agents = replace(plant, links=LATE), tuple(replace(agent, links=LATE) for agent in agents)
+    toy = Holding(plant)
+    outcome = run_inprocess(plant, agents, lambda telemetry: None, plant=toy)
+    held = [t for t, name, _ in toy.held if name == "inv2"]
+
+    assert outcome.broke == ""
+    assert outcome.reproducible
+    assert [t for t in held if 0.3 <= t < 0.6 - 1e-9] == []
+    assert held[-1] == pytest.approx(0.98)
+
+
+def test_in_wall_clock_time_a_ghost_is_not_held_and_does_not_block_the_newcomer() -> None:
+    """The new process counts from 0, in an epoch that is even lower; only what it says is held, once it is there."""
+    config, _ = toy_configs(3, end=9.0)
+    config = replace(config, clock="wall", links=LATE)
+    toy, now = Holding(config), 50.0
+    plant = RealtimePlant(config, toy, links_of("plant", LATE))
+    plant.start(now)
+
+    def join(name: str, instance: str, epoch: int) -> None:
+        plant.appeared(KEYS.alive_agent(name, instance), now)
+        plate = replace(Agent(agent_config(name)).nameplate, epoch=epoch)
+        plant.received(KEYS.nameplate(name, instance), encode(plate), now)
+
+    def step(said: State) -> None:
+        nonlocal now
+        plant.received(KEYS.state("inv2"), encode(said), now)
+        while plant.work(now):
+            pass
+        now = plant.deadline
+        plant.expire(now)
+        plant.take_actions()
+
+    def said(epoch: int, seq: int) -> State:
+        P_set = 11e3 if epoch == 9 else 22e3
+        return State(sender="inv2", epoch=epoch, seq=seq, t=0.0, P_set=P_set, V_set=277.0, Q=0.0)
+
+    for name in ("inv1", "inv2", "inv3"):
+        join(name, "a", 9)
+    for k in range(30):
+        step(said(9, 1000 + k))
+    plant.vanished(KEYS.alive_agent("inv2", "a"), now)
+    plant.take_actions()
+    join("inv2", "b", 4)
+    t = plant.t
+    for k in range(40):
+        step(said(4, k))
+    after = [(at, P_set) for at, _, P_set in toy.held if at >= t]
+
+    assert {P_set for _, P_set in after} == {22e3}
+    assert after[0][0] == pytest.approx(t + 0.3, abs=0.05)

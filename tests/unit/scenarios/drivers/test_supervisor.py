@@ -1,17 +1,108 @@
-"""Process faults of a scenario, injected by the run time that telemetry has."""
+"""Processes of a run: where they listen, how they are ended, and faults that a scenario injects."""
 
 from __future__ import annotations
 
-from typing import Any
+import signal
+import socket
+from typing import Any, cast
 
 import pytest
 from msgspec.structs import replace
 
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.scenarios.drivers import supervisor
+from gridpeers.scenarios.drivers.children import Child, Children
+from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint
 from gridpeers.scenarios.drivers.supervisor import FaultInjector
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from tests.toy.toy_configs import toy_configs
+
+
+def test_a_port_in_use_is_told_before_anything_starts() -> None:
+    """The endpoint, the reason and the two ways out."""
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        text = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+
+        with pytest.raises(
+            ListenError,
+            match=f"--listen: {text} cannot be listened on: address already in use; end what.* kill -CONT",
+        ):
+            free_endpoint(text, option="--listen")
+
+
+def test_port_0_becomes_a_free_port() -> None:
+    """The endpoint to be told to others has a number."""
+    assert int(free_endpoint("tcp/127.0.0.1:0").rpartition(":")[2]) > 0
+
+
+def test_an_address_of_another_machine_cannot_be_listened_on() -> None:
+    """192.0.2.0/24 belongs to nobody: there is nothing to end there, and the line does not say so."""
+    with pytest.raises(
+        ListenError, match=r"cannot be listened on: .*; 192\.0\.2\.1 is no address of this host"
+    ) as told:
+        free_endpoint("tcp/192.0.2.1:7447")
+
+    assert "end what" not in str(told.value)
+
+
+def test_a_name_without_an_address_cannot_be_listened_on() -> None:
+    """The names under .invalid never have one."""
+    with pytest.raises(ListenError, match=r"cannot be listened on: .*; no address is known of lab\.invalid"):
+        free_endpoint("tcp/lab.invalid:7447")
+
+
+class Process:
+    """A process that says what is done to it, and ends when it is waited for, or by the last signal alone."""
+
+    def __init__(self, name: str, said: list[str], *, ends: bool = True) -> None:
+        self.name, self.status = name, cast(int | None, None)
+        self._said, self._ends = said, ends
+
+    def signal(self, number: int) -> None:
+        """Note the signal; the last one ends every process."""
+        self._said.append(f"{signal.Signals(number).name} to {self.name}")
+        if number == signal.SIGKILL:
+            self.status = -number
+
+    def join(self, until: float) -> bool:
+        """End, if it does at all."""
+        if self._ends and self.status is None:
+            self._said.append(f"{self.name} ends")
+            self.status = 0
+        return self.status is not None
+
+    def release(self) -> None:
+        """Close nothing."""
+
+
+def all_of(*processes: Process) -> Children:
+    """The processes of a run."""
+    children = Children()
+    for process in processes:
+        children.add(cast(Child, process))
+    return children
+
+
+def test_agents_are_asked_once_the_plant_has_gone() -> None:
+    """One that is asked while its plant is there leaves, and the record has an inverter off the network at its end."""
+    said: list[str] = []
+    all_of(*(Process(name, said) for name in ("inv1", "plant", "inv2"))).end()
+
+    asked = ["SIGTERM to plant", "plant ends", "SIGTERM to inv1", "SIGTERM to inv2"]
+    assert said == [*asked, "inv1 ends", "inv2 ends"]
+
+
+@pytest.mark.parametrize("plant", [(), ("plant",)])
+def test_whoever_does_not_leave_is_killed(plant: tuple[str, ...]) -> None:
+    """Whether there is a plant or not: every process is asked, and then ended."""
+    said: list[str] = []
+    all_of(*(Process(name, said, ends=False) for name in ("inv1", *plant))).end()
+
+    asked = [*(f"SIGTERM to {name}" for name in plant), "SIGTERM to inv1"]
+    assert said == [*asked, *(f"SIGKILL to {name}" for name in ("inv1", *plant))]
+
 
 MICROGRIDS = {"inv1": "mg1", "inv2": "mg1", "inv3": "mg1"}
 
