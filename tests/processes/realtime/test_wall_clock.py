@@ -166,16 +166,6 @@ def test_a_plant_that_freezes_or_dies_is_held_out_for_and_has_its_agents_again(t
         settled(town)
 
 
-def test_a_start_order_works_in_which_the_plant_is_neither_first_nor_last(tmp_path: Path) -> None:
-    """Agents wait for a plant; the plant waits for agents as long as its configuration says."""
-    with Town(4, tmp_path) as town:
-        town.start("inv3", "inv1", "plant", "inv4", "inv2")
-        town.together(FOUR)
-        settled(town)
-
-        assert [event.subject for event in town.events if "joined" in event.text and event.t > 0.0] == []
-
-
 def test_a_plant_that_waits_for_nobody_has_its_agents_and_a_spare_one_as_they_come(tmp_path: Path) -> None:
     """It starts alone; an agent nobody has heard of brings its inverter on line, and all share with it."""
     with Town(4, tmp_path, spares=("inv4",), wait_for_agents=0.0) as town:
@@ -188,24 +178,6 @@ def test_a_plant_that_waits_for_nobody_has_its_agents_and_a_spare_one_as_they_co
 
         assert settled_without == []
         assert all(town.children[name].status is None for name in FOUR)
-
-
-def test_a_second_agent_of_one_name_is_refused(tmp_path: Path) -> None:
-    """By name, in one line, with exit status 2; the first goes on, and its inverter stays on."""
-    with Town(3, tmp_path).all() as town:
-        first = town.children["inv2"]
-        life = town.status["inv2"].epoch
-        second = town.add("second", ["-m", "gridpeers.agents"], town.agent_configs["inv2"])
-        status = town.until_ended("second")
-        since = town.t
-        town.until(lambda: town.t > since + 0.6, "the run goes on")
-
-        assert status == 2
-        assert "inv2: another agent of this name takes part in run toy already" in second.log.read_text()
-        assert first.status is None
-        assert town.status["inv2"].epoch == life
-        assert not any("disconnected" in event.text for event in town.events)
-        town.together(("inv1", "inv2", "inv3"))
 
 
 def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
@@ -222,36 +194,6 @@ def test_two_runs_side_by_side_do_not_meet(tmp_path: Path) -> None:
 
         b.together(("inv1", "inv2", "inv3"))
         assert [event for event in b.events if "left" in event.text or "died" in event.text] == []
-
-
-def test_commands_reach_a_running_plant(tmp_path: Path) -> None:
-    """Status, stop, open, what there is not, and down, which ends everybody with exit status 0."""
-    with Town(3, tmp_path).all() as town:
-        status = town.command("status").data
-        wrong = town.command("open", "sw7")
-        opened = town.command("open", "sw1")
-        stopped = town.command("stop", "inv2")
-        ended = town.until_ended("inv2")
-        town.until_event("inv2", "inv2 left")
-        again = town.command("stop", "inv2")
-        down = town.command("down")
-
-        assert status["agents"] == ["inv1", "inv2", "inv3"]
-        assert (wrong.ok, wrong.text) == (False, 'no switch "sw7"; switches are sw1')
-        assert (opened.ok, stopped.ok, ended, down.ok) == (True, True, 0, True)
-        assert (again.ok, again.text) == (False, 'no agent "inv2" is running; running are: inv1, inv3')
-        assert [town.until_ended(name) for name in ("inv1", "inv3", "plant")] == [0, 0, 0]
-
-
-def test_an_agent_without_a_plant_ends_after_its_deadline(tmp_path: Path) -> None:
-    """One line with the run, the time and the endpoint; exit status 2."""
-    with Town(3, tmp_path) as town:
-        config = replace(town.agent_configs["inv1"], deadline=0.5)
-        lonely = town.add("inv1", ["-m", "gridpeers.agents"], config)
-
-        assert town.until_ended("inv1") == 2
-        text = lonely.log.read_text()
-        assert "inv1: no plant of run toy within 0.5 s; is the plant of run toy running at tcp/127.0.0.1:" in text
 
 
 def test_a_fleet_runs_in_wall_clock_time_and_a_death_is_only_an_event(tmp_path: Path) -> None:
