@@ -276,14 +276,17 @@ def recorded() -> Recorded:
     return recorder.finish(8.0, plant.record_step)
 
 
-def account(folder: Path, recorded: Recorded, until: float) -> tuple[dict[str, Any], str]:
+def account(folder: Path, recorded: Recorded, until: float, *, figures: bool = False) -> tuple[dict[str, Any], str]:
     """metrics.json and report of a live run that ended then (s)."""
     scenario, feeder = one_case("islanding")
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="live", folder=folder, clock="wall")
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
     whole = msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events)
-    report = write_report(ran, whole, None)
+    with pytest.MonkeyPatch.context() as patch:
+        if not figures:
+            patch.setattr("gridpeers.scenarios.results.plots.run_figures.draw_all", lambda *_: None)
+        report = write_report(ran, whole, None)
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
 
@@ -298,7 +301,7 @@ def test_a_live_run_that_was_left_alone_has_the_numbers_of_its_case(tmp_path: Pa
     found = find(scenario, feeder, {"IV": CaseRecord(history=history, windows=came, events=recorder.events)})
     ran = RunMetrics(scenario=scenario, feeder=feeder, driver="inprocess", folder=tmp_path)
     expected = json.loads(metrics_json(ran, found, {"IV": {}}))["cases"]["IV"]
-    metrics, report = account(tmp_path, recorded, 8.0)
+    metrics, report = account(tmp_path, recorded, 8.0, figures=True)
 
     for event in ("event1", "event2"):
         assert metrics["cases"]["IV"][event] == pytest.approx(expected[event], rel=1e-6)
