@@ -6,13 +6,17 @@ import json
 import math
 import os
 import re
+import select
 import signal
 import subprocess
+import sys
 from pathlib import Path
+from time import monotonic
 
 import pandas
 import pytest
 
+from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from tests.command_line import invoke
 from tests.processes.commands.test_run_command import command
 from tests.processes.terminals import DEADLINE, Desk, Terminal, children_of, wait_for
@@ -314,3 +318,78 @@ def test_a_law_that_fails_in_a_live_run_is_exit_code_1_and_named_by_file_and_lin
     why = r"inv[12] at t = .* s: law mine:Mine \(mine.py:5\): step at t = .* and 1 more"
     up.expect(rf"FAILED  case IV: {why}")
     assert re.match(f"FAILED  case IV: {why}\n", (desk.folder / "here" / "report.txt").read_text())
+
+
+SCRIPT = Path(__file__).parents[3] / "examples" / "live_run.py"
+
+
+def test_a_live_run_is_changed_by_commands_and_read_at_its_end(tmp_path: Path) -> None:
+    """A link is made late, an agent leaves, and the record has both."""
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), free_endpoint()],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=100,
+        check=False,
+    )
+
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "inv2 left; its inverter is off the network" in done.stdout
+    assert "link command 1: inv1 <-> inv4: delay 0.1 s" in done.stdout
+    assert "P of inv2 at the end: 0 W" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["live_run.png"]
+
+
+pty = pytest.importorskip("pty")
+termios = pytest.importorskip("termios")
+
+
+def read_until(file: int, wanted: bytes, deadline: float = 80.0) -> bytes:
+    """Read from a terminal until something has appeared on it."""
+    seen, end = b"", monotonic() + deadline
+    while wanted not in seen:
+        ready, _, _ = select.select([file], [], [], max(0.0, end - monotonic()))
+        assert ready, f"{wanted!r} did not appear; this did: {seen!r}"
+        seen += os.read(file, 65536)
+    return seen
+
+
+def test_watch_is_a_table_until_a_key_quits(tmp_path: Path) -> None:
+    """The table is on the alternate screen; q and Ctrl-C leave it, and echo is on again."""
+    (tmp_path / "calm.toml").write_text('[time]\nend_s = 1.0\n[case.IV]\nsecondary = "all"\ngraph = "full"\n')
+    endpoint = free_endpoint()
+    with Desk(tmp_path, "--run", "lab") as desk:
+        desk.open("plant", "calm.toml", "--listen", endpoint, "--wait", "0").expect("t = 0; speed")
+        for key, status in ((b"q", 0), (b"", 130)):
+            master, slave = pty.openpty()
+            before = termios.tcgetattr(slave)
+            words = [sys.executable, "-P", "-c", "from gridpeers.cli.app import main; main()", "watch", "--run", "lab"]
+            watch = subprocess.Popen(
+                [*words, "--connect", endpoint],
+                stdin=slave,
+                stdout=slave,
+                stderr=slave,
+                start_new_session=True,
+                env={**os.environ, "TERM": "xterm-256color", "COLUMNS": "150", "LINES": "40"},
+            )
+            try:
+                seen = read_until(master, b"q: quit")
+                if key:
+                    os.write(master, key)
+                else:
+                    watch.send_signal(signal.SIGINT)
+                read_until(master, b"\x1b[?1049l")  # back from the alternate screen
+                code = watch.wait(80)
+            finally:
+                if watch.poll() is None:
+                    watch.kill()
+                    watch.wait()
+            after = termios.tcgetattr(slave)
+            os.close(slave)
+            os.close(master)
+
+            assert code == status
+            assert b"\x1b[?1049h" in seen
+            assert b"inv10" in seen
+            assert after == before

@@ -1,14 +1,21 @@
-"""Sweep files: what they come to, and that every problem in them is told at once, before anything starts."""
+"""From a sweep file to its runs: axes, random graphs, and all that is wrong with it."""
 
 from __future__ import annotations
 
+import random
+from collections import Counter
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
 
 from gridpeers.scenarios.schema import ScenarioError
+from gridpeers.scenarios.sweep.axes import Edges, algebraic_connectivity, connected_graph, connected_graphs
 from gridpeers.scenarios.sweep.paths import PathError, put
 from gridpeers.scenarios.sweep.sweep_reading import read_sweep, sweeps
 from tests.unit.scenarios.sweep.conftest import Write
@@ -199,3 +206,47 @@ def test_any_key_of_a_tree_can_be_set_that_a_later_version_may_know() -> None:
     assert tree == {"link": [{"delay": 0.0, "loss": {"p": 0.1}}], "netem": {"window_s": 2.0}}
     with pytest.raises(PathError, match=r"there is no link\[1\]; there is link\[0\] alone"):
         put(tree, "link[1].delay", 0.1)
+
+
+@settings(max_examples=100)
+@given(n=st.integers(2, 12), part=st.floats(0.0, 1.0), seed=st.integers(0, 10**6))
+def test_a_drawn_graph_is_connected_and_has_its_links(n: int, part: float, seed: int) -> None:
+    """From a tree to all pairs: so many different links, all nodes within reach of each other (lambda_2 > 0)."""
+    links = n - 1 + int(part * (n * (n - 1) // 2 - n + 1))
+
+    edges = connected_graph(n, links, random.Random(seed))
+
+    assert len(set(edges)) == links
+    assert all(0 <= i < j < n for i, j in edges)
+    assert algebraic_connectivity(n, edges) > 1e-6
+
+
+def _trees(n: int, edges: Edges) -> int:
+    """Spanning trees of a graph by trying all sets of n - 1 links: the form that everybody can check."""
+    return sum(algebraic_connectivity(n, some) > 1e-6 for some in combinations(edges, n - 1))
+
+
+def test_a_graphs_probability_is_proportional_to_the_number_of_its_spanning_trees() -> None:
+    """The law that the module tells: all 15 connected graphs of 4 nodes and 4 links, by chi-square."""
+    pairs = tuple(combinations(range(4), 2))
+    graphs = [edges for edges in combinations(pairs, 4) if algebraic_connectivity(4, edges) > 1e-6]
+    weights = np.array([_trees(4, edges) for edges in graphs], dtype=float)
+    rng = random.Random(20)
+
+    counts = Counter(connected_graph(4, 4, rng) for _ in range(4000))
+
+    assert len(graphs) == 15
+    assert set(weights) == {3.0, 4.0}
+    observed = [counts[edges] for edges in graphs]
+    assert chisquare(observed, 4000 * weights / weights.sum()).pvalue > 0.01
+    assert chisquare(observed).pvalue < 0.01  # and not uniform, so that the test can tell
+
+
+def test_graphs_of_a_count_differ_and_stay_when_more_are_asked_for() -> None:
+    """No graph is run twice; asking for more, or for other counts, redraws none; with all links there is one."""
+    few, many = connected_graphs(9, 34, 5, seed=3), connected_graphs(9, 34, 20, seed=3)
+
+    assert len(set(many)) == 20
+    assert many[:5] == few
+    assert connected_graphs(9, 34, 5, seed=4) != few
+    assert [len(connected_graphs(3, links, 10, seed=1)) for links in (2, 3)] == [3, 1]
