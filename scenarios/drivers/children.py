@@ -14,7 +14,6 @@ import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic
-from typing import IO
 
 import msgspec
 
@@ -57,7 +56,10 @@ class Child:
         self.name, self.log = name, log
         words = [*command, LEASH, name]  # the name is for people who look at ps
         with log.open("wb") as stderr:
-            self._process = self._forked(server, words, stderr, speaks=on_word is not None) or subprocess.Popen(
+            forked: ForkedProcess | None = None
+            with contextlib.suppress(ForkServerError):
+                forked = None if server is None else server.fork(words[1:], stderr, speaks=on_word is not None)
+            self._process = forked or subprocess.Popen(
                 # -P: a folder named like one of our packages, where the user stands, must not be imported instead
                 [sys.executable, "-P", *words],
                 stdin=subprocess.PIPE,
@@ -71,12 +73,6 @@ class Child:
             self._process.stdin.flush()
         self._watcher = threading.Thread(target=self._watch, args=(on_exit, on_word), daemon=True)
         self._watcher.start()
-
-    @staticmethod
-    def _forked(server: ForkServer | None, words: list[str], log: IO[bytes], *, speaks: bool) -> ForkedProcess | None:
-        with contextlib.suppress(ForkServerError):
-            return None if server is None else server.fork(words[1:], log, speaks=speaks)
-        return None
 
     def _watch(self, on_exit: Callable[[Child], None], on_word: Callable[[str], None] | None) -> None:
         if on_word is not None and self._process.stdout is not None:

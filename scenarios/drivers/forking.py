@@ -15,7 +15,7 @@ import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType, TracebackType
-from typing import IO, Any, NamedTuple
+from typing import IO, Any
 
 _SET_CHILD_SUBREAPER = 36
 """Option of `prctl(2)`: orphans below this process become its children."""
@@ -155,15 +155,8 @@ _SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
 """Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""
 
 
-class _Surroundings(NamedTuple):
-    """What a server has inherited: once it differs, another server is needed."""
-
-    owner: int
-    folder: Path
-    variables: dict[str, str]
-
-
-_kept: dict[tuple[str, ...], tuple[_Surroundings, ForkServer]] = {}
+_kept: dict[tuple[str, ...], tuple[tuple[int, Path, dict[str, str]], ForkServer]] = {}
+"""By modules: what the server has inherited (owner, folder, variables; once it differs, another is needed), and it."""
 
 
 def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> ForkServer | None:
@@ -199,7 +192,7 @@ def _kept_server(preload: tuple[str, ...], environment: Mapping[str, str] = Mapp
         return None
     variables = {name: value for name, value in os.environ.items() if name not in _SET_BY_US}
     try:
-        surroundings = _Surroundings(os.getpid(), Path.cwd(), variables)
+        surroundings = os.getpid(), Path.cwd(), variables
     except OSError:  # the working directory has been deleted
         return None
     if preload in _kept:
@@ -207,7 +200,7 @@ def _kept_server(preload: tuple[str, ...], environment: Mapping[str, str] = Mapp
         if before == surroundings and server.lives:
             return server
         del _kept[preload]
-        if before.owner == surroundings.owner:  # else it is the server of the process that has forked this one
+        if before[0] == surroundings[0]:  # else it is the server of the process that has forked this one
             server.close()
     try:
         server = ForkServer(preload, environment)

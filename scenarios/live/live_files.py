@@ -6,9 +6,9 @@ import platform
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -25,7 +25,6 @@ from gridpeers.scenarios.results.run_files import (
     new_folder,
     refusal,
     set_broken,
-    set_complete,
     shown,
     write_whole,
 )
@@ -80,26 +79,11 @@ def ended_scenario(scenario: ScenarioModel, ended: float) -> tuple[ScenarioModel
     return changed, tuple(remarks)
 
 
-@dataclass(frozen=True)
-class Folders:
+class Folders(NamedTuple):
     logs: Path
     record: Path | None = None
     """For the files of the record, a folder in the run folder; None if nothing is recorded."""
     whole: Path | None = None
-
-    def complete(self, *missing: str) -> None:
-        """Write to status.txt that the folder is complete, and sentences on what is missing beside."""
-        if self.whole is not None:
-            set_complete(self.whole, filter(None, missing))
-
-    def write_end(self, scenario: ScenarioModel, ended: float) -> None:
-        """Write the scenario anew, as long as the run was, which ended at a run time (s)."""
-        if self.whole is not None:
-            _write_scenario(self.whole, *ended_scenario(scenario, ended))
-
-    def broken(self, why: str) -> None:
-        if self.whole is not None:
-            set_broken(self.whole, why)
 
 
 AS_BEGUN = "A live run begins with it; how long it lasted, and what people did, is in events.csv and run.mcap."
@@ -117,7 +101,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
         return
     whole = new_folder(out, scenario.name, datetime.now().astimezone())
     try:
-        _write_scenario(whole, scenario, [AS_BEGUN])
+        write_scenario(whole, scenario, [AS_BEGUN])
         (whole / "log").mkdir()
     except OSError as error:
         why = refusal(whole, error)
@@ -127,7 +111,7 @@ def folders(out: Path | None, scenario: ScenarioModel) -> Iterator[Folders]:
     yield Folders(whole / "log", whole / case, whole)
 
 
-def _write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]) -> None:
+def write_scenario(folder: Path, scenario: ScenarioModel, remarks: Iterable[str]) -> None:
     write_whole(folder / "scenario.toml", to_toml(scenario, {"driver": LIVE} | versions(), remarks))
 
 

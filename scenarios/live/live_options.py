@@ -114,7 +114,11 @@ def configure(
 
     The plant connects to the endpoints `beyond` itself, e.g. a Zenoh router. UsageError if an option cannot be used.
     """
-    _check(options)
+    least, greatest = SPEEDS
+    if not least <= options.speed <= greatest:
+        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {options.speed:g}")
+    check_wait(options.wait)
+    check_duration(options.duration)
     if scenario.plant.simulator != "gridpeers":
         raise UsageError(
             f'plant.simulator = "{scenario.plant.simulator}": keeps no real time; use {command_line("run")}, '
@@ -172,11 +176,3 @@ def _spares(feeder: Feeder, like: AgentConfig) -> Iterator[AgentConfig]:
             m_p=row.m_p,
             m_q=row.m_q,
         )
-
-
-def _check(options: LiveOptions) -> None:
-    least, greatest = SPEEDS
-    if not least <= options.speed <= greatest:
-        raise UsageError(f"--speed: must be from {least:g} to {greatest:g} (1 is real time), got {options.speed:g}")
-    check_wait(options.wait)
-    check_duration(options.duration)

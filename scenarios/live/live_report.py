@@ -14,7 +14,7 @@ from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
 from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
-from gridpeers.scenarios.live.live_files import Folders
+from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, late_moves
@@ -26,7 +26,7 @@ from gridpeers.scenarios.results.plots.drawing import Drawing, Mark, drawing_of
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.recorded_events import law_failures
 from gridpeers.scenarios.results.report import RunReport, plain, show
-from gridpeers.scenarios.results.run_files import shown, write_whole
+from gridpeers.scenarios.results.run_files import set_broken, set_complete, shown, write_whole
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.driver.drive import StoppedError
 from gridpeers.wire.messages import Pacing, PlantEvent
@@ -99,9 +99,7 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None)
     write_whole(metrics.folder / FILE, verdicts_json(checks))
     write_whole(metrics.folder / "report.txt", plain(report))
     stop.end()
-    from gridpeers.scenarios.results.plots.run_figures import (
-        draw_all,  # matplotlib takes longer to import than all else
-    )
+    from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
 
     draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")
     return report
@@ -162,23 +160,26 @@ def _named(windows: Iterable[Window]) -> str:
     return ", ".join(f"{window.label} ({window.start:g} to {window.end:g} s)" for window in windows)
 
 
-def conclude(outcome: ProcessOutcome, metrics: RunMetrics, folders: Folders) -> ProcessOutcome:
+def conclude(outcome: ProcessOutcome, metrics: RunMetrics) -> ProcessOutcome:
     """Write and show the report of a run that has ended, and note in its folder how it ended.
 
     Ctrl-C and SIGTERM are good ends of a live run. Only a second one leaves it without numbers.
     """
-    if outcome.broke or outcome.recorded is None:
-        folders.broken(outcome.broke or "no whole record")
+    folder, recorded = metrics.folder, outcome.recorded
+    if outcome.broke or recorded is None:
+        set_broken(folder, outcome.broke or "no whole record")
         return outcome
     try:
-        folders.write_end(metrics.scenario, outcome.recorded.ended)  # first: a signal may end what follows
-        show(write_report(metrics, outcome.recorded, outcome.pacing), terminal())
-        folders.complete(outcome.recorded.record_failure)
+        write_scenario(
+            folder, *ended_scenario(metrics.scenario, recorded.ended)
+        )  # first: a signal may end what follows
+        show(write_report(metrics, recorded, outcome.pacing), terminal())
+        set_complete(folder, filter(None, [recorded.record_failure]))
     except (StoppedError, KeyboardInterrupt) as stop:
-        folders.broken("interrupted while its numbers were made")
+        set_broken(folder, "interrupted while its numbers were made")
         return replace(outcome, interrupted=str(stop) or "SIGINT")
     except OSError as error:
         broke = f"its numbers cannot be written: {error.strerror or error}"
-        folders.broken(broke)
+        set_broken(folder, broke)
         return replace(outcome, broke=broke)
     return outcome

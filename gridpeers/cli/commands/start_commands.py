@@ -146,7 +146,7 @@ def _start(
                 metrics = RunMetrics(
                     scenario=spec, feeder=feeder, driver=LIVE, folder=kept.whole, clock="wall", speed=speed
                 )
-                outcome = conclude(outcome, metrics, kept)
+                outcome = conclude(outcome, metrics)
             elif outcome.failed_laws:
                 typer.secho(f"FAILED  {first_of(law_failures(outcome.failed_laws))}", fg="red", bold=True)
         stopped = ended_by_a_law(spec.on_law_failure, outcome.failed_laws)

@@ -19,7 +19,14 @@ from gridpeers.netem.schema.pattern import Link, links_among
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.emulation.link_data import LinkCommand
 from gridpeers.scenarios.live import live_report
-from gridpeers.scenarios.live.live_files import LinkLog, check_new, ended_scenario, folders, replay_lines
+from gridpeers.scenarios.live.live_files import (
+    LinkLog,
+    check_new,
+    ended_scenario,
+    folders,
+    replay_lines,
+    write_scenario,
+)
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
 from gridpeers.scenarios.live.run_address import UsageError
 from gridpeers.scenarios.results.metrics_file import RunMetrics
@@ -51,8 +58,10 @@ def test_the_folder_of_a_live_run_has_a_scenario_that_is_as_long(
         partitions=(Partition(by="halves", from_s=6.5, to_s=6.8),),
         nodes=(NodeFault(name="inv2", from_s=6.0, kill=True),),
     )
-    with folders(tmp_path / "live", islanding(netem=late, P_max_kW={"event2": {"inv2": 200.0}})) as kept:
-        kept.write_end(islanding(netem=late, P_max_kW={"event2": {"inv2": 200.0}}), ended)
+    scenario = islanding(netem=late, P_max_kW={"event2": {"inv2": 200.0}})
+    with folders(tmp_path / "live", scenario) as kept:
+        assert kept.whole == tmp_path / "live"
+        write_scenario(kept.whole, *ended_scenario(scenario, ended))
 
     file = tmp_path / "live" / "scenario.toml"
     again, _ = load_scenario(file)  # which refuses what it could not run
@@ -92,8 +101,8 @@ def test_a_run_that_is_interrupted_while_it_is_judged_has_its_length_in_its_scen
     monkeypatch.setattr(live_report, "write_report", interrupted)
     outcome = ProcessOutcome(recorded=cast(Recorded, SimpleNamespace(ended=2.01)))
     with folders(tmp_path / "live", islanding()) as kept:
-        metrics = cast(RunMetrics, SimpleNamespace(scenario=islanding()))
-        ended = live_report.conclude(outcome, metrics, kept)
+        metrics = cast(RunMetrics, SimpleNamespace(scenario=islanding(), folder=kept.whole))
+        ended = live_report.conclude(outcome, metrics)
 
     again, _ = load_scenario(tmp_path / "live" / "scenario.toml")
     assert again.time.end_s == 2.02
