@@ -68,7 +68,7 @@ def _in_short(event: PlantEvent) -> str:
     return f"{match[1]} {PRESENT[match[2]]}" if match else ""
 
 
-def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None) -> RunReport:
+def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None, *, figures: bool = True) -> RunReport:
     """Measure the record of a live run of one case; write metrics.json, report.txt and figures into its folder.
 
     It judges no claim of the paper, as people may have changed the run. StoppedError or KeyboardInterrupt if a signal
@@ -99,6 +99,8 @@ def write_report(metrics: RunMetrics, recorded: Recorded, pacing: Pacing | None)
     write_whole(metrics.folder / FILE, verdicts_json(checks))
     write_whole(metrics.folder / "report.txt", plain(report))
     stop.end()
+    if not figures:
+        return report
     from gridpeers.scenarios.results.plots.run_figures import draw_all  # matplotlib takes longest to import
 
     draw_all(live_drawing(departures, scenario, feeder, record.history, recorded.events), metrics.folder / "plots")

@@ -283,10 +283,7 @@ def account(folder: Path, recorded: Recorded, until: float, *, figures: bool = F
     rows = [row for row in recorded.rows if row[0] <= until]
     events = tuple(event for event in recorded.events if event.t <= until)
     whole = msgspec.structs.replace(recorded, rows=rows, ended=rows[-1][0], events=events)
-    with pytest.MonkeyPatch.context() as patch:
-        if not figures:
-            patch.setattr("gridpeers.scenarios.results.plots.run_figures.draw_all", lambda *_: None)
-        report = write_report(ran, whole, None)
+    report = write_report(ran, whole, None, figures=figures)
     return json.loads((folder / "metrics.json").read_text()), plain(report)
 
 
