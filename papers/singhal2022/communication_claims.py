@@ -1,10 +1,21 @@
-"""The paper's claims on reduced communication and of a link failure (its section 4, Table IV)."""
+"""The paper's claims on communication: fewer links, a link failure (Table IV), and random graphs (its section 4)."""
 
 from __future__ import annotations
 
-from gridpeers.benchmarks import Findings
+from dataclasses import dataclass
+from statistics import median
+
+from gridpeers.benchmarks import MPSI_BAND, Findings, Settling, Steady
 from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, seconds
-from gridpeers.papers.singhal2022.tables import REDUCED_MQSI, SAME_END, SAME_V, SLOWER_LEAST, SLOWER_MOST
+from gridpeers.papers.singhal2022.tables import (
+    FEW_LINKS,
+    REDUCED_MQSI,
+    SAME_END,
+    SAME_V,
+    SLOWER_LEAST,
+    SLOWER_MOST,
+    STEEPER,
+)
 
 EVENT, RETURN = "event1", "return"
 """Labels of the events in the scenario; the paper has the first alone."""
@@ -15,14 +26,14 @@ ROWS = ("full", "reduced", "link-failure")
 UNTUNED, ADAPTIVE = "untuned", "adaptive"
 """The reduced graph with the gains of the full one, and with an alpha that adapts; the paper has no such rows."""
 
-claims = ExperimentClaims("communication", figure="communication", events=(EVENT,))
-claims.column("IV", "f_error_Hz")
-claims.column("IV", "MPSI")
-claims.column("IV", "V_error")
-claims.relative("IV")
+communication = ExperimentClaims("communication", figure="communication", events=(EVENT,))
+communication.column("IV", "f_error_Hz")
+communication.column("IV", "MPSI")
+communication.column("IV", "V_error")
+communication.relative("IV")
 
 
-@claims.add(
+@communication.add(
     f"MQSI: full, then link failure, then reduced, and that below {REDUCED_MQSI.value:g}",
     source="Table IV",
     figure="",
@@ -35,7 +46,7 @@ def MQSI_order(found: Findings) -> tuple[bool, str]:
     return holds, f"full {full:.3f}, link failure {failure:.3f}, reduced {reduced:.3f}"
 
 
-@claims.add(
+@communication.add(
     "re-tuned alpha and beta more than halve the MQSI of the reduced graph",
     source="section 4, text of Table IV (ours: the paper shows no untuned row)",
     cases=(UNTUNED, "reduced"),
@@ -49,7 +60,7 @@ def re_tuning_pays(found: Findings) -> tuple[bool, str]:
     return after.MQSI < 0.5 * before.MQSI, shown
 
 
-@claims.add(
+@communication.add(
     "an alpha that grows with the voltage error shares vars better still, at the same V_error",
     source="ours: the paper mentions adaptive weights and gives none",
     cases=("reduced", ADAPTIVE),
@@ -62,7 +73,7 @@ def adaptive_alpha_pays(found: Findings) -> tuple[bool, str]:
     return holds, f"{shown}; V_error {fixed.V_error:.4f}, {adaptive.V_error:.4f} pu"
 
 
-@claims.add(
+@communication.add(
     "steady f and MPSI do not depend on the links",
     source="section 4, Table IV and figure",
     cases=ROWS,
@@ -76,7 +87,7 @@ def same_steady_state(found: Findings) -> tuple[bool, str]:
     return max(f_off, MPSI_off) < SAME_END.value, shown
 
 
-@claims.add(
+@communication.add(
     "reduced needs about 0.5 s more for power sharing to converge",
     source="section 4, figure of reduced communication",
     cases=("full", "reduced"),
@@ -87,7 +98,7 @@ def reduced_is_slower(found: Findings) -> tuple[bool, str]:
     return _slower(found, EVENT)
 
 
-@claims.add(
+@communication.add(
     "the same where powers are unequal: inverter 2 has returned at no load",
     source="ours: the paper does not tell what its figure starts from",
     cases=("full", "reduced"),
@@ -103,3 +114,80 @@ def _slower(found: Findings, event: str) -> tuple[bool, str]:
     if full is None or reduced is None:
         return False, shown
     return SLOWER_LEAST.value <= reduced - full <= SLOWER_MOST.value, shown
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphRun:
+    """A run on one random graph: settling after the event, and steady values."""
+
+    links: int
+    """Links of the graph."""
+    connected: bool
+    """Whether there is a way between any two inverters; a graph with links enough may still lack one."""
+    settled: Settling
+    steady: Steady
+
+
+@dataclass(frozen=True, kw_only=True)
+class GraphFindings(Findings):
+    """Findings of an experiment that is one event over many graphs."""
+
+    graphs: tuple[GraphRun, ...] = ()
+
+
+def graph_runs(found: Findings) -> tuple[GraphRun, ...]:
+    """Return the runs over graphs; none of an experiment that has other findings."""
+    return found.graphs if isinstance(found, GraphFindings) else ()
+
+
+TREE, BEND = 8, int(FEW_LINKS.value)
+"""Links of a tree of nine inverters, with fewer of which no graph is connected; and where the paper's curve bends."""
+
+topology = ExperimentClaims("topology", source="section 4, figure of topologies", figure="topology")
+
+
+def medians(runs: tuple[GraphRun, ...]) -> dict[int, float]:
+    """Return the median time (s) to MPSI < 0.01 by number of links; infinite where most never share."""
+    by_links: dict[int, list[float]] = {}
+    for run in runs:
+        t = run.settled.t_share_s
+        by_links.setdefault(run.links, []).append(float("inf") if t is None else t)
+    return {links: median(by_links[links]) for links in sorted(by_links)}
+
+
+def connected(found: Findings) -> tuple[GraphRun, ...]:
+    """Return the runs on connected graphs."""
+    return tuple(run for run in graph_runs(found) if run.connected)
+
+
+@topology.add("time to MPSI < 0.01 falls with the number of links")
+def more_links_are_faster(found: Findings) -> tuple[bool, str]:
+    times = medians(connected(found))
+    first, last = min(times), max(times)
+    shown = ", ".join(f"{links} links {times[links]:.2f} s" for links in (first, BEND, last))
+    return times[last] < times[BEND] < times[first], shown
+
+
+@topology.add("it rises slowly from 36 down to about 12 links, and sharply toward 8")
+def steepest_at_few_links(found: Findings) -> tuple[bool, str]:
+    times = medians(connected(found))
+    last = max(times)
+    few = (times[TREE] - times[BEND]) / (BEND - TREE)
+    many = (times[BEND] - times[last]) / (last - BEND)
+    shown = f"{1e3 * few:.0f} ms a link from {TREE} to {BEND}, {1e3 * many:.1f} ms from there to {last}"
+    return few > STEEPER.value * many, shown
+
+
+@topology.add("all connected graphs reach the same steady state")
+def same_steady_state_on_every_graph(found: Findings) -> tuple[bool, str]:
+    runs = connected(found)
+    f_error, MPSI = max(run.steady.f_error_Hz for run in runs), max(run.steady.MPSI for run in runs)
+    shown = f"{len(runs)} graphs: abs(f-60) at most {f_error:.4f} Hz, MPSI at most {MPSI:.4f}"
+    return max(f_error, MPSI) < SAME_END.value, shown
+
+
+@topology.add("below 8 links there is no consensus")
+def none_below_8(found: Findings) -> tuple[bool, str]:
+    runs = [run for run in graph_runs(found) if run.links < TREE]
+    least = min((run.steady.MPSI for run in runs), default=0.0)
+    return bool(runs) and least >= MPSI_BAND, f"{len(runs)} graphs: MPSI at least {least:.3f}"

@@ -11,8 +11,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from gridpeers.figures import PAGE
-from gridpeers.papers.singhal2022.tables import MQSI_FACTOR
-from gridpeers.papers.singhal2022.topology_claims import TREE, GraphRun, medians
+from gridpeers.papers.singhal2022.communication_claims import TREE, GraphRun, medians
+from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
+from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, tables_of
 
 LEAST = 1e-6
 """MPSI below this is drawn as this: on an axis of logarithms there is no 0."""
@@ -72,29 +73,29 @@ EventValues = Mapping[tuple[str, str], float]
 """MQSI by case and event."""
 
 
-def var_sharing(
-    paper: EventValues, ours: Mapping[str, EventValues], cases: Sequence[str], events: Sequence[str]
-) -> Figure:
+def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
     """Draw a mark for each variant of ours beside the paper's line, one panel for each event.
 
     Marks and not bars: on an axis of logarithms, which MQSI needs, bars have no foot.
     """
+    cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
+    paper = {(cell.case, cell.event): cell.paper for cell in cells}
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(7.4, 3.6), layout="constrained")
-        (panels,) = figure.subplots(1, len(events), sharey=True, squeeze=False)
-        for panel, event in zip(panels, events, strict=True):
-            for x, case in enumerate(cases):
+        (panels,) = figure.subplots(1, len(EVENTS), sharey=True, squeeze=False)
+        for panel, event in zip(panels, EVENTS, strict=True):
+            for x, case in enumerate(CASES):
                 number = paper[case, event]
                 ends = np.array([number / MQSI_FACTOR.value, number * MQSI_FACTOR.value])
                 panel.fill_between([x - 0.42, x + 0.42], *ends, color="#000000", alpha=0.10, lw=0)
                 panel.hlines(number, x - 0.42, x + 0.42, color="#000000", lw=1.6)
             for number, (variant, values) in enumerate(ours.items()):
-                at = np.arange(len(cases)) + (number - 0.5 * (len(ours) - 1)) * 0.18
-                heights = [values[case, event] for case in cases]
+                at = np.arange(len(CASES)) + (number - 0.5 * (len(ours) - 1)) * 0.18
+                heights = [values[case, event] for case in CASES]
                 marks = {"marker": _MARKERS[number % 4], "color": _COLOURS[number % 4]}
                 panel.plot(at, heights, lw=0, ms=6, mec="#ffffff", mew=0.5, label=variant, **marks)
             panel.set_yscale("log")
-            panel.set_xticks(range(len(cases)), [f"case {case}" for case in cases])
+            panel.set_xticks(range(len(CASES)), [f"case {case}" for case in CASES])
             panel.set_title(f"Var sharing after {event}", loc="left")
             panel.yaxis.set_major_formatter("{x:g}")
             panel.grid(visible=False, axis="x")

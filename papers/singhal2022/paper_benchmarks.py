@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
 from gridpeers.benchmarks import Benchmark, Claim, Findings
-from gridpeers.papers.singhal2022 import communication_claims, islanding_claims, plant_claims, topology_claims
+from gridpeers.papers.singhal2022 import communication_claims, islanding_claims, plant_claims
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable, tables_of
 
 
@@ -97,8 +97,8 @@ def _tables(some: Iterable[ComparedNumber]) -> str:
 CLAIMS: dict[str, tuple[Claim, ...]] = {
     "islanding": islanding_claims.claims.all,
     "intermittency": plant_claims.intermittency.all,
-    "communication": communication_claims.claims.all,
-    "topology": topology_claims.claims.all,
+    "communication": communication_claims.communication.all,
+    "topology": communication_claims.topology.all,
     "plug-n-play": plant_claims.plug_n_play.all,
     "switching": plant_claims.switching.all,
     "wind-up": plant_claims.wind_up.all,

@@ -3,86 +3,88 @@
 from __future__ import annotations
 
 import base64
+import json
+import os
+import platform
 import shutil
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from gridpeers.benchmarks import HEADINGS, Quantity
+from gridpeers.benchmarks import HEADINGS, Quantity, Verdict
 from gridpeers.output_folders import set_status, versions, write_whole
-from gridpeers.papers.singhal2022.paper_benchmarks import headline
-from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, machine, metrics_json
-from gridpeers.papers.singhal2022.reproduce.work import FORMATS, Work
+from gridpeers.papers.singhal2022.communication_claims import graph_runs
+from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, headline, numbers
+from gridpeers.papers.singhal2022.reproduce.parts import SETTINGS
+from gridpeers.papers.singhal2022.reproduce.work import FORMATS, PartResult, Work
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable
 from gridpeers.theory import ScenarioModel
 
 
-def settings(scenarios: dict[str, ScenarioModel]) -> list[tuple[str, str, str]]:
+@dataclass(frozen=True, kw_only=True)
+class Reproduction:
+    """All contents of the report."""
+
+    results: tuple[PartResult, ...]
+    driver: str
+    seed: int
+    started: str
+    """Date and time."""
+
+    @property
+    def verdicts(self) -> list[Verdict]:
+        return [verdict for result in self.results for verdict in result.verdicts]
+
+    @property
+    def wall_s(self) -> float:
+        return sum(result.wall_s for result in self.results)
+
+    @property
+    def cpu_s(self) -> float:
+        return sum(result.cpu_s for result in self.results)
+
+    @property
+    def failed(self) -> bool:
+        """Whether a claim failed that is no known miss. A number out of its tolerance fails the claim on its column."""
+        return any(verdict.status == "FAIL" for verdict in self.verdicts)
+
+    def counts(self) -> dict[str, int]:
+        """Return how many claims have which status."""
+        statuses = [verdict.status for verdict in self.verdicts]
+        return {status: statuses.count(status) for status in dict.fromkeys(("PASS", "FAIL", "MISS", *statuses))}
+
+    @property
+    def numbers(self) -> list[ComparedNumber]:
+        """All numbers of the tables, ours beside the paper's."""
+        return [number for result in self.results for number in numbers(result.found, result.tables)]
+
+    @property
+    def claims(self) -> str:
+        """How many claims hold, in words."""
+        counts = self.counts()
+        held = f"{counts['PASS']} of {len(self.verdicts)} claims hold, {counts['MISS']} missed for a known reason"
+        return f"{held}, {counts['FAIL']} failed."
+
+
+def settings(scenarios: Mapping[str, ScenarioModel]) -> list[tuple[str, str, str]]:
     """Return each setting, its value with the unit, and its reason, for the scenarios of a report by their part."""
-    first = next(iter(scenarios.values()))
-    gains, time, gfm, gfl = first.gains, first.time, first.plant.gfm, first.plant.gfl
+    first, reduced = next(iter(scenarios.values())), scenarios.get("reduced-communication")
     sets: dict[str, list[str]] = {}
     for name, scenario in scenarios.items():
         sets.setdefault(scenario.plant.load_set, []).append(name)
-    rows = [
-        (
-            "places of inverters, capacitors, loads",
-            f"feeder {first.plant.feeder}",
-            "the paper names the IEEE 123-node feeder, but not the buses; plant/data/README.md tells ours",
-        ),
-        (
-            "load set",
-            "; ".join(f'"{load_set}" in {", ".join(names)}' for load_set, names in sets.items()),
-            '"event2" drops 1.35 MW at event 2; 0.14 and 0.07 Hz of Table I together imply 1.365 MW; "main" lets '
-            "each microgrid stand alone",
-        ),
-        ("first P_set", f"{first.plant.P_set0_pu:g} pu", "follows from Table I by algebra: 0.65 pu on every unit"),
-        (
-            "control period T_c",
-            f"{time.T_c_s:g} s",
-            "f, MPSI and V_error do not depend on it, MQSI and speed do: docs/reproduction.md has 5 to 100 ms",
-        ),
-        ("k_p", f"{gains.k_p:g} s", 'm_p / k_p = 14 1/s: the speed that "in less than 1 s" asks for'),
-        (
-            "k_q, alpha, beta",
-            f"{gains.k_q:g}, {gains.alpha:g}, {gains.beta_GFM:g}",
-            "the simplest choice that settles vars within some seconds; the paper's (14) has no weight",
-        ),
-        (
-            "limits of P_set",
-            f"{gains.P_set_min:g} to {gains.P_set_max:g} pu",
-            "the paper has none and accepts wind-up (Remark 2); they act below 200 kW only, see wind-up",
-        ),
-        (
-            "filters",
-            f"GFM {gfm.R_f:g} + j{gfm.X_f:g} pu, GFL {gfl.R_f:g} + j{gfl.X_f:g} pu",
-            "usual values of GridLAB-D's models",
-        ),
-        ("limit of the GFM", f"{gfm.P_max:g} pu", "follows from the 0.08 Hz of cases II and III in Table I"),
-        (
-            "apparent power of the GFL",
-            f"{gfl.S_max:g} pu",
-            "at 1.0 pu nothing would be left for vars above 0.95 pu of real power",
-        ),
-        (
-            "lags of the GFL",
-            f"P {gfl.T_pf:g} s, Q {gfl.T_qf:g} s, V {gfl.T_vf:g} s, f {gfl.T_ff:g} s",
-            "GridLAB-D's defaults for P are too slow for consensus within 1 s",
-        ),
-    ]
-    reduced = scenarios.get("reduced-communication")
-    if reduced is not None:
-        own = reduced.cases["reduced"].gains
-        rows.append(
-            (
-                "re-tuned alpha, beta",
-                f"{own.alpha:g}, {own.beta_GFM:g}",
-                "the best of a grid of 30 points by a rule fixed before (docs/reproduction.md)",
-            )
-        )
+    load_sets = "; ".join(f'"{load_set}" in {", ".join(names)}' for load_set, names in sets.items())
+    rows = []
+    for name, value, why, case in ((one.name, one.value, one.why, one.case) for one in SETTINGS):
+        if not case:
+            gains = first.gains
+        elif reduced is not None:
+            gains = reduced.cases[case].gains
+        else:
+            continue
+        rows.append((name, value.format(gains=gains, plant=first.plant, time=first.time, load_sets=load_sets), why))
     return rows
 
 
@@ -105,24 +107,20 @@ class GridRow(NamedTuple):
     entries: tuple[Entry, ...]
 
 
+_CASES = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
+
+
 def lines(table: PaperTable, result: PartResult) -> tuple[GridRow, ...]:
     """Return the rows of a table, in the paper's order."""
     rows: dict[str, dict[Quantity, Cell]] = {}
-    titles = titles_of(result)
     several = len({cell.event for cell in table.cells}) > 1
     for cell in table.cells:
-        what = f"island of {cell.island}" if cell.island else titles.get(cell.case, cell.case)
+        what = f"island of {cell.island}" if cell.island else f"{cell.case} {_CASES.get(cell.case, '')}".rstrip()
         rows.setdefault(f"{what}, {cell.event}" if several else what, {})[cell.quantity] = cell
     return tuple(
         GridRow(label, tuple(_entry(cells[quantity], result) for quantity in table.quantities))
         for label, cells in rows.items()
     )
-
-
-def titles_of(result: PartResult) -> dict[str, str]:
-    """Return the case names for people."""
-    words = {"I": "no control", "II": "un-coordinated", "III": "GFM-coordinated", "IV": "fully coordinated"}
-    return {case: f"{case} {words[case]}" if case in words else case for case in result.found.results}
 
 
 def tolerances(table: PaperTable) -> list[str]:
@@ -203,3 +201,85 @@ def write(whole: Reproduction, work: Work, folder: Path) -> None:
         write_whole(folder / name, render(f"{name}.jinja", whole, ours))
     write_whole(folder / "metrics.json", metrics_json(whole))
     set_status(folder, "complete")
+
+
+def machine() -> str:
+    """Return processor, its cores that may be used, memory and system."""
+    cpu = platform.processor() or platform.machine()
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
+        cpu = next(line.partition(":")[2].strip() for line in text.splitlines() if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return f"{cpu}, {cores} core{'s' if cores > 1 else ''}; {platform.system()} {platform.release()}"
+
+
+def metrics_json(whole: Reproduction) -> str:
+    """Return the text of metrics.json: every number of the tables beside the paper's, every verdict, every measure."""
+    tables = [_number(result, cell) for result in whole.results for table in result.tables for cell in table.cells]
+    claims = [
+        {
+            "part": result.part.name,
+            "claim": verdict.claim.name,
+            "text": verdict.claim.text,
+            "source": verdict.claim.source,
+            "status": verdict.status,
+            "found": verdict.found,
+            "reason": verdict.claim.known_miss if verdict.status == "MISS" else "",
+        }
+        for result in whole.results
+        for verdict in result.verdicts
+    ]
+    topology = [
+        {
+            "links": run.links,
+            "connected": run.connected,
+            **asdict(run.settled),
+            **{"MPSI": run.steady.MPSI, "f_error_Hz": run.steady.f_error_Hz},
+        }
+        for result in whole.results
+        for run in graph_runs(result.found)
+    ]
+    document = {
+        "driver": whole.driver,
+        "seed": whole.seed,
+        "started": whole.started,
+        "machine": machine(),
+        "versions": versions(),
+        "times_s": {result.part.name: {"wall": result.wall_s, "cpu": result.cpu_s} for result in whole.results},
+        "tables": tables,
+        "claims": claims,
+        "runs": {result.part.name: result.metrics for result in whole.results if result.metrics},
+        "topology": topology,
+    }
+    return json.dumps(_plain(document), indent=2, allow_nan=False) + "\n"
+
+
+def _number(result: PartResult, cell: Cell) -> dict[str, Any]:
+    """Return a number beside the paper's; null where ours is not steady."""
+    reason = result.found.reason(cell)
+    ours = None if reason else result.found.value(cell)
+    return {
+        "table": cell.table,
+        "case": cell.case,
+        "event": cell.event,
+        "island": cell.island,
+        "quantity": cell.quantity,
+        "paper": cell.paper,
+        "ours": ours,
+        **({"reason": reason} if reason else {}),
+        "tolerance": cell.tolerance.value,
+        "within": result.found.within(cell),
+        "within_relative": None if ours is None else cell.within_relative(ours),
+        "within_factor": None if ours is None else cell.within_factor(ours),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return the same with null in place of nan."""
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and value != value else value

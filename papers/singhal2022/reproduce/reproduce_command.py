@@ -26,7 +26,7 @@ from gridpeers.cli.usage import (
 from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, chosen
 
 if TYPE_CHECKING:
-    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
+    from gridpeers.papers.singhal2022.reproduce.report import Reproduction
 
 
 def reproduce(
@@ -69,8 +69,7 @@ def reproduce(
 
     from gridpeers.cli.progress import remaining
     from gridpeers.output_folders import FolderError, OutputLostError, new_folder, refusal, set_broken, shown
-    from gridpeers.papers.singhal2022.reproduce.report import write
-    from gridpeers.papers.singhal2022.reproduce.reproduction import Reproduction
+    from gridpeers.papers.singhal2022.reproduce.report import Reproduction, write
     from gridpeers.papers.singhal2022.reproduce.work import ReproduceDriver, Work
 
     now = datetime.now().astimezone()
@@ -93,7 +92,6 @@ def reproduce(
                 driver=driver,
                 seed=work.seed,
                 started=now.isoformat(sep=" ", timespec="minutes"),
-                only=only or "",
             )
             write(whole, work, folder)
     except gp.ScenarioError as error:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import gridpeers as gp
 from gridpeers.benchmarks import Settling, Steady
 from gridpeers.output_folders import feeder_folder
+from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
-from gridpeers.papers.singhal2022.topology_claims import GraphFindings, GraphRun
 from gridpeers.random_graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
 
 if TYPE_CHECKING:

@@ -3,31 +3,57 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, Literal
 
 import gridpeers as gp
-from gridpeers.benchmarks import Findings, judge
+from gridpeers.benchmarks import Findings, Verdict, judge
 from gridpeers.cli.progress import TellPart as Tell
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
-from gridpeers.papers.singhal2022.reproduce.parts import Part
-from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult
+from gridpeers.papers.singhal2022.reproduce.parts import Part, Picture
 from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, bank_study, graphs, topology_study
-from gridpeers.papers.singhal2022.tables import tables_of
+from gridpeers.papers.singhal2022.tables import PaperTable, tables_of
 from gridpeers.theory import ScenarioModel
 
 if TYPE_CHECKING:
     from gridpeers.figures import Format
 
 ReproduceDriver = Literal["processes", "inprocess"]
-"""How cases are run."""
 
 FORMATS: tuple[Format, ...] = ("png", "pdf", "svg")
 """Files of each figure."""
+
+_STUDIES = ("topology", "var-sharing")
+"""Parts that are many short runs of the islanding, without a folder for each."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartResult:
+    """Findings, verdicts and files of one part."""
+
+    part: Part
+    found: Findings
+    verdicts: Sequence[Verdict]
+    tables: tuple[PaperTable, ...]
+    figures: Mapping[Picture, Path]
+    """Image of each of its figures that the report shows."""
+    sha256: Mapping[str, str]
+    """Hash of each case's history.csv, by case."""
+    metrics: Any
+    """Contents of its metrics.json; None for the topologies."""
+    wall_s: float
+    cpu_s: float
+    """Processor time (s) of all its processes."""
+
+    def verdicts_beside(self, figure: str) -> list[Verdict]:
+        """Return the verdicts to show below a figure, by its key; "" for those of claims without a shown figure."""
+        figured = {picture.key for picture in self.figures}
+        shown = [(one.claim.figure if one.claim.figure in figured else "", one) for one in self.verdicts]
+        return [verdict for key, verdict in shown if key == figure]
 
 
 class Work:
@@ -76,32 +102,34 @@ class Work:
             If a run broke; those before are done, and their folders stay.
         """
         for part in self.parts:
-            with _timed() as took:
-                do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
-                found, sha256, metrics, plots = do(part, tell, figures)
+            wall, cpu = perf_counter(), sum(os.times()[:4])
+            folder = self.folder / part.name
+            if part.name in _STUDIES:
+                folder.mkdir(parents=True)
+            do = {"topology": self._topology, "var-sharing": self._banks}.get(part.name, self._scenario)
+            found, sha256, metrics, plots = do(part, folder, tell, figures)
             self._before += self._length(part)
             yield PartResult(
                 part=part,
                 found=found,
                 verdicts=judge(found, CLAIMS[part.experiment]) if part.experiment else (),
                 tables=tables_of(part.experiment),
-                figures={picture: plots / picture.file for picture in part.pictures} if figures else {},
+                figures={picture: plots / picture.file for picture in part.picture} if figures else {},
                 sha256=sha256,
                 metrics=metrics,
-                wall_s=took["wall"],
-                cpu_s=took["cpu"],
+                wall_s=perf_counter() - wall,
+                cpu_s=sum(os.times()[:4]) - cpu,
             )
 
     def _length(self, part: Part) -> float:
         if part.name == "topology":
             return END_S * sum(1 for _ in graphs(9, self.seed))
         scenario = self.spec(part.name)
-        if part.name == "var-sharing":
-            return scenario.time.end_s * len(BANKS) * len(CASES)
-        return scenario.time.end_s * len(scenario.cases)
+        runs = len(BANKS) * len(CASES) if part.name == "var-sharing" else len(scenario.cases)
+        return scenario.time.end_s * runs
 
-    def _scenario(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
-        scenario, folder = self._loaded[part.name], self.folder / part.name
+    def _scenario(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
+        scenario = self._loaded[part.name]
         order = list(scenario.cases)
 
         def note(case: str, t: float, end: float) -> None:
@@ -111,13 +139,11 @@ class Work:
         if figures:
             from gridpeers.figures import save  # matplotlib takes longer to import than a case to run
 
-            for picture in part.pictures:
+            for picture in part.picture:
                 save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
         return run.findings, run.sha256, run.numbers, folder / "plots"
 
-    def _topology(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
-        folder = self._folder_of(part)
-
+    def _topology(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
         def note(done: int, of: int) -> None:
             tell(f"topology, {done} of {of} graphs", self._before + done * END_S)
 
@@ -126,23 +152,21 @@ class Work:
             from gridpeers.figures import save
             from gridpeers.papers.singhal2022.figures import topologies
 
-            save(topologies(found.graphs), folder, part.pictures[0].stem, FORMATS)
+            save(topologies(found.graphs), folder, part.picture[0].stem, FORMATS)
         return found, {}, None, folder
 
-    def _banks(self, part: Part, tell: Tell, figures: bool) -> _PartOutput:
-        folder, scenario = self._folder_of(part), self._loaded[part.name]
+    def _banks(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
+        scenario = self._loaded[part.name]
 
         def note(done: int, of: int) -> None:
             tell(f"{part.name}, {done} of {of} runs", self._before + done * scenario.spec.time.end_s)
 
         ours = bank_study(scenario, folder, note, self.jobs, self.dask)
-        cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
-        paper = {(cell.case, cell.event): cell.paper for cell in cells}
         if figures:
             from gridpeers.figures import save
             from gridpeers.papers.singhal2022.figures import var_sharing
 
-            save(var_sharing(paper, ours, CASES, EVENTS), folder, part.pictures[0].stem, FORMATS)
+            save(var_sharing(ours), folder, part.picture[0].stem, FORMATS)
         metrics = [
             {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
             for variant, values in ours.items()
@@ -150,24 +174,6 @@ class Work:
         ]
         return Findings(results={}), {}, metrics, folder
 
-    def _folder_of(self, part: Part) -> Path:
-        """Make the folder of a part that is many runs."""
-        folder = self.folder / part.name
-        folder.mkdir(parents=True)
-        return folder
-
 
 _PartOutput = tuple[Findings, dict[str, str], Any, Path]
 """Findings, hashes by case, metrics, and the folder of the figures."""
-
-_STUDIES = ("topology", "var-sharing")
-"""Parts that are many short runs of the islanding, without a folder for each."""
-
-
-@contextmanager
-def _timed() -> Iterator[dict[str, float]]:
-    """Measure wall time and processor time (s) of the block, of this process and those that ended meanwhile."""
-    took: dict[str, float] = {}
-    wall, cpu = perf_counter(), sum(os.times()[:4])
-    yield took
-    took["wall"], took["cpu"] = perf_counter() - wall, sum(os.times()[:4]) - cpu

@@ -9,9 +9,9 @@ import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, within
 from gridpeers.papers.singhal2022.reproduce.parts import CHOICES, PARTS, Part, chosen
-from gridpeers.papers.singhal2022.reproduce.report import lines, render, settings
-from gridpeers.papers.singhal2022.reproduce.reproduction import PartResult, Reproduction, metrics_json
+from gridpeers.papers.singhal2022.reproduce.report import Reproduction, lines, metrics_json, render, settings
 from gridpeers.papers.singhal2022.reproduce.studies import graphs
+from gridpeers.papers.singhal2022.reproduce.work import PartResult
 from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
 from gridpeers.scenarios.results.evaluation.claims import judge
 from gridpeers.scenarios.results.findings import Findings
@@ -49,7 +49,7 @@ def result(folder: Path, f_error: float = 0.136) -> PartResult:
         found=found,
         verdicts=judge(found, CLAIMS["islanding"]),
         tables=tables_of("islanding"),
-        figures=dict.fromkeys(ISLANDING.pictures, image),
+        figures=dict.fromkeys(ISLANDING.picture, image),
         sha256={"IV": "1b14ee14"},
         metrics={"seed": 1},
         wall_s=1.0,
@@ -59,14 +59,14 @@ def result(folder: Path, f_error: float = 0.136) -> PartResult:
 
 def whole(*results: PartResult) -> Reproduction:
     """A report of some parts."""
-    return Reproduction(results=results, driver="inprocess", seed=1, started="2026-01-01 12:00", only="")
+    return Reproduction(results=results, driver="inprocess", seed=1, started="2026-01-01 12:00")
 
 
 def test_the_page_needs_nothing_but_itself(tmp_path: Path) -> None:
     """Every image is inside, nothing is fetched: no script, no link to a style, no address."""
     page = render("report.html.jinja", whole(result(tmp_path)), settings({"islanding": load_scenario("islanding")[0]}))
 
-    assert page.count("data:image/png;base64,") == len(ISLANDING.pictures)
+    assert page.count("data:image/png;base64,") == len(ISLANDING.picture)
     assert not re.findall(r"https?://|<script|<link|src=\"(?!data:)|url\(", page)
 
 
@@ -113,7 +113,7 @@ def test_what_is_no_number_is_null(tmp_path: Path) -> None:
 def test_every_claim_is_shown_and_every_figure_exists() -> None:
     """A claim that names a figure names one of its own part's; every experiment with claims is a part."""
     for part in PARTS:
-        keys = {picture.key for picture in part.pictures}
+        keys = {picture.key for picture in part.picture}
         assert {claim.figure for claim in CLAIMS.get(part.experiment, ())} <= keys | {""}
     assert {part.experiment for part in PARTS if part.experiment} == set(CLAIMS)
     assert {table.experiment for table in TABLES} == {part.experiment for part in chosen("tables")}

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.papers.singhal2022.tables import TABLE, tables_of
-from gridpeers.papers.singhal2022.topology_claims import GraphFindings, GraphRun
 from gridpeers.scenarios.results.evaluation.claims import Verdict, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Settling, Steady
