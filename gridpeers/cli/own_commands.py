@@ -34,7 +34,7 @@ OWN_COMMANDS = {
         ),
         (
             "experiment",
-            "gridpeers.papers.singhal2022.experiments.experiment_command:experiment",
+            "gridpeers.papers.singhal2022.experiment_command:experiment",
             "Run an experiment on late, lossy or broken links.",
         ),
         ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),

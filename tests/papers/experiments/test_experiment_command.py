@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gridpeers.papers.singhal2022.experiments import EXPERIMENTS
 from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Curve,
     ExperimentResult,
@@ -15,7 +16,6 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     Page,
     Panel,
 )
-from gridpeers.papers.singhal2022.experiments.experiment_registry import EXPERIMENTS
 from tests import command_line
 
 DOCS = Path(__file__).parents[3] / "docs"

@@ -24,8 +24,8 @@ from gridpeers.cli.usage import (
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from gridpeers.papers.singhal2022.experiments import FromScenario, FromSweep
     from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
-    from gridpeers.papers.singhal2022.experiments.experiment_registry import FromScenario, FromSweep
 
 
 def experiment(
@@ -53,7 +53,7 @@ def experiment(
     needed = {"numba": "the plant", "scipy": "the theory", "threadpoolctl": "the plant", "matplotlib": "the figure"}
     require(needed)
     from gridpeers.output_folders import RUNS, refusal, shown
-    from gridpeers.papers.singhal2022.experiments.experiment_registry import EXPERIMENTS, FromSweep
+    from gridpeers.papers.singhal2022.experiments import EXPERIMENTS, FromSweep
 
     if name == "list":
         for known, source in EXPERIMENTS.items():
@@ -120,7 +120,7 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
 
 def _title(source: FromSweep | FromScenario) -> str:
     """Return the title of the file that is run."""
-    from gridpeers.papers.singhal2022.experiments.experiment_registry import FromScenario
+    from gridpeers.papers.singhal2022.experiments import FromScenario
     from gridpeers.sweep_files import sweep_title
 
     return gp.load(source.scenario).title if isinstance(source, FromScenario) else sweep_title(source.sweep)
