@@ -1,8 +1,7 @@
 """The paper's experiments, each case run once for all tests of this folder and for the pinned histories."""
 
 from dataclasses import dataclass
-
-import pytest
+from functools import cache
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
 from gridpeers.scenarios.results.evaluation.claims import judge
@@ -36,42 +35,7 @@ def expected(experiment: str) -> dict[str, str]:
     return {claim.name: "MISS" if claim.known_miss else "PASS" for claim in CLAIMS[experiment]}
 
 
-@pytest.fixture(scope="session")
-def islanding() -> Experiment:
-    """The paper's islanding experiment, by the driver without processes."""
-    return experiment("islanding")
-
-
-@pytest.fixture(scope="session")
-def plug_n_play() -> Experiment:
-    """The paper's plug-n-play experiment, by the driver without processes."""
-    return experiment("plug-n-play")
-
-
-@pytest.fixture(scope="session")
-def intermittency() -> Experiment:
-    """The paper's intermittency experiment, by the driver without processes."""
-    return experiment("intermittency")
-
-
-@pytest.fixture(scope="session")
-def communication() -> Experiment:
-    """The paper's reduced communication and link failure, by the driver without processes."""
-    return experiment("reduced-communication")
-
-
-@pytest.fixture(scope="session")
-def switching() -> Experiment:
-    """The paper's microgrid switching, by the driver without processes."""
-    return experiment("microgrid-switching")
-
-
-@pytest.fixture(scope="session")
-def wind_up() -> Experiment:
-    """Our experiment on the paper's Remark 2, by the driver without processes."""
-    return experiment("wind-up")
-
-
+@cache
 def experiment(name: str) -> Experiment:
     """Run all cases of a scenario."""
     scenario, feeder = load_scenario(name)
