@@ -40,6 +40,9 @@ LETTERS = {"MPSI": "P", "MQSI": "Q", "S_max_pu": "S"}
 INDEXES = (*LIMITS, "V_min_pu", "V_max_pu")
 """Measures of the tables."""
 
+RUN = ("case", "node", "link", "law")
+"""Columns that name a run."""
+
 SIZES = (("P_set_W", 1e-3, " kW"), ("P_set", 1.0, ""), ("delay_s", 1.0, " s"))
 """Keys of a lie that are its size: key, factor, and unit in words."""
 
@@ -48,12 +51,13 @@ def hostile(sweep: SweepData) -> ExperimentResult:
     """Return how far every attack gets against every defence, on every graph."""
     lies = replace(sweep, window=EVENT)
     rows = lies.rows
-    attacks = {attack_words(node, link): {"node": node, "link": link} for node, link in _unique(rows, "node", "link")}
-    defences = {defence_words(law): {"law": law} for (law,) in _unique(rows, "law")}
+    attacks = {attack_words(node, link): (node, link) for node, link in _unique(rows, "node", "link")}
+    defences = {defence_words(law): law for (law,) in _unique(rows, "law")}
+    row_of = {run: number for number, run in enumerate(zip(*(rows[name] for name in RUN), strict=True))}
+    columns = {index: lies.measured(index, rows) for index in INDEXES}
 
     def measured(case: str, attack: str, defence: str, index: str) -> float:
-        (value,) = lies.measured(index, lies.where({"case": case, **attacks[attack], **defences[defence]}))
-        return float(value)
+        return float(columns[index][row_of[case, *attacks[attack], defences[defence]]])
 
     def curves(case: str, index: str, least: float) -> list[Curve]:
         found = []
@@ -92,8 +96,8 @@ def hostile(sweep: SweepData) -> ExperimentResult:
             for attack in attacks:
                 found = [{index: measured(case, attack, defence, index) for index in INDEXES} for defence in defences]
                 table.append((case, what, attack, *map(cell, found)))
-    columns = ("graph", "numbers", "attack", *defences)
-    return ExperimentResult(page=page, table=ExperimentTable(columns=columns, rows=table, apart=2))
+    heads = ("graph", "numbers", "attack", *defences)
+    return ExperimentResult(page=page, table=ExperimentTable(columns=heads, rows=table, apart=2))
 
 
 def frequency_cell(found: Mapping[str, float]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,8 @@ from gridpeers.scenarios.sweep.sweep_case import run_one
 from gridpeers.sweep_files import read_sweep
 from tests.papers.experiments.experiment_runs import theory
 from tests.unit.agents.test_resilient_law import spread_after
+
+sweep = cache(partial(read_sweep, "hostile"))
 
 
 def written(run: Any, *keys: str) -> list[str]:
@@ -60,7 +63,7 @@ def test_below_3_robust_one_constant_liar_keeps_the_honest_apart() -> None:
 
 def test_every_run_is_in_the_table_and_has_words_of_its_own() -> None:
     """No two attacks or defences have one name, so that none hides another; each graph has all of them."""
-    plan = read_sweep("hostile")
+    plan = sweep()
     attacks = {attack_words(*written(run, "node", "link")) for run in plan.runs}
     defences = {defence_words(*written(run, "law")) for run in plan.runs}
 
@@ -89,7 +92,7 @@ def f_off(case: str, attack: str, defence: str) -> float:
     """Largest frequency error (Hz) 1.5 to 2 s after the lies began."""
     (run,) = (
         run
-        for run in read_sweep("hostile").runs
+        for run in sweep().runs
         if (run.case, attack_words(*written(run, "node", "link")), defence_words(*written(run, "law")))
         == (case, attack, defence)
     )
