@@ -40,4 +40,4 @@ def test_small_and_large_var_sharing_are_both_seen() -> None:
     assert panel.get_yscale() == "log"
     low, high = panel.get_ylim()
     assert low < 0.01 < 4.0 < high
-    assert np.log(0.01 / low) / np.log(high / low) > 0.05
+    assert np.log(0.01 / low) / np.log(high / low) > 0.04
