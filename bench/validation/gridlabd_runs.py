@@ -61,7 +61,7 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     tolerance: float = 1e-8
     """Largest difference (Hz, pu) that passes."""
     in_tests: bool = True
-    """Whether the tests have it too: three minutes on two cores have to do for all parts."""
+    """Whether the tests have it too: their time has to do for all parts."""
 
     @property
     def closed_loop(self) -> bool:
