@@ -14,7 +14,7 @@ import pytest
 
 import gridpeers as gp
 from tests.conformance.laws.consensus_fmi3 import NAME, build, described
-from tests.conformance.laws.law_runs import SHORT, Driver, islanding, written
+from tests.conformance.laws.law_runs import SHORT, islanding, written
 
 HERE = Path(__file__).parent
 PATIENT = {"time_limit_s": 30.0}
@@ -41,24 +41,28 @@ def fmi3(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return {"fmu": build(cc, folder), "folder": str(folder)}
 
 
-@pytest.mark.parametrize(
-    ("carrier", "driver"),
-    [("class", "inprocess"), ("program", "inprocess"), ("fmu", "inprocess"), ("fmu", "processes")],
-)
-def test_every_carrier_of_a_law_gives_the_same_history(carrier: str, driver: Driver, fmu: dict[str, str]) -> None:
-    """The paper's law built in, as anybody's class, as a program and as an FMU: one hash, in one process and in ten.
+@pytest.mark.parametrize("carrier", ["class", "program"])
+def test_every_carrier_of_a_law_gives_the_same_history(carrier: str) -> None:
+    """The paper's law built in, as anybody's class and as a program: one hash.
 
     Processes run a class in tests/unit/gridpeers/test_own_law.py, and a program in test_law_programs.py.
     """
-    laws: dict[str, Any] = {
-        "class": "gridpeers.agents.laws.consensus:Consensus",
-        "program": PROGRAM | PATIENT,
-        "fmu": fmu | PATIENT,
-    }
-    result = written(laws[carrier], driver=driver)
+    laws: dict[str, Any] = {"class": "gridpeers.agents.laws.consensus:Consensus", "program": PROGRAM | PATIENT}
+    result = written(laws[carrier])
 
     assert not list(result.events[result.events["kind"] == "law"]["text"])
     assert result.sha256 == islanding(short=True).sha256
+
+
+def test_an_fmu_gives_the_history_of_the_class_and_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None:
+    """In one process and in ten. A scenario gives parameters as those of any law; an unknown one is told."""
+    k_p = {"gains.k_p": 0.0014}
+    slower = written({**fmu, **PATIENT, "k_p": 0.0014})
+
+    assert written(fmu | PATIENT, driver="processes").sha256 == islanding(short=True).sha256
+    assert slower.sha256 == gp.load("islanding").replace(k_p | SHORT).run("IV").sha256
+    with pytest.raises(gp.ScenarioError, match=re.escape('case.IV.law.k_pp: unknown parameter; did you mean "k_p"?')):
+        written({**fmu, "k_pp": 1.0})
 
 
 def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp_path: Path) -> None:
@@ -72,15 +76,6 @@ def test_an_fmu_for_another_platform_is_refused_by_name(fmu: dict[str, str], tmp
 
     with pytest.raises(gp.ScenarioError, match=r"case.IV.law.fmu: x.fmu is for .*win64.*, and this is "):
         written({"fmu": "x.fmu", "folder": str(tmp_path)})
-
-
-def test_an_fmu_has_the_parameters_that_it_declares(fmu: dict[str, str]) -> None:
-    """A scenario gives them as those of any law; an unknown one is told with what there is."""
-    slower = written({**fmu, **PATIENT, "k_p": 0.0014})
-
-    assert slower.sha256 == gp.load("islanding").replace({"gains.k_p": 0.0014, **SHORT}).run("IV").sha256
-    with pytest.raises(gp.ScenarioError, match=re.escape('case.IV.law.k_pp: unknown parameter; did you mean "k_p"?')):
-        written({**fmu, "k_pp": 1.0})
 
 
 def test_an_fmu_of_fmi_3_gives_the_history_of_the_class(fmi3: dict[str, str]) -> None:
