@@ -11,16 +11,19 @@ from xdist.workermanage import WorkerController
 REAL_TIME = ("tests/processes/realtime", "tests/schedules")
 """Folders of tests that keep real time: no two of them run at once, and what runs beside them gives way."""
 
+IN_PROCESS = ("tests/unit", "tests/golden", "tests/papers", "tests/fuzz")
+"""Folders of tests that start hardly a process. They come last on the other workers, as each is short."""
 
 ONE_RUN = ("tests/golden/catalogue", "tests/papers/singhal2022")
 """Folders whose tests look at the same runs of the catalogue: one worker has them all, and runs each case once."""
 
-SHORT = ("tests/unit",)
-"""Folders of tests of which each is short: they come last, so that no worker waits for another's long one."""
-
 
 class RealTimeApart(LoadFileScheduling):
-    """A file of tests goes to any worker that is free, but one that keeps real time to the first worker alone."""
+    """The first worker has what keeps real time, and the third nothing that starts processes.
+
+    Linux weighs each session of processes alone, whatever its niceness: the processes that a test starts take from
+    those of a real-time test, and only tests without any give way.
+    """
 
     def _split_scope(self, nodeid: str) -> str:
         file = super()._split_scope(nodeid)
@@ -28,10 +31,10 @@ class RealTimeApart(LoadFileScheduling):
 
     def _assign_work_unit(self, node: WorkerController) -> None:
         real_time = [file for file in self.workqueue if _within(file, REAL_TIME)]
-        others = [file for file in self.workqueue if not _within(file, REAL_TIME)]
-        others.sort(key=lambda file: _within(file, SHORT) or not _within(file, ("tests",)))
-        first = min(self.nodes, key=lambda each: int(each.gateway.id.removeprefix("gw")))
-        choices = real_time or others if node is first else others
+        in_process = [file for file in self.workqueue if _within(file, IN_PROCESS) or not _within(file, ("tests",))]
+        others = [file for file in self.workqueue if file not in real_time and file not in in_process]
+        workers = sorted(self.nodes, key=lambda each: int(each.gateway.id.removeprefix("gw")))
+        choices = {0: real_time or others or in_process, 1: others or in_process}.get(workers.index(node), in_process)
         if choices:
             self.workqueue.move_to_end(choices[0], last=False)
             super()._assign_work_unit(node)
