@@ -12,10 +12,9 @@ import pytest
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.processes.commands.test_run_command import command
 from tests.processes.terminals import LIMITED
-from tests.record.full_disk import CALM, has_namespaces
+from tests.record.full_disk import CALM, has_namespaces, kinds
 from tests.record.killed_commands import CLOCKS, Clock, assert_usable, killed
 from tests.record.reader_commands import assert_commands_read
-from tests.unit.plant.feeder.test_load_board import kinds
 
 MOST = 4.0
 """Run time (s) of a run beyond which it would take long to read."""
@@ -55,7 +54,7 @@ def test_a_record_without_room_ends_and_the_run_goes_on(tmp_path: Path) -> None:
     """The run is whole; its report and its log say where run.mcap ends and why, and what is in it can be read."""
     (tmp_path / "calm.toml").write_text(CALM)
     done = subprocess.run(
-        [*LIMITED, *command("run", "calm.toml", "--clock", "simulated", "--out", "here")],
+        [*LIMITED, *command("run", "calm.toml", "--clock", "wall", "--out", "here")],
         cwd=tmp_path,
         capture_output=True,
         text=True,
