@@ -96,8 +96,8 @@ def test_the_wheel_runs_beside_a_distribution_with_our_rooms_names(wheels: Wheel
         words = ["-m", "gridpeers", "check", "islanding"]
         subprocess.run([fresh.python, *words], cwd=elsewhere, check=True, stdout=subprocess.DEVNULL)
 
-    fresh.share_dependencies()
     theirs, ours = install(wheels.neighbour), install(wheels.gridpeers)
+    fresh.share_dependencies()
     assert ours & theirs == set()
     assert any(file.startswith("agents/") for file in theirs)
     assert {file.partition("/")[0].partition("-")[0] for file in ours} == {"gridpeers"}
