@@ -81,7 +81,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         gridpeers.plant.tables.FeederError
             With everything that the engine refuses, and everything that cannot be represented.
         """
-        from gridpeers.plant.imports.opendss import read_opendss
+        from gridpeers.bridges.opendss import read_opendss
 
         return cls._of(read_opendss(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 
@@ -112,7 +112,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         gridpeers.plant.tables.FeederError
             With everything that GridLAB-D refuses, and everything that cannot be represented.
         """
-        from gridpeers.plant.imports.gridlabd.read_glm import read_glm
+        from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
 
         return cls._of(read_glm(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
 

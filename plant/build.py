@@ -24,11 +24,11 @@ def start_plant(config: PlantConfig) -> LivePlant:
         If it cannot start; the message says why, and what to do.
     """
     if config.settings.simulator == "helics":
-        from gridpeers.plant.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
+        from gridpeers.bridges.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
 
         return HelicsPlant(config, _feeder(config))
     if config.bridged:
-        from gridpeers.plant.helics.bridged_plant import BridgedPlant
+        from gridpeers.bridges.helics.bridged_plant import BridgedPlant
 
         return BridgedPlant(lambda: _here(config), config)
     return _here(config)
@@ -37,7 +37,7 @@ def start_plant(config: PlantConfig) -> LivePlant:
 def _here(config: PlantConfig) -> LivePlant:
     """Start a plant that we run ourselves."""
     if config.settings.simulator == "gridlabd":
-        from gridpeers.plant.gridlabd.start import start_gridlabd
+        from gridpeers.bridges.gridlabd.start import start_gridlabd
 
         return start_gridlabd(config, _feeder(config))
     return build_plant(config)

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.plant.equipment.inverter_parameters import GflParameters as GflParameters
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmParameters
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
-from gridpeers.plant.helics.helics_settings import HelicsSettings
 from gridpeers.plant.known_names import Simulator
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting

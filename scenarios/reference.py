@@ -17,12 +17,12 @@ from gridpeers.agents import graphs
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.agents.graphs import GRAPHS
+from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.netem.models import own_fault
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.netem.schema.partition import Partition
-from gridpeers.plant.helics.helics_settings import HelicsSettings
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry

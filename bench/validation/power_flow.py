@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from bench.validation.opendss_engines import ENGINES, solve_scripts
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart
 from bench.validation.write_opendss import IDEAL_SOURCE, write_opendss
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.equipment import PHASES, Feeder, Source
-from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
 

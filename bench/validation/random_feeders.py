@@ -17,12 +17,12 @@ from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
 from bench.validation.opendss_engines import ENGINES, SolvedStates, solve_scripts
 from bench.validation.random_script import RandomFeeder, Shape, random_feeder
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import Dynamics, PlantError, reduction
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.named_loads import with_powers
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
-from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
+from gridpeers.bridges.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
-from gridpeers.plant.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import supply_states

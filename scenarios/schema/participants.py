@@ -8,11 +8,11 @@ from pathlib import Path
 
 import msgspec
 
+from gridpeers.bridges.helics.helics_settings import settings_problems
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
-from gridpeers.plant.helics.helics_settings import settings_problems
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple

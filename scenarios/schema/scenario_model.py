@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains, Secondary
+from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.plant.helics.helics_settings import HelicsSettings
 from gridpeers.plant.known_names import Simulator
 from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
 from gridpeers.wire.journal import RecordLevel

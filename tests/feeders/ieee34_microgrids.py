@@ -15,8 +15,8 @@ from typing import Literal
 from msgspec.structs import replace
 
 import gridpeers.plant.data
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.equipment import Feeder, InverterRow
-from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.tables.write import write_feeder
 
 SCRIPT = Path(__file__).parent / "ieee34.dss"

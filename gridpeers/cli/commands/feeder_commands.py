@@ -210,7 +210,7 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
     """Write the tables of a script's feeder and read them again; end with every problem if a run could not."""
-    from gridpeers.plant.imports.import_checks import of_script
+    from gridpeers.bridges.import_checks import of_script
     from gridpeers.plant.tables import FeederError
 
     feeder.save(folder)

@@ -36,9 +36,9 @@ def glm(
     """
     from tempfile import gettempdir
 
+    from gridpeers.bridges.gridlabd.model.export_glm import export_glm
     from gridpeers.feeder import READERS
     from gridpeers.plant.dynamics import PlantError
-    from gridpeers.plant.gridlabd.model.export_glm import export_glm
     from gridpeers.plant.tables import FeederError
     from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
 

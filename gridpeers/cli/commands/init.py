@@ -13,9 +13,9 @@ from gridpeers.cli.usage import BAD_INPUT, fail
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from gridpeers.bridges.proposal.feeder_proposal import Proposal
     from gridpeers.feeder import Feeder
     from gridpeers.plant.equipment import Feeder as Tables
-    from gridpeers.scenarios.proposal.feeder_proposal import Proposal
     from gridpeers.scenarios.schema import ScenarioModel
 
     Project = tuple[ScenarioModel, Tables]
@@ -151,9 +151,9 @@ def _with_proposal(
     script: str, switches: list[str], leave_out: list[str], count: int | None
 ) -> tuple[Feeder, Proposal]:
     """Return a feeder and its proposal; one without a switch to island at gets one near the substation."""
+    from gridpeers.bridges.proposal.feeder_proposal import propose
+    from gridpeers.bridges.proposal.proposal_errors import NoSwitchError
     from gridpeers.cli.commands.feeder_commands import read_script
-    from gridpeers.scenarios.proposal.feeder_proposal import propose
-    from gridpeers.scenarios.proposal.proposal_errors import NoSwitchError
 
     feeder = read_script(script, switches, leave_out)
     try:
@@ -169,7 +169,7 @@ def _with_proposal(
 
 def _calmed(project: Project, rewritten: Callable[[str], Project], proposal: Proposal) -> str | None:
     """Return the settings with which a project comes to rest on droop alone, or None; say what they are."""
-    from gridpeers.scenarios.proposal.droop_alone import unsteady
+    from gridpeers.bridges.proposal.droop_alone import unsteady
 
     if not (found := unsteady(*project, "none")):
         return ""
@@ -238,10 +238,10 @@ def _propose(folder: Path, script: Path, switches: list[str], leave_out: list[st
 
     import msgspec
 
+    from gridpeers.bridges.proposal.proposal_errors import NoProposalError
     from gridpeers.cli.commands.feeder_commands import folder_of, save_readable
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.plant.equipment.neutrals import returns_in_words
-    from gridpeers.scenarios.proposal.proposal_errors import NoProposalError
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema import load_scenario
     from gridpeers.scenarios.schema.check_notes import start_problem

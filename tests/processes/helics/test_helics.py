@@ -15,10 +15,10 @@ import pytest
 
 import gridpeers
 from gridpeers import Result, Scenario
-from gridpeers.plant.helics import topics
-from gridpeers.plant.helics.bridged_plant import BridgedPlant
-from gridpeers.plant.helics.federate import HelicsError, HelicsFederate
-from gridpeers.plant.helics.helics_settings import HelicsSettings
+from gridpeers.bridges.helics import topics
+from gridpeers.bridges.helics.bridged_plant import BridgedPlant
+from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.run_request import BrokenRunError

@@ -12,12 +12,12 @@ import pandas as pd
 import pytest
 
 from gridpeers import BrokenRunError, Feeder, Scenario
+from gridpeers.bridges.proposal import feeder_proposal
 from gridpeers.cli.commands import init
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
-from gridpeers.scenarios.proposal import feeder_proposal
 from tests.command_line import invoke
-from tests.unit.plant.imports.gridlabd.glm_models import HEAD, LOADS
+from tests.unit.bridges.gridlabd.reading.glm_models import HEAD, LOADS
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
 pytest.importorskip("gridlabd", reason="GridLAB-D is not installed")

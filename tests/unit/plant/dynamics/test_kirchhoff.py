@@ -9,11 +9,11 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import Dynamics, reduction
 from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
-from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings
 from tests.unit.plant import networks

@@ -18,7 +18,7 @@ from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.powerflow import solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings, SwitchEvent
-from tests.unit.plant.imports.opendss.opendss_solutions import LETTERS, TOLERANCE
+from tests.unit.bridges.opendss.opendss_solutions import LETTERS, TOLERANCE
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 

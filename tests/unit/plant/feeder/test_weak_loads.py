@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.bridges.opendss import read_opendss
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.feeder import Plant
-from gridpeers.plant.imports.opendss import read_opendss
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 

@@ -14,7 +14,7 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.scenarios.checks.physics.balance_check import IslandBalance, IslandPowerFlow, NetworkState
-from tests.unit.scenarios.proposal.test_feeder_proposal import series
+from tests.unit.bridges.proposal.test_feeder_proposal import series
 
 V_NOM = 2400.0
 LOADS = {"A": 160e3 + 40e3j, "B": 80e3 + 20e3j, "C": 120e3 + 30e3j}

@@ -1,0 +1,265 @@
+"""GridLAB-D as a plant: the interface of `gridpeers.plant.feeder.Plant` on GridLAB-D's own network and inverters."""
+
+from __future__ import annotations
+
+import sys
+from math import isfinite
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gridpeers.bridges.gridlabd.gridlabd_schedule import GridlabdSchedule, Write
+from gridpeers.bridges.gridlabd.model.glm import write_glm
+from gridpeers.bridges.gridlabd.process.delta_mode_process import DeltaModeProcess, GridlabdError
+from gridpeers.plant.equipment.inverter_parameters import GflParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.limit_events import SetPointLimits
+from gridpeers.plant.feeder.plant import Reading
+from gridpeers.plant.feeder.protection import Relays
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.timing import time_of
+
+FEEDERS = Path(__file__).parents[1] / "data"
+
+REST = 0.5
+"""Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
+
+
+class GridlabdPlant:
+    """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
+
+    Parameters
+    ----------
+    ours
+        Our plant of the same run, at its start. GridLAB-D's initialisation takes the powers of the inverters and
+        chooses set-points that give them; a scenario gives the set-points. So GridLAB-D begins its initial power flow
+        from the powers that our plant has found; what comes out after `REST` is its own.
+    settings
+        Everything that decides the numbers. Inverters that come and go have no counterpart in GridLAB-D.
+    T_c
+        Control period (s).
+    end
+        Duration of the run (s).
+    python
+        Interpreter that has the wheel `gridlabd`.
+    record_step
+        Distance of the recorded rows (s); None for every step.
+    deadline
+        Longest wait for GridLAB-D's next control period (s).
+
+    Raises
+    ------
+    GridlabdError
+        If the wheel is missing or the model does not run.
+    """
+
+    def __init__(
+        self,
+        ours: Plant,
+        settings: PlantSettings,
+        T_c: float,
+        end: float,
+        python: str = sys.executable,
+        *,
+        record_step: float | None = None,
+        deadline: float = 60.0,
+    ) -> None:
+        self.inverters = ours.inverters
+        self.tick = 0
+        """k: the plant is at k T_c."""
+        self._T_c, self._h = T_c, settings.h
+        self._steps, self._record = round(T_c / self._h), round((record_step or self._h) / self._h)
+        network = ours.network
+        self._units = {unit.name: unit for unit in network.inverters}
+        self._parameters = {
+            unit.name: network.feeder.parameters_of(unit, settings.gfm, settings.gfl) for unit in network.inverters
+        }
+        self._V_nom = np.array([unit.V_nom for unit in network.inverters])
+        self._schedule = GridlabdSchedule(network, settings, self._parameters)
+        self._set_points = SetPointLimits()
+        self._relays = Relays(settings.protection, len(self.inverters), self._h, network.feeder.f_nom)
+        self._events = self._schedule.start()
+        self._events += [event for event in ours.take_events() if event.kind == "warning"]
+        self._writes: list[Write] = []
+        """Values for GridLAB-D's next step."""
+        start = {name: complex(reading.P, reading.Q) for name, reading in ours.measure().items()}
+        model = write_glm(
+            FEEDERS / settings.feeder,
+            settings.load_set,
+            start,
+            self._parameters,
+            self._h,
+            round(REST + end + 2.0),
+        )
+        self.process = DeltaModeProcess(python, deadline)
+        """GridLAB-D."""
+        try:
+            units = [(unit.name, f"n{unit.bus}", unit.kind, unit.phases) for unit in self._units.values()]
+            self.version = self.process.load(model, units)
+            # GridLAB-D chose set-points that give the powers it was started with; now the run's own take over
+            for name, unit in self._units.items():
+                self.hold(name, settings.P_set0 * unit.P_rated, settings.V_set0 * unit.V_nom)
+                if unit.kind == "GFL":
+                    self._writes.append((name, "Qref", 0.0))
+            self._now = self._run(round(REST / self._h))[-1]
+        except BaseException:
+            self.close()
+            raise
+        self._rows = [self._as_row(0, self._now)]
+
+    def __enter__(self) -> Self:
+        """Give the plant; leaving the context ends GridLAB-D's process."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End GridLAB-D's process."""
+        self.close()
+
+    def close(self) -> None:
+        """End GridLAB-D's process."""
+        self.process.close()
+
+    # ---------------------------------------------------------------- for agents
+
+    def measure(self) -> dict[str, Reading]:
+        """Read every inverter's sensors at t = tick * T_c."""
+        island, fed = self._schedule.islands()
+        readings = {}
+        for i, name in enumerate(self.inverters):
+            f, P, Q, V, P_set, V_set = self._in_units(name, self._now[i])
+            readings[name] = Reading(P, Q, V, f, P_set, V_set, fed[i], island[i])
+        return readings
+
+    def phasors(self, bus: str) -> tuple[complex, ...]:
+        """Return the voltages (V) of phases A, B and C at a bus."""
+        return tuple(complex(*phase) for phase in self.process.ask(phasors=f"n{bus}")["phasors"])
+
+    def hold(self, name: str, P_set: float, V_set: float) -> None:
+        """Take set-points (W, V), in force from the next step on, within the inverter's bounds.
+
+        A value beyond its bounds is limited, and one that is not finite is ignored; each is an event, once per spell.
+        """
+        t = time_of(self.tick, self._T_c)
+        if not (isfinite(P_set) and isfinite(V_set)):
+            self._events += self._set_points.refused(name, t)
+            return
+        unit, own = self._units[name], self._parameters[name]
+        P = min(max(P_set / unit.P_rated, -own.P_set_lim), own.P_set_lim)
+        V = min(max(V_set / unit.V_nom, own.V_set_min), own.V_set_max)
+        self._events += self._set_points.held(name, t, "P_set", P_set / 1e3, P * unit.P_rated / 1e3)
+        self._events += self._set_points.held(name, t, "V_set", V_set, V * unit.V_nom)
+        if not isinstance(own, GflParameters):
+            self._writes.append((name, "Pset", P))
+        else:  # GridLAB-D bounds it at S_max itself
+            self._writes.append((name, "Pref", P_set if own.P_set_lim == own.S_max else P * unit.P_rated))
+        self._writes.append((name, "Vset", V))
+
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Position of each switch now, by its name: whether it is closed."""
+        return self._schedule.positions
+
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
+        """Operate a switch ("open" or "close") at the next step; return whether it was in that state already."""
+        if synchronised:
+            raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
+        return self._schedule.put(self.tick * self._steps, name, action)
+
+    @property
+    def loads(self) -> dict[str, complex]:
+        """Return none: they stay as in the model."""
+        return {}
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Refuse: the loads are those of the model."""
+        raise ValueError(f"load {name}: GridLAB-D as the plant keeps the loads of its model; use our own plant")
+
+    def connect(self, name: str, on: bool) -> None:
+        """Do nothing if an inverter comes that is there; RuntimeError if it goes: GridLAB-D's inverters stay."""
+        if not on:
+            raise GridlabdError(f"{name} leaves, and GridLAB-D's delta mode cannot disconnect an inverter")
+
+    def advance(self) -> None:
+        """Advance to the next tick, with the scheduled switches and limits on the way.
+
+        Raises
+        ------
+        GridlabdError
+            If GridLAB-D has ended or diverges, or if an inverter would trip, which GridLAB-D's cannot.
+        """
+        step, last = self.tick * self._steps, (self.tick + 1) * self._steps
+        while step < last:
+            writes, events = self._schedule.happen(step)
+            self._writes += writes
+            self._events += events
+            stop = min(last, step + self._relays.quiet, *self._schedule.after(step))
+            try:
+                steps = self._run(stop - step)
+            except GridlabdError as error:
+                raise GridlabdError(f"plant after t = {self._time(step):g} s: {error}") from error
+            for k in range(stop - step):
+                if (step + k + 1) % self._record == 0:
+                    self._rows.append(self._as_row(step + k + 1, steps[k]))
+            self._now = steps[-1]
+            self._watch(stop, steps)
+            step = stop
+        self.tick += 1
+
+    # ---------------------------------------------------------------- for the recorder
+
+    def take_rows(self) -> tuple[tuple[float, ...], ...]:
+        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
+        rows, self._rows = tuple(self._rows), []
+        return rows
+
+    def take_events(self) -> tuple[PlantEvent, ...]:
+        """Return the events since the last call."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    def _time(self, step: int) -> float:
+        """Return the time of a step (s)."""
+        return time_of(step, self._h)
+
+    def _in_units(self, name: str, reading: NDArray[np.float64]) -> tuple[float, ...]:
+        """Convert a reading to Hz, W, var, V, W, V."""
+        unit, (f, P, Q, V, P_set, V_set, *_) = self._units[name], reading.tolist()
+        return f, P, Q, V, P_set * (unit.P_rated if unit.kind == "GFM" else 1.0), V_set * unit.V_nom
+
+    def _as_row(self, step: int, readings: NDArray[np.float64]) -> tuple[float, ...]:
+        values = [
+            value
+            for name, reading in zip(self.inverters, readings, strict=True)
+            for value in self._in_units(name, reading)
+        ]
+        return (self._time(step), *values)
+
+    # ---------------------------------------------------------------- steps
+
+    def _run(self, steps: int) -> NDArray[np.float64]:
+        """Write the pending values, advance, and return the readings after each step: steps x inverters x values."""
+        writes, self._writes = self._writes, []
+        readings = np.array(self.process.ask(write=writes, advance=steps)["steps"])
+        if not np.isfinite(readings).all():
+            k, i = np.argwhere(~np.isfinite(readings).all(axis=2))[0].tolist()
+            raise GridlabdError(
+                f"GridLAB-D diverges: {self.inverters[i]} has no finite values {(k + 1) * self._h:g} s later"
+            )
+        return readings
+
+    def _watch(self, step: int, steps: NDArray[np.float64]) -> None:
+        """End the run where protection of ours would trip an inverter, because GridLAB-D's goes on."""
+        f, low, high = steps[:, :, 0], steps[:, :, 6] / self._V_nom, steps[:, :, 7] / self._V_nom
+        trips = self._relays.watch(f, low, high, np.ones(len(self.inverters), bool))
+        if trips:
+            names = "; ".join(f"{self.inverters[trip.inverter]}: {trip}" for trip in trips)
+            raise GridlabdError(
+                f"plant at t = {self._time(step):g} s: protection trips {names}. GridLAB-D's inverter has none, so the "
+                'run ends here; write [protection] category = "off", or simulator = "gridpeers"'
+            )

@@ -1,0 +1,169 @@
+"""A feeder's network as GridLAB-D objects: nodes, lines, switches, regulators, loads and capacitors."""
+
+from __future__ import annotations
+
+import cmath
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from math import pi, sqrt
+
+from gridpeers.bridges.gridlabd.model.glm_block import TableRow, block
+from gridpeers.bridges.gridlabd.model.glm_ideal_devices import compensations, regulator_blocks, switch_blocks
+
+F_NOM = 60.0
+"""Nominal frequency (Hz)."""
+
+FOOT, MILE = 0.3048e-3, 1.609344
+"""Length (km): GridLAB-D takes lines in feet and impedances per mile."""
+
+NOMINAL_ANGLE = {"A": 0.0, "B": -2 * pi / 3, "C": 2 * pi / 3, "AB": pi / 6, "BC": -pi / 2, "CA": 5 * pi / 6}
+"""Of a load branch (rad): phase to ground, or phase to phase."""
+
+
+def network_blocks(
+    table: Mapping[str, Sequence[TableRow]],
+    load_set: str,
+    V_nom: Mapping[str, float],
+    leaders: Collection[str],
+    *,
+    ideal: bool = True,
+) -> list[str]:
+    """Return the objects of a network.
+
+    Parameters
+    ----------
+    table
+        Its tables.
+    load_set
+        Which of the load tables.
+    V_nom
+        Nominal voltages (V) of the buses.
+    leaders
+        Buses with a GFM.
+    ideal
+        Whether closed switches and regulators have no impedance, as here, or the default ones of GridLAB-D.
+    """
+    return [
+        *_buses(table["buses"], V_nom, table["source"][0], leaders),
+        *_lines(table["lines"], table["line_configs"]),
+        *(compensations() if ideal else ()),
+        *switch_blocks(table.get("switches", ()), V_nom, ideal=ideal),
+        *regulator_blocks(table.get("regulators", ()), V_nom, ideal=ideal),
+        *_transformers(table.get("transformers", ()), V_nom),
+        *_loads(table[f"loads_{load_set}"], V_nom),
+        *_capacitors(table.get("capacitors", ()), V_nom),
+    ]
+
+
+def _buses(
+    rows: Iterable[TableRow], V_nom: Mapping[str, float], source: TableRow, leaders: Collection[str]
+) -> list[str]:
+    """Nodes; only a SWING, or a SWING_PQ where there is none, lets GridLAB-D keep an island alive."""
+    blocks = []
+    for row in rows:
+        name, V = row["bus"], V_nom[row["bus"]]
+        swing: dict[str, str | complex] = {}
+        if name == source["bus"]:
+            turned = cmath.rect(float(source["V_pu"]) * V, float(source["angle_deg"]) * pi / 180)
+            swing = {f"voltage_{phase}": turned * cmath.rect(1.0, NOMINAL_ANGLE[phase]) for phase in "ABC"}
+            swing["bustype"] = "SWING"
+        elif name in leaders:
+            swing["bustype"] = "SWING_PQ"
+        blocks.append(block("node", name=f"n{name}", phases=row["phases"] + "N", nominal_voltage=V, **swing))
+    return blocks
+
+
+def _lines(rows: Iterable[TableRow], configs: Iterable[TableRow]) -> list[str]:
+    """Lines as a pi: series impedance (ohm per mile) and shunt capacitance (nF per mile)."""
+    kinds: dict[str, dict[str, complex | float]] = {}
+    for row in configs:
+        per_mile = complex(float(row["R_ohm_per_km"]), float(row["X_ohm_per_km"])) * MILE
+        nF = float(row["B_uS_per_km"]) * 1e-6 / (2 * pi * F_NOM) * 1e9 * MILE
+        i, j = ("ABC".index(row[end]) + 1 for end in ("phase_1", "phase_2"))
+        kind = kinds.setdefault(row["config"], {})
+        kind |= {f"z{i}{j}": per_mile, f"z{j}{i}": per_mile, f"c{i}{j}": nF, f"c{j}{i}": nF}
+    blocks = [block("line_configuration", name=f"c{config}", **kind) for config, kind in kinds.items()]
+    for row in rows:
+        blocks.append(
+            block(
+                "overhead_line",
+                name=f"l{row['line']}",
+                from_=f"n{row['from_bus']}",
+                to=f"n{row['to_bus']}",
+                phases=row["phases"] + "N",
+                length=float(row["length_m"]) / 1e3 / FOOT,
+                configuration=f"c{row['config']}",
+            )
+        )
+    return blocks
+
+
+def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Three-phase transformers of equal connections on both sides, at the nominal voltages of their buses."""
+    kinds = {"D-D": ("DELTA_DELTA", "ABCD"), "Yg-Yg": ("WYE_WYE", "ABCN")}
+    blocks = []
+    for row in rows:
+        connection, phases = kinds[row["connection"]]
+        name, start, end = (row[key] for key in ("transformer", "from_bus", "to_bus"))
+        blocks.append(
+            block(
+                "transformer_configuration",
+                name=f"ct{name}",
+                connect_type=connection,
+                power_rating=float(row["S_rated_kVA"]),
+                primary_voltage=V_nom[start] * sqrt(3),
+                secondary_voltage=V_nom[end] * sqrt(3),
+                impedance=complex(float(row["R_percent"]), float(row["X_percent"])) / 100,
+            )
+        )
+        blocks.append(
+            block(
+                "transformer",
+                name=f"t{name}",
+                from_=f"n{start}",
+                to=f"n{end}",
+                phases=phases,
+                configuration=f"ct{name}",
+            )
+        )
+    return blocks
+
+
+def _loads(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Spot loads, each at a load object of its own below its bus."""
+    blocks = []
+    for number, row in enumerate(rows):
+        ends = ("AB", "BC", "CA") if row["connection"] == "D" else ("A", "B", "C")
+        V = V_nom[row["bus"]] * (sqrt(3) if row["connection"] == "D" else 1.0)
+        values: dict[str, complex] = {}
+        for end, letter in zip(ends, "abc", strict=True):
+            S = complex(float(row[f"P_{letter}_kW"]), float(row[f"Q_{letter}_kvar"])) * 1e3
+            if not S:
+                continue
+            if row["model"] == "P":
+                values[f"constant_power_{end}"] = S
+            elif row["model"] == "I":
+                values[f"constant_current_{end}"] = (S / cmath.rect(V, NOMINAL_ANGLE[end])).conjugate()
+            else:
+                values[f"constant_impedance_{end}"] = V**2 / S.conjugate()
+        phases = "".join(sorted({phase for name in values for phase in name.rpartition("_")[2]}))
+        blocks.append(_load(f"load{number}", row["bus"], V_nom, phases, values))
+    return blocks
+
+
+def _capacitors(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Capacitor banks, as the constant impedances that they are."""
+    blocks = []
+    for number, row in enumerate(rows):
+        V = float(row["V_rated_kV_LN"]) * 1e3
+        Q = {phase: float(row[f"Q_{phase.lower()}_kvar"]) * 1e3 for phase in "ABC"}
+        Z = {f"constant_impedance_{phase}": complex(0.0, -(V**2) / var) for phase, var in Q.items() if var}
+        phases = "".join(name[-1] for name in Z)
+        blocks.append(_load(f"bank{number}", row["bus"], V_nom, phases, Z))
+    return blocks
+
+
+def _load(name: str, bus: str, V_nom: Mapping[str, float], phases: str, values: Mapping[str, complex]) -> str:
+    """One load object at a bus: its phases, and its powers, currents or impedances by GridLAB-D's names."""
+    return block(
+        "load", name=f"{name}_{bus}", parent=f"n{bus}", phases=phases + "N", nominal_voltage=V_nom[bus], **values
+    )

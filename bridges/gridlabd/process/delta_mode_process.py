@@ -1,0 +1,117 @@
+"""GridLAB-D's process: its start, one request and its answer at a time, and its end, whoever dies first."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from gridpeers.bridges.gridlabd.process.gridlabd_messages import messages
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
+from gridpeers.wire.packages import damaged
+
+DELTA_MODE = Path(__file__).with_name("delta_mode.py")
+
+SHOWN = 2
+"""So many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow."""
+
+START_DEADLINE = 600.0
+"""Longest time (s) until a model is loaded and its first power flow solved."""
+
+KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
+"""Lets glibc keep the memory of one power flow for the next: GridLAB-D's solver takes and returns its matrices in every
+iteration. Returned to the system each time, they take a quarter of the processor time. No number depends on it."""
+
+MISSING = (
+    "GridLAB-D is not there: {python} cannot import the package gridlabd ({error}); install it (Linux, x86-64): "
+    "pip install 'gridpeers[gridlabd]'"
+)
+
+
+class GridlabdError(RuntimeError):
+    """GridLAB-D is missing, refuses its model, diverges, or has ended."""
+
+
+class DeltaModeProcess:
+    """GridLAB-D in a process of its own, which ends with this one.
+
+    Parameters
+    ----------
+    python
+        Interpreter that has the package gridlabd.
+    deadline
+        Longest wait for an answer (s).
+
+    Raises
+    ------
+    GridlabdError
+        If there is no such interpreter.
+    """
+
+    def __init__(self, python: str, deadline: float) -> None:
+        self._python, self._deadline = python, deadline
+        self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
+        try:
+            command = [python, "-P", str(DELTA_MODE), str(os.getpid())]
+            self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
+        except OSError as error:
+            self._folder.close()
+            raise GridlabdError(MISSING.format(python=python, error=error.strerror)) from error
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> str:
+        """Load a model and take its first step; return GridLAB-D's version.
+
+        Parameters
+        ----------
+        model
+            Text of the GLM.
+        inverters
+            Name, node, kind and phases of each inverter to read.
+        """
+        path = self._folder.path / "feeder.glm"
+        path.write_text(model, encoding="utf-8")
+        return str(self._answer({"load": str(path), "inverters": inverters}, START_DEADLINE)["version"])
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """Return the answer to a request; see `delta_mode`.
+
+        Raises
+        ------
+        GridlabdError
+            If GridLAB-D cannot do it, does not answer in time, or has ended; with its own errors.
+        """
+        return self._answer(request, self._deadline)
+
+    def close(self) -> None:
+        """End the process, at any time and as often as you like."""
+        self._process.close()
+        self._folder.close()
+
+    def _answer(self, request: dict[str, Any], deadline: float) -> dict[str, Any]:
+        self._process.send(request)
+        try:
+            answer = self._process.answer(monotonic() + deadline)
+        except ProcessEndedError as how:
+            raise GridlabdError(f"GridLAB-D's process {how}{self._complaints()}") from None
+        if answer is None:
+            raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
+        if "not_importable" in answer:
+            reason = answer["not_importable"]
+            if answer["installed"]:
+                raise GridlabdError(damaged("gridlabd", reason, "GridLAB-D as the plant"))
+            raise GridlabdError(MISSING.format(python=self._python, error=reason))
+        if "error" in answer:
+            raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
+        return answer
+
+    def _complaints(self) -> str:
+        """Return GridLAB-D's first errors as the end of a sentence, on one line as all that goes over the wire."""
+        first = [text.removeprefix("GridLAB-D: ").rstrip(".") for text in messages(self._process.printed())[:SHOWN]]
+        return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"

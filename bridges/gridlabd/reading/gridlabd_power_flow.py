@@ -1,0 +1,307 @@
+"""GridLAB-D's own power flow of a model: a program for a process of its own, as GridLAB-D's state is global.
+
+It loads the model and solves the power flow by Newton's method at the model's first moment. Where regulators or
+capacitors have a control, GridLAB-D goes on until they rest. Then it writes what the solver holds, as one JSON object:
+buses, branches with their admittance matrices as the solver uses them, and the powers, currents and admittances that
+every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its
+tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
+
+Usage: `python -m gridpeers.bridges.gridlabd.reading.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not
+beyond the first moment.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import math
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from gridpeers.bridges.gridlabd.process.delta_mode import NotImportableError, end_with, gridlabd_package
+from gridpeers.bridges.gridlabd.reading.glm_classes import CHILD_OF_BUS, WATCHING
+from gridpeers.bridges.gridlabd.reading.solver_memory import ModelCore, ObjectHead, SolverBranch, SolverBus, complexes
+
+TOLERANCE = "1e-10"
+"""Largest change of a voltage in the last iteration (pu). GridLAB-D's default, 1e-6, costs six digits."""
+
+WRITTEN = ("file", "filename", "output_file", "outfile", "report_file", "base_file_name", "output_filename")
+"""Properties that name a file which GridLAB-D would write into the folder of the model."""
+
+PHASE_D = 0x100
+"""Bit of an object's `phases`: delta-connected."""
+
+PV, SWING = 1, 2
+"""Values of `bustype`, and of the solver's `type`, of buses whose voltage is given, in magnitude or entirely."""
+
+WYE, AROUND, LEGS = ("A", "B", "C"), ("AB", "BC", "CA"), ("1", "2", "12")
+"""Branches of a load: to ground, between phases, of a split-phase service."""
+
+POSITIONS = {"regulator": "tap_", "capacitor": "switch"}
+"""Classes that a control moves, and the names of their positions, one a phase."""
+
+DELAYS = ("time_delay", "dwell_time", "lockout_time", "regulator_delay", "capacitor_delay")
+"""Properties (s) that let a control wait."""
+
+LONGEST_SETTLING = 3600
+"""Time (s) that GridLAB-D goes on at most."""
+
+KINDS = {"P": "power", "I": "current", "Y": "shunt"}
+"""Kinds of a load's demand (VA, A, S), and the word in the names of GridLAB-D's properties."""
+
+
+class PowerFlowModel:
+    """A model of GridLAB-D, loaded; `solve` gives what the solver holds.
+
+    Parameters
+    ----------
+    path
+        The GLM; the working folder is its own.
+    scratch
+        Folder for what GridLAB-D writes by itself.
+    settles
+        Whether to go on until regulators and capacitors rest.
+    """
+
+    def __init__(self, path: str, scratch: Path, *, settles: bool) -> None:
+        self._scratch, self._settles = scratch, settles
+        self._module = gridlabd_package()
+        self._gridlabd = self._module.DirectGridLabD()
+        if self._gridlabd.load_glm([path]) != self._module.GLDErrorCode.SUCCESS:
+            raise RuntimeError("the model was not loaded")
+        self._core = ModelCore()
+        self._classes = {
+            name: kind
+            for kind in self._gridlabd.get_all_classes()
+            for name in self._gridlabd.get_objects_by_class(kind)
+        }
+
+    def solve(self) -> dict[str, Any]:
+        """Solve the power flow at the model's first moment, or when its regulators and capacitors rest."""
+        result: dict[str, Any] = {
+            "objects": self._objects(),
+            "has_powerflow": self._gridlabd.get_global("powerflow::nominal_frequency") != "",
+        }
+        if not result["has_powerflow"]:
+            return result
+        result["method"] = self._gridlabd.get_global("powerflow::solver_method")
+        result["f_nom"] = float(self._gridlabd.get_global("powerflow::nominal_frequency").split()[0])
+        for name, value in (
+            ("powerflow::solver_method", "NR"),
+            ("powerflow::NR_solver_algorithm", "TCIM"),
+            ("powerflow::default_maximum_voltage_error", TOLERANCE),
+            ("stoptime", self._gridlabd.get_global("starttime")),
+            ("powerflow::NR_matrix_output_interval", "NEVER"),
+            ("savefile", ""),
+            ("checkpoint_type", "NONE"),
+            ("checkpoint_file", os.devnull),
+            ("dumpfile", str(self._scratch / "gridlabd.xml")),
+            ("dumpall", "0"),
+            ("kmlfile", ""),
+        ):
+            self._gridlabd.set_global(name, value)
+        self._keep_quiet()
+        if result["method"] != "NR":
+            self._give_a_swing()
+        moved = self._controlled() if self._settles else []
+        if moved:
+            self._core.stop_after(LONGEST_SETTLING)
+        self._gridlabd.setup_after_load()
+        if moved:
+            result["settling"] = self._settle(moved)
+            result["solved"] = result["settling"]["solved"]
+        else:
+            result["solved"] = self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS
+        if result["solved"]:
+            result |= self._solver_tables()
+            result["takes"] = [self._takes(name, kind) for name, kind in self._classes.items() if kind in CHILD_OF_BUS]
+        return result
+
+    def _controlled(self) -> list[str]:
+        """Return the regulators and capacitors that a control of their own, or one of the model, may move."""
+        found = [name for name, kind in self._classes.items() if kind in POSITIONS]
+        if "volt_var_control" in self._classes.values():
+            return found
+        return [name for name in found if self._control_of(name) not in ("MANUAL", "")]
+
+    def _control_of(self, name: str) -> str:
+        if self._classes[name] == "capacitor":
+            return str(self._gridlabd.get_object_properties(name)["control"])
+        configuration = self._core.object_of(name, "configuration")
+        return str(self._gridlabd.get_object_properties(configuration)["Control"]) if configuration else ""
+
+    def _settle(self, moved: list[str]) -> dict[str, Any]:
+        """Go on until the positions have been the same for longer than any control waits, or for an hour.
+
+        Returns
+        -------
+        dict
+            Whether the power flow was `solved` all the time; whether they `rest`; the `time` as GridLAB-D writes it,
+            and the `seconds` since the first moment; positions at the `first` moment and the `last`, by object.
+        """
+        wait = 2.0 * max(
+            (self._core.doubles(name, key)[0] for name in self._classes for key in DELAYS if self._core.has(name, key)),
+            default=0.0,
+        )
+        start = changed = later = self._core.clock()
+        first = last = self._positions(moved)
+        solved = True
+        while solved and later - changed <= wait and later <= start + LONGEST_SETTLING:
+            now, time = later, self._gridlabd.get_global("clock")
+            solved = self._gridlabd.step()[0] == self._module.GLDErrorCode.SUCCESS
+            before, last = last, self._positions(moved)
+            later = max(self._core.clock(), now)
+            if now == start:
+                first = last
+            elif last != before:
+                changed = now
+        rest = min(later, start + LONGEST_SETTLING) - changed > wait
+        return {"solved": solved, "rest": rest, "time": time, "seconds": now - start, "first": first, "last": last}
+
+    def _positions(self, names: list[str]) -> dict[str, list[str]]:
+        found = {}
+        for name in names:
+            own = self._gridlabd.get_object_properties(name)
+            found[name] = [str(own[f"{POSITIONS[self._classes[name]]}{phase}"]) for phase in WYE]
+        return found
+
+    def _objects(self) -> list[dict[str, Any]]:
+        found = []
+        for name, kind in self._classes.items():
+            head = self._core.head(name)
+            parent = ObjectHead.from_address(head.parent).name.decode() if head.parent else ""
+            place = (head.longitude, head.latitude)
+            known = all(map(math.isfinite, place))
+            found.append({"name": name, "class": kind, "parent": parent, "place": place if known else None})
+        return found
+
+    def _keep_quiet(self) -> None:
+        """Let nothing be written beside the model, nothing be asserted, no node be content with a coarser tolerance."""
+        for name, kind in self._classes.items():
+            for key in self._gridlabd.get_object_properties(name):
+                if key in WRITTEN and kind != "player":
+                    self._gridlabd.set_property(name, key, os.devnull)
+                elif key == "interval" and kind in WATCHING:  # each of their moments would be a step
+                    self._gridlabd.set_property(name, key, str(LONGEST_SETTLING))
+            if kind.endswith("assert"):
+                self._gridlabd.set_property(name, "status", "ASSERT_NONE")
+            if kind in CHILD_OF_BUS and self._core.has(name, "maximum_voltage_error"):
+                self._core.doubles(name, "maximum_voltage_error")[0] = 0.0
+
+    def _give_a_swing(self) -> None:
+        """Make the only bus to which no branch leads the substation, as it is one in a forward-backward sweep."""
+        buses = [name for name in self._classes if self._core.has(name, "bustype")]
+        if any(self._core.bits(name, "bustype") == SWING for name in buses):
+            return
+        branches = [name for name in self._classes if self._core.has(name, "from") and self._core.has(name, "to")]
+        first, last = ({self._core.object_of(name, key) for name in branches} for key in ("from", "to"))
+        roots = first - last
+        if len(roots) == 1:
+            self._gridlabd.set_property(roots.pop(), "bustype", "SWING")
+
+    def _solver_tables(self) -> dict[str, Any]:
+        package = Path(str(self._module.__file__)).parent
+        powerflow = ctypes.CDLL(str(package / "lib" / "powerflow.so"))
+        counts = [ctypes.c_uint.in_dll(powerflow, f"NR_{table}_count").value for table in ("bus", "branch")]
+        addresses = [ctypes.c_void_p.in_dll(powerflow, f"NR_{table}data").value for table in ("bus", "branch")]
+        buses = (SolverBus * counts[0]).from_address(addresses[0]) if addresses[0] else ()
+        branches = (SolverBranch * counts[1]).from_address(addresses[1]) if addresses[1] else ()
+        return {"buses": [self._bus(bus) for bus in buses], "branches": [self._branch(branch) for branch in branches]}
+
+    def _bus(self, bus: Any) -> dict[str, Any]:
+        name = bus.name.decode()
+        if self._core.find(bus.name) != bus.object:
+            raise RuntimeError("buses are not laid out as in GridLAB-D 6.0.0; install gridlabd==6.0.0")
+        return {
+            "name": name,
+            "class": self._classes[name],
+            "type": bus.type,
+            "phases": bus.original_phases | bus.phases,
+            "V_nom": bus.V_nom,
+            "V": complexes(bus.V, 3),
+        }
+
+    def _branch(self, branch: Any) -> dict[str, Any]:
+        name = branch.name.decode()
+        kind = self._classes[name]
+        row = {
+            "name": name,
+            "class": kind,
+            "from": branch.from_,
+            "to": branch.to,
+            "phases": branch.original_phases | branch.phases,
+            "open": bool(branch.status) and ctypes.c_uint.from_address(branch.status).value == 0,
+        }
+        for key in ("Y_from", "Y_to", "YS_from", "YS_to"):
+            row[key] = complexes(getattr(branch, key), 9)
+        for key, count in (("switch_impedance", 2), ("fuse_resistance", 1)):
+            if self._core.has(name, key):
+                row["Z"] = (list(self._core.doubles(name, key, count)) * 2)[:2]
+        return row
+
+    def _takes(self, name: str, kind: str) -> dict[str, Any]:
+        """Return the powers, currents and admittances of one object itself."""
+        delta = bool(self._core.bits(name, "phases") & PHASE_D)
+        takes: dict[str, dict[str, list[list[float]]]] = {}
+        for letter, word in KINDS.items():
+            takes[letter] = {}
+            if kind.startswith("triplex"):
+                _put(takes[letter], LEGS, [self._complex(name, f"{word}_{leg}") for leg in LEGS])
+                continue
+            pairs = [self._complex(name, f"{word}_{phase}") for phase in WYE]
+            _put(takes[letter], AROUND if delta else WYE, pairs)
+            if letter != "Y":  # GridLAB-D's names shunt_AB etc. lead to its powers
+                _put(takes[letter], AROUND, [self._complex(name, f"{word}_{ends}") for ends in AROUND])
+                _put(takes[letter], WYE, [self._complex(name, f"{word}_{phase}N") for phase in WYE])
+            elif kind == "load":
+                _put(takes[letter], AROUND, [self._inverse(name, f"constant_impedance_{ends}") for ends in AROUND])
+                _put(takes[letter], WYE, [self._inverse(name, f"constant_impedance_{phase}N") for phase in WYE])
+        row: dict[str, Any] = {"name": name, "class": kind, "takes": takes}
+        if kind == "capacitor":
+            row["connected_delta"] = bool(self._core.bits(name, "phases_connected") & PHASE_D) and not delta
+            row["connected"] = self._core.bits(name, "phases_connected") & 0x07
+            row["closed"] = [self._core.bits(name, f"switch{phase}") for phase in WYE]
+            row["var"] = [self._core.doubles(name, f"capacitor_{phase}")[0] for phase in WYE]
+            row["V"] = self._core.doubles(name, "cap_nominal_voltage")[0]
+        return row
+
+    def _complex(self, name: str, key: str) -> list[float]:
+        return list(self._core.doubles(name, key, 2))
+
+    def _inverse(self, name: str, key: str) -> list[float]:
+        value = complex(*self._complex(name, key))
+        inverse = 1.0 / value if value else 0j
+        return [inverse.real, inverse.imag]
+
+
+def _put(takes: dict[str, list[list[float]]], keys: tuple[str, ...], pairs: list[list[float]]) -> None:
+    """Add what is not zero."""
+    for key, pair in zip(keys, pairs, strict=True):
+        if any(pair):
+            takes.setdefault(key, []).append(pair)
+
+
+def main() -> None:
+    """Solve the model and write the result; where that fails, the last line on standard output says why."""
+    model, result = sys.argv[1], Path(sys.argv[2])
+    end_with(int(sys.argv[3]))
+    try:
+        answer = PowerFlowModel(model, result.parent, settles="first" not in sys.argv[4:]).solve()
+    except NotImportableError as error:
+        answer = {"not_importable": str(error)}
+    except Exception as error:
+        answer = {"error": f"{type(error).__name__}: {error}"}
+    status = 0
+    try:
+        result.write_text(json.dumps(answer), encoding="utf-8")
+    except OSError as error:
+        print(f"\n{error}")
+        status = os.EX_CANTCREAT
+    sys.stdout.flush()
+    os._exit(status)  # GridLAB-D's own end is slow, and may fail
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,188 @@
+"""The HELICS federate of a run, as its plant sees it: requests with a deadline, and every failure as one sentence."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from time import monotonic
+from typing import Any
+
+from gridpeers.bridges.helics.helics_settings import HelicsSettings, endpoint
+from gridpeers.bridges.helics.topics import Topic, Value
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
+from gridpeers.wire.packages import damaged
+
+PROCESS = Path(__file__).with_name("federate_process.py")
+
+USER = "a HELICS federate"
+
+MISSING = f"{USER} needs the package helics; install it: pip install 'gridpeers[helics]'"
+
+IMPORT = 60.0
+"""Longest time (s) until the process has imported HELICS, on a machine that is busy."""
+
+FAREWELL = 3.0
+"""Longest wait (s) for the process to leave the federation."""
+
+BEFORE = "before t = 0"
+
+ASK = 5.0
+"""Longest wait (s) for the answer where the others are; it comes at once, but for a busy machine."""
+
+LATER = 3.0
+"""Time (s) for which the process is heard out once its own wait for the broker is over."""
+
+
+class HelicsError(RuntimeError):
+    """The federation, or this federate, cannot go on."""
+
+
+class HelicsFederate:
+    """A federate in a process of its own (`federate_process.py`).
+
+    Parameters
+    ----------
+    settings
+        Its name, and its broker.
+    deadline
+        Longest wait (s of real time) for the others.
+
+    Raises
+    ------
+    HelicsError
+        If the wheel is missing, the broker cannot be reached or started, or the name is taken.
+    """
+
+    def __init__(self, settings: HelicsSettings, deadline: float) -> None:
+        self._settings, self._deadline = settings, deadline
+        self._when = BEFORE
+        self._others = "nobody"
+        """Names of the other federates."""
+        self._process = RequestProcess([sys.executable, str(PROCESS)])
+        ready = self._take(IMPORT, f"its process did not start within {IMPORT:g} s")
+        if "not_importable" in ready:
+            self._process.close(FAREWELL)
+            raise HelicsError(damaged("helics", ready["not_importable"], USER) if ready["installed"] else MISSING)
+        host, port = endpoint(settings.broker)
+        late = f"{settings.broker} did not answer as a HELICS broker of core type ZMQ within {deadline:g} s"
+        self._ask(
+            {
+                "do": "join",
+                "name": settings.name,
+                "host": host,
+                "port": port,
+                "federates": settings.federates,
+                "wait": 0.9 * deadline,
+            },
+            late,
+            deadline + LATER,
+        )
+
+    def begin(
+        self, publications: Sequence[Topic], subscriptions: Sequence[Topic], publish: Mapping[str, Value]
+    ) -> dict[str, list[str]]:
+        """Register topics, publish what holds at t = 0, and wait until all federates are at t = 0.
+
+        Returns
+        -------
+        dict
+            "others": names of the other federates; "missing": keys of the subscriptions that nobody publishes.
+        """
+        settings = self._settings
+        wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"
+        late = f"the federation at {settings.broker} did not begin within {settings.wait:g} s ({wanted})"
+        request = {
+            "do": "begin",
+            "publications": publications,
+            "subscriptions": subscriptions,
+            "publish": publish,
+        }
+        federation = self._ask(request, late, settings.wait)
+        self._others = " or ".join(federation["others"]) or "the broker"
+        return federation
+
+    def step(
+        self, publish: Mapping[str, Value], t: float, after: float = 0.0, *, needed: bool = True
+    ) -> dict[str, Value]:
+        """Publish, go to a time (s), or a little after, and return the values that came since the last step, by key.
+
+        If they are `needed`, a publisher of which none came must not have left.
+        """
+        late = f"{self._others} did not let time go on to {t:g} s within {self._deadline:g} s"
+        answer = self._ask({"do": "step", "publish": publish, "time": t + after, "needed": needed}, late)
+        if answer["gone"]:
+            raise HelicsError(
+                f"HELICS, {self._when}: {' and '.join(answer['gone'])} left the federation before the end; "
+                "let it run at least as long as the scenario"
+            )
+        self._when = f"t = {t:g} s"
+        values: dict[str, Value] = answer["values"]
+        return values
+
+    def end(self, publish: Mapping[str, Value]) -> None:
+        """Publish the last values and leave the federation, which goes on without this federate."""
+        try:
+            self._ask({"do": "end", "publish": publish}, "the federate did not leave")
+        except HelicsError:
+            pass  # the run has its end already
+        finally:
+            self.abort("")
+
+    def abort(self, reason: str) -> None:
+        """End the process, unless it has ended; if it is in a federation still, the others get the reason."""
+        if not self._process.closed:
+            self._process.send({"do": "abort", "reason": f"{self._settings.name}: {reason}"})
+            self._process.close(FAREWELL)
+
+    def _ask(self, request: Mapping[str, Any], late: str, wait: float | None = None) -> dict[str, Any]:
+        self._process.send(request)
+        try:
+            answer = self._take(self._deadline if wait is None else wait, late)
+            if "died" in answer:
+                raise HelicsError(f"HELICS, {self._when}: {answer['died']}")
+            if "error" in answer:
+                raise HelicsError(f"HELICS, {self._when}: {self._explained(answer['error'], request['do'])}")
+        except HelicsError as error:
+            self.abort(str(error))
+            raise
+        return answer
+
+    def _take(self, wait: float, late: str) -> dict[str, Any]:
+        """Return the next answer, or complain that it is late, with the times at which the others are."""
+        answer = self._answer(monotonic() + wait)
+        if answer is not None:
+            return answer
+        self._process.send({"do": "times"})
+        until = monotonic() + ASK
+        times: list[str] = []
+        while (answer := self._answer(until)) is not None:
+            if "times" in answer:
+                times = answer["times"]
+                break
+        silent = "" if self._when == BEFORE else "; nor did the broker answer where they stand"
+        where = f": {', '.join(times)}" if times else silent
+        key = "plant.helics.wait_s" if self._when == BEFORE else "processes.deadline_s"
+        raise HelicsError(f"HELICS, {self._when}: {late}{where}; end what hangs, or raise {key}")
+
+    def _answer(self, until: float) -> dict[str, Any] | None:
+        """Return the next answer of the process; None at a time of `monotonic` (s)."""
+        try:
+            return self._process.answer(until)
+        except ProcessEndedError as how:
+            last = self._process.printed()[-300:].strip().rpartition("\n")[2]
+            name = self._settings.name
+            raise HelicsError(f"HELICS, {self._when}: our federate {name} {how}; {last or 'no word'}") from None
+
+    def _explained(self, error: str, doing: str) -> str:
+        """Return an error of HELICS with what it means."""
+        broker = self._settings.broker
+        if error.startswith("no broker"):
+            return f"{error}; start one: helics_broker -f 2, or --start-broker of gridpeers bridge helics"
+        if "lost connection with broker" in error:
+            return f"the broker at {broker} has ended, or cannot be reached any more"
+        if "lost comms" in error:
+            return f"a federate at {broker} died without leaving ({error})"
+        if "duplicate" in error.lower():
+            return f'{error}; the name "{self._settings.name}" is taken at {broker}: choose another plant.helics.name'
+        return error if doing == "join" else f"the federation ended: {error}"

@@ -1,0 +1,362 @@
+"""One HELICS federate, and its broker if asked for: the only file that knows the package `helics`.
+
+It is a process of its own, because HELICS writes to the terminal from its own threads, and because a wait inside its
+library cannot be ended from Python: a process can. `gridpeers.bridges.helics.federate` starts it as a script, so it
+imports nothing of ours. Each line of standard input is a JSON object with a request, each line of standard output its
+answer; what HELICS prints goes to standard error.
+
+    {"do": "join", "name", "host", "port", "federates", "wait"}
+    {"do": "begin", "publications": [[key, type, unit]], "subscriptions": [...], "publish": {key: value}}
+    {"do": "step", "publish": {key: value}, "time", "needed"}  publish, go to a time (s), return the values that came
+    {"do": "end", "publish": {key: value}}              publish, leave the federation, end
+    {"do": "times"}                                     times of the others; also in the middle of a wait
+    {"do": "abort", "reason": text}                     end the federation at once; also in the middle of a wait
+
+HELICS takes half a minute to notice that a process was killed, or never does. So in a wait this process looks every
+second whether the broker and the others still listen at their ports: {"died": text} is the answer if one does not.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import socket
+import sys
+import threading
+import time
+from typing import Any
+
+GLOBAL_ERROR = 1
+"""HELICS's error code of a federation that we end."""
+
+BROKER_LEAVES = 3000
+"""Longest time (ms) that an own broker waits for the others after the end."""
+
+FAREWELL = 0.3
+"""Time (s) for the word of an abort to reach the others."""
+
+NOBODY = "any"
+"""Type of a topic that nobody publishes."""
+
+PROBE = 0.1
+"""Time (s) between two attempts to reach a broker."""
+
+LOOK = 1.0
+"""Time (s) of a wait after which it looks, and looks again, whether the others still listen. A process that stands
+still listens; only one that has ended does not."""
+
+Address = tuple[str, int]
+"""Host and port."""
+
+
+class RefusedError(Exception):
+    """A request that cannot be done, in words for a person."""
+
+
+class Federate:
+    """The federate with its topics."""
+
+    def __init__(self) -> None:
+        import helics
+
+        self.helics: Any = helics
+        self.fed: Any = None
+        self.broker: Any = None
+        self.name = ""
+        self.publications: dict[str, tuple[Any, str]] = {}
+        self.subscriptions: dict[str, tuple[Any, str]] = {}
+        self.publishers: dict[str, set[str]] = {}
+        """By federate: our subscriptions that it publishes."""
+        self.waits_since: float | None = None
+        """Since when (s, monotonic) it waits for the federation; None while it does not."""
+        self.begun = False
+        """Whether all federates are at t = 0, so that nobody comes any more."""
+        self._broker_at: Address | None = None
+        """Where the broker of somebody else listens."""
+        self._has_broker = ""
+        """Name of the federate of gridpeers that has the broker in its process."""
+        self._others_at: dict[Address, list[str]] = {}
+        """Where the others' processes listen, and the names of the federates in each."""
+        self._cores: set[str] = set()
+        """HELICS's names of the processes that were asked for it."""
+
+    def join(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Start the broker if asked for, and connect to it."""
+        helics, host, port = self.helics, request["host"], request["port"]
+        loopback = host == "127.0.0.1"
+        self.name = request["name"]
+        if request["federates"]:
+            _require_free(host, port)
+            options = f"-f {request['federates']} --loglevel=no_print --localinterface=tcp://{host}:{port}"
+            self.broker = helics.helicsCreateBroker("zmq", self.name + _OF_BROKER, options)
+            if not helics.helicsBrokerIsConnected(self.broker):
+                raise RefusedError(f"cannot start a broker at tcp://{host}:{port}")
+        else:
+            _reach(host, port, request["wait"])
+            self._broker_at = host, port
+        info = helics.helicsCreateFederateInfo()
+        helics.helicsFederateInfoSetCoreTypeFromString(info, "zmq")
+        options = f"--federates=1 --loglevel=no_print --broker_address=tcp://{host}:{port}"
+        if loopback:
+            options += f" --localinterface=tcp://{host}"
+        helics.helicsFederateInfoSetCoreInitString(info, options)
+        helics.helicsFederateInfoSetIntegerProperty(
+            info, helics.HELICS_PROPERTY_INT_LOG_LEVEL, helics.HELICS_LOG_LEVEL_NO_PRINT
+        )
+        # a value that comes between two requested times must not wake it: its times are those of the control period
+        helics.helicsFederateInfoSetFlagOption(info, helics.HELICS_FLAG_UNINTERRUPTIBLE, True)
+        self.fed = helics.helicsCreateValueFederate(self.name, info)
+        return {"version": helics.helicsGetVersion()}
+
+    def begin(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Register all topics, wait for the whole federation, and tell which topics nobody publishes."""
+        helics = self.helics
+        for key, kind, unit in request["publications"]:
+            code = getattr(helics, f"HELICS_DATA_TYPE_{kind.upper()}")
+            self.publications[key] = helics.helicsFederateRegisterGlobalPublication(self.fed, key, code, unit), kind
+        # we tell ourselves which topics nobody publishes; said after the registration, it leaves the broker its warning
+        helics.helicsFederateSetFlagOption(self.fed, helics.HELICS_HANDLE_OPTION_CONNECTION_OPTIONAL, True)
+        for key, kind, unit in request["subscriptions"]:
+            self.subscriptions[key] = helics.helicsFederateRegisterSubscription(self.fed, key, unit), kind
+        self.waits_since = time.monotonic()
+        helics.helicsFederateEnterInitializingMode(self.fed)
+        self._publish(request["publish"])
+        helics.helicsFederateEnterExecutingMode(self.fed)
+        self.waits_since, self.begun = None, True
+        self.meet()
+        others = [name for name in self._names("root", "federates") if name != self.name]
+        for name in others:
+            if keys := self.subscriptions.keys() & set(self._names(name, "publications")):
+                self.publishers[name] = set(keys)
+        if not self.publishers:  # one that does not wait for our values may have left: nobody knows what was its own
+            self.publishers = {name: set(self.subscriptions) for name in others}
+        type_of = helics.helicsInputGetPublicationType
+        missing = [key for key, (topic, _) in self.subscriptions.items() if type_of(topic) == NOBODY]
+        return {"others": others, "missing": missing}
+
+    def step(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Publish, go to a time, and return what was published since the last step."""
+        helics = self.helics
+        self._publish(request["publish"])
+        self.waits_since = time.monotonic()
+        helics.helicsFederateRequestTime(self.fed, request["time"])
+        self.waits_since = None
+        read = {
+            "double": helics.helicsInputGetDouble,
+            "boolean": lambda topic: bool(helics.helicsInputGetBoolean(topic)),
+            "string": helics.helicsInputGetString,
+        }
+        values = {
+            key: read[kind](topic)
+            for key, (topic, kind) in self.subscriptions.items()
+            if helics.helicsInputIsUpdated(topic)
+        }
+        gone = []
+        if request["needed"]:
+            silent = [name for name, keys in self.publishers.items() if not keys & values.keys()]
+            gone = [name for name in silent if self._query(name, "state") in _GONE]
+        return {"values": values, "gone": gone}
+
+    def end(self, request: dict[str, Any]) -> dict[str, Any]:
+        """Leave the federation; an own broker stays until the others have left, or for a while."""
+        self._publish(request["publish"])
+        self.helics.helicsFederateDisconnect(self.fed)
+        if self.broker is not None:
+            self.helics.helicsBrokerWaitForDisconnect(self.broker, BROKER_LEAVES)
+        return {}
+
+    def abort(self, reason: str) -> None:
+        """End the federation for everybody, with a reason that others can print."""
+        if self.fed is None:
+            return
+        with contextlib.suppress(Exception):
+            self.helics.helicsFederateGlobalError(self.fed, GLOBAL_ERROR, reason)
+            time.sleep(FAREWELL)  # HELICS has no sign that the others have heard it
+
+    def times(self) -> list[str]:
+        """Return the other federates and the times at which they stand, for a complaint."""
+        if self.fed is None:
+            return []
+        answer = self._query("root", "global_time")
+        found = []
+        for core in answer.get("cores", []) if isinstance(answer, dict) else []:
+            for federate in core.get("federates", []):
+                name = federate.get("attributes", {}).get("name", "")
+                if name != self.name:
+                    found.append(f"{name} stands at t = {max(federate.get('granted_time', 0.0), 0.0):g} s")
+        return found
+
+    def meet(self) -> None:
+        """Note where the processes of the others listen that have joined by now."""
+        state = self._state()
+        name, of_ours, _ = str(state.get("attributes", {}).get("name", "")).partition(_OF_BROKER)
+        self._has_broker = name if of_ours else ""
+        for core in state.get("cores", []):
+            attributes = core["attributes"]
+            each = [federate["attributes"] for federate in state.get("federates", [])]
+            names = [its["name"] for its in each if its["parent"] == attributes["id"]]
+            if not names or self.name in names or attributes["name"] in self._cores:
+                continue
+            self._cores.add(attributes["name"])
+            host, _, port = str(self._query(attributes["name"], "address")).rpartition("://")[2].rpartition(":")
+            if port.isdecimal() and not _has_ended((host, int(port))):
+                self._others_at[host, int(port)] = names
+
+    def dead(self) -> str:
+        """Return who has ended without leaving the federation, as a sentence; empty if nobody has."""
+        if self._broker_at is not None and _has_ended(self._broker_at):
+            broker = f"the broker at tcp://{self._broker_at[0]}:{self._broker_at[1]}"
+            return f"{self._has_broker} died, and with it {broker}" if self._has_broker else f"{broker} has ended"
+        ended = {name: at for at, names in self._others_at.items() if _has_ended(at) for name in names}
+        if not ended:
+            return ""
+        left = {it["attributes"]["name"] for it in self._state().get("federates", []) if it["state"] in _GONE}
+        died = [f"{name} died: nothing listens at tcp://{at[0]}:{at[1]} any more" for name, at in ended.items()]
+        return "; ".join(text for name, text in zip(ended, died, strict=True) if name not in left)
+
+    def _state(self) -> dict[str, Any]:
+        """Return what the broker knows of the federation, which it answers at once."""
+        state = self._query("root", "current_state")
+        return state if isinstance(state, dict) else {}
+
+    def _publish(self, values: dict[str, Any]) -> None:
+        helics = self.helics
+        write = {
+            "double": helics.helicsPublicationPublishDouble,
+            "boolean": lambda topic, value: helics.helicsPublicationPublishBoolean(topic, int(value)),
+            "string": helics.helicsPublicationPublishString,
+        }
+        for key, value in values.items():
+            topic, kind = self.publications[key]
+            write[kind](topic, value)
+
+    def _names(self, target: str, what: str) -> list[str]:
+        """Return the names in the answer to a query; none if HELICS has no answer, as of a federate that has left."""
+        answer = self._query(target, what)
+        return answer if isinstance(answer, list) else []
+
+    def _query(self, target: str, what: str) -> Any:
+        query = self.helics.helicsCreateQuery(target, what)
+        try:
+            return self.helics.helicsQueryExecute(query, self.fed)
+        finally:
+            self.helics.helicsQueryFree(query)
+
+
+_OF_BROKER = "-broker"
+"""What the name of a broker of ours has after that of its federate."""
+
+_GONE = ("disconnected", "finalized", "error")
+"""States of a federate that publishes no more."""
+
+
+def _require_free(host: str, port: int) -> None:
+    """Refuse a port in use: HELICS itself would wait for it for a long time. A broker of type ZMQ has two ports."""
+    for each in (port, port + 1):
+        with socket.socket() as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                probe.bind((host, each))
+            except OSError as error:
+                text = f"cannot start a broker at tcp://{host}:{port}: port {each}: {error.strerror}"
+                raise RefusedError(f"{text}; end what has it, or choose another port") from None
+
+
+def _reach(host: str, port: int, wait: float) -> None:
+    """Wait until something listens there: HELICS itself would say only much later that nothing does."""
+    until = time.monotonic() + wait
+    while True:
+        try:
+            with socket.create_connection((host, port), timeout=max(PROBE, until - time.monotonic())):
+                return
+        except OSError as error:
+            if time.monotonic() + PROBE > until:
+                why = error.strerror or str(error)
+                raise RefusedError(f"no broker at tcp://{host}:{port} within {wait:g} s ({why})") from None
+            time.sleep(PROBE)
+
+
+def _has_ended(at: Address) -> bool:
+    """Return whether a host that answers refuses connections on a port."""
+    try:
+        socket.create_connection(at, timeout=LOOK).close()
+    except ConnectionRefusedError:
+        return True
+    except OSError:  # as of a host that is out of reach: HELICS may have other ways
+        return False
+    return False
+
+
+def _reason(error: Exception) -> str:
+    """Return the text of an error of HELICS without its number."""
+    text = str(error)
+    return text.partition("] ")[2] if text.startswith("[") else text
+
+
+def main() -> None:
+    """Answer requests until the end of standard input."""
+    answers = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+    requests: queue.Queue[dict[str, Any]] = queue.Queue()
+    federate: Federate | None = None
+
+    def answer(content: dict[str, Any]) -> None:
+        with contextlib.suppress(OSError):  # the parent is gone: so is this process, in a moment
+            answers.write(json.dumps(content) + "\n")
+
+    def answer_times() -> None:
+        with contextlib.suppress(Exception):
+            answer({"times": federate.times() if federate else []})
+
+    def listen() -> None:
+        """Take requests; do at once what must not wait for the present one."""
+        for line in sys.stdin:
+            request = json.loads(line)
+            if request["do"] == "times":  # HELICS asks a dead federate, too, and waits long for it
+                threading.Thread(target=answer_times, daemon=True).start()
+            elif request["do"] == "abort":
+                if federate:
+                    federate.abort(request["reason"])
+                os._exit(0)
+            else:
+                requests.put(request)
+        if federate:
+            federate.abort(f"{federate.name}: its gridpeers process was killed")
+        os._exit(0)
+
+    def look() -> None:
+        """Look who has come, until all are at t = 0; and in a wait, who has died."""
+        while True:
+            time.sleep(LOOK)
+            since = federate.waits_since if federate else None
+            with contextlib.suppress(Exception):
+                if federate and since is not None and time.monotonic() - since >= LOOK and (died := federate.dead()):
+                    answer({"died": died})
+                    return
+                if federate and federate.fed is not None and not federate.begun:
+                    federate.meet()
+
+    try:
+        federate = Federate()
+    except Exception as error:  # a damaged package may raise anything
+        missing = isinstance(error, ModuleNotFoundError) and error.name == "helics"
+        answer({"not_importable": f"{type(error).__name__}: {error}", "installed": not missing})
+        return
+    answer({"ready": True})
+    threading.Thread(target=listen, daemon=True).start()
+    threading.Thread(target=look, daemon=True).start()
+    while True:
+        request = requests.get()
+        try:
+            answer(getattr(federate, request["do"])(request))
+        except Exception as error:
+            answer({"error": _reason(error)})
+        if request["do"] == "end":
+            answers.close()
+            os._exit(0)
+
+
+if __name__ == "__main__":
+    main()

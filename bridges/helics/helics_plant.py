@@ -1,0 +1,192 @@
+"""A plant that an outside federate simulates: its sensors are HELICS values, and our set-points are, too."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+
+import msgspec
+
+from gridpeers.bridges.helics import topics
+from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.topics import ACT, Value, number
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.feeder.plant import Reading
+from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.wire.bounds import NAME
+from gridpeers.wire.codec import decode_foreign
+from gridpeers.wire.messages import LoadSetting, PlantEvent
+from gridpeers.wire.timing import time_of
+from gridpeers.wire.wording import first_of
+
+SHOWN = 4
+"""Topics that an error names."""
+
+
+class HelicsPlant:
+    """The plant's side of our agents, and a controller in the federation.
+
+    At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
+    agents' set-points. So a plant that steps from t on with what it finds at the end of its step has them in force from
+    t, as ours has.
+
+    Parameters
+    ----------
+    config
+        Names, times and the federation; the scenario's events are the outside plant's to carry out.
+    feeder
+        Ratings of the inverters.
+
+    Raises
+    ------
+    HelicsError
+        If the federation does not begin, or topics are missing.
+    """
+
+    def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
+        settings = config.settings
+        helics = self._helics = settings.helics
+        self.inverters = tuple(row.name for row in feeder.inverters)
+        self.tick = 0
+        self._T_c, self._record = config.T_c, config.record_step
+        self._rows_a_tick = round(config.T_c / config.record_step)
+        self._end_tick = None if config.end is None else round(config.end / config.T_c)
+        self._ours = {
+            row.name: (settings.P_set0 * row.P_rated, settings.V_set0 * row.V_nom) for row in feeder.inverters
+        }
+        needed = [topic for name in self.inverters for topic in topics.sensors(helics.prefix, name)]
+        optional = [
+            topic
+            for name in self.inverters
+            for topic in (*topics.held(helics.prefix, name), *topics.where(helics.prefix, name))
+        ]
+        optional.append(topics.events(helics.prefix))
+        self._needed = [topic.key for topic in needed]
+        self._island_keys = {f"{helics.prefix}/{name}/island" for name in self.inverters}
+        self._values: dict[str, Value] = {}
+        self._outgoing: dict[str, Value] = {}
+        self._rows: list[tuple[float, ...]] = []
+        self._events: list[PlantEvent] = []
+        ours = [topic for name in config.agents for topic in topics.set_points(helics.prefix, name)]
+        self._federate = HelicsFederate(helics, config.deadline)
+        try:
+            self._check_publishers(self._federate.begin(ours, [*needed, *optional], {}))
+            self._hear(0)
+        except HelicsError as error:
+            self._federate.abort(str(error))
+            raise
+
+    def measure(self) -> dict[str, Reading]:
+        """Return the sensors' values at t = tick * T_c."""
+        prefix = self._helics.prefix
+        first = self.inverters[0]
+        readings = {}
+        for name in self.inverters:
+            f, P, Q, V, P_set, V_set = self._numbers(name)
+            fed = bool(self._values.get(f"{prefix}/{name}/grid_connected", False))
+            island = str(self._values.get(f"{prefix}/{name}/island", "grid" if fed else first))
+            readings[name] = Reading(P, Q, V, f, P_set, V_set, fed, island)
+        return readings
+
+    def hold(self, name: str, P_set: float, V_set: float) -> None:
+        """Publish set-points (W, V) with the next step; one that is not finite is ignored."""
+        if not (math.isfinite(P_set) and math.isfinite(V_set)):
+            return
+        self._ours[name] = P_set, V_set
+        for topic, value in zip(topics.set_points(self._helics.prefix, name), (P_set, V_set), strict=True):
+            self._outgoing[topic.key] = value
+
+    def connect(self, name: str, on: bool) -> None:
+        """Refuse: there is no topic for it."""
+        raise HelicsError(f"{name} cannot {'join' if on else 'leave'}: a HELICS plant has its inverters all the time")
+
+    @property
+    def switches(self) -> dict[str, bool]:
+        """Return none: the outside plant has the switches."""
+        return {}
+
+    def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
+        """Refuse: the outside plant has the switches."""
+        raise ValueError(f"{name}: the outside plant has the switches, and HELICS no topic for them")
+
+    @property
+    def loads(self) -> Mapping[str, complex]:
+        """Return none: the outside plant has the loads."""
+        return {}
+
+    def set_load(self, name: str, setting: LoadSetting) -> str:
+        """Refuse: the outside plant has the loads."""
+        raise ValueError(f"load {name}: the outside plant has the loads, and HELICS no topic for them")
+
+    def advance(self) -> None:
+        """Publish the set-points, and go on to the next tick."""
+        try:
+            for k in range(1, self._rows_a_tick + 1):
+                self._hear(self.tick * self._rows_a_tick + k)
+        except HelicsError as error:
+            self._federate.abort(str(error))
+            raise
+        self.tick += 1
+
+    def take_rows(self) -> tuple[tuple[float, ...], ...]:
+        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
+        rows, self._rows = tuple(self._rows), []
+        return rows
+
+    def take_events(self) -> tuple[PlantEvent, ...]:
+        """Return the events that the outside plant published since the last call."""
+        events, self._events = tuple(self._events), []
+        return events
+
+    def close(self) -> None:
+        """Leave the federation, or end it if the run has not reached its end."""
+        if self.tick == self._end_tick:
+            self._federate.end({})
+        else:
+            self._federate.abort(f"the run ended at t = {time_of(self.tick, self._T_c):g} s, before its end")
+
+    def _hear(self, row: int) -> None:
+        """Publish what is due, go on to a record time, and take its values."""
+        t = time_of(row, self._record)
+        came = self._federate.step(self._outgoing, t, ACT)
+        self._outgoing = {}
+        self._check(came, t)
+        self._values |= came
+        if (lacking := [key for key in self._needed if key not in self._values]) and row == 0:
+            names = first_of(lacking, SHOWN)
+            raise HelicsError(f"HELICS, t = 0 s: no value yet of {names}; publish all at t = 0 or before")
+        self._rows.append((t, *(x for name in self.inverters for x in self._numbers(name))))
+        if text := came.get(topics.events(self._helics.prefix).key):
+            self._events += self._decoded(str(text), t)
+
+    def _numbers(self, name: str) -> tuple[float, ...]:
+        """Return f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V) of an inverter."""
+        prefix = self._helics.prefix
+        measured = (float(self._values[topic.key]) for topic in topics.sensors(prefix, name))
+        followed = zip(topics.held(prefix, name), self._ours[name], strict=True)
+        return (*measured, *(float(self._values.get(topic.key, own)) for topic, own in followed))
+
+    def _check_publishers(self, federation: Mapping[str, list[str]]) -> None:
+        lacking = [key for key in self._needed if key in federation["missing"]]
+        if lacking:
+            others = ", ".join(federation["others"]) or "nobody else"
+            raise HelicsError(
+                f"HELICS: nobody publishes {first_of(lacking, SHOWN)} (in the federation: {others}); "
+                "publish these topics, or correct plant.helics.prefix"
+            )
+
+    def _check(self, came: Mapping[str, Value], t: float) -> None:
+        for key, value in came.items():
+            if not isinstance(value, bool | str) and not math.isfinite(number(value)):
+                raise HelicsError(f"HELICS, t = {t:g} s: {key} is not a finite number; correct its publisher")
+            if key in self._island_keys and not re.fullmatch(NAME, str(value)):
+                text = f"{key} must be the name of an inverter, grid or off, got {str(value)!r:.80}"
+                raise HelicsError(f"HELICS, t = {t:g} s: {text}; correct its publisher")
+
+    def _decoded(self, text: str, t: float) -> tuple[PlantEvent, ...]:
+        try:
+            return decode_foreign(msgspec.json.Decoder(tuple[PlantEvent, ...]).decode, text)
+        except msgspec.DecodeError as error:
+            key = topics.events(self._helics.prefix).key
+            return (PlantEvent(t=t, kind="warning", subject=key, text=f"{key} cannot be read: {error}"),)

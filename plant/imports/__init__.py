@@ -1,1 +1,0 @@
-"""Feeders from other programs' files."""

@@ -1,5 +1,0 @@
-"""Feeders written for OpenDSS: the engine reads the script, we take over its elements."""
-
-from gridpeers.plant.imports.opendss.read_opendss import read_opendss
-
-__all__ = ["read_opendss"]

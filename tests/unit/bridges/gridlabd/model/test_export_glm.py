@@ -1,0 +1,120 @@
+"""A feeder as a model that GridLAB-D runs without us."""
+
+import csv
+import subprocess
+import sys
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from gridpeers.bridges.gridlabd.model.export_glm import export_glm
+from gridpeers.plant.equipment import Feeder, Load
+from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GfmParameters
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import FeederError, read_feeder
+
+TOLERANCE = 1e-8
+"""Largest difference (pu); GridLAB-D writes 1e-6 V, which is 4e-10 pu."""
+
+RUN = """import gridlabd
+model = gridlabd.DirectGridLabD()
+model.load_glm(["model.glm"])
+model.setup_after_load()
+assert model.run() == gridlabd.GLDErrorCode.SUCCESS
+"""
+
+
+def voltages(text: str, folder: Path) -> dict[str, list[complex]]:
+    """Run a model in the stock wheel; return the phasors A, B, C (V) of its nodes at the start."""
+    pytest.importorskip("gridlabd", reason="GridLAB-D comes with the extra gridlabd")
+    (folder / "model.glm").write_text(text)
+    subprocess.run([sys.executable, "-c", RUN], cwd=folder, check=True, capture_output=True, timeout=100)
+    with (folder / "voltages.csv").open(newline="") as stream:
+        rows = [row for row in csv.reader(stream) if len(row) == 7][1:]
+    return {name: [complex(float(a), float(b)) for a, b in list(pairwise(values))[::2]] for name, *values in rows}
+
+
+def largest_difference(feeder: Feeder, theirs: dict[str, list[complex]]) -> float:
+    """Largest difference (pu) over all nodes of a power flow; behind a delta winding, over phase to phase."""
+    network = Network(feeder)
+    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    floating = {row.to_bus for row in feeder.transformers if row.connection == "D-D"}
+    gaps = []
+    for bus in feeder.buses:
+        index = [network.index(bus.name, phase) for phase in bus.phases]
+        gap = V[index] - [theirs[f"n{bus.name}"]["ABC".index(phase)] for phase in bus.phases]
+        gaps.append(np.abs(gap - gap.mean() if bus.name in floating else gap).max() / bus.V_nom)
+    assert len(gaps) == len(feeder.buses) > 100
+    return float(max(gaps))
+
+
+def test_an_exported_power_flow_has_our_voltages(tmp_path: Path) -> None:
+    """Every node of the IEEE 123-node feeder, run by GridLAB-D from the exported model, has the voltage it has here."""
+    feeder = read_feeder("standard123")
+
+    theirs = voltages(export_glm(feeder, PlantSettings(), 1, "voltages.csv"), tmp_path)
+
+    assert largest_difference(feeder, theirs) < TOLERANCE
+
+
+def test_transformers_and_regulators_of_any_ratio_are_exported(tmp_path: Path) -> None:
+    """A loaded grounded transformer, and regulators between two taps, one ratio a phase, give the same voltages."""
+    feeder = read_feeder("standard123")
+    ratios = {"reg1": 1.0321, "reg2": 0.9875}
+    feeder = replace(
+        feeder,
+        transformers=tuple(replace(row, connection="Yg-Yg") for row in feeder.transformers),
+        regulators=tuple(replace(row, ratio=ratios.get(row.name, row.ratio)) for row in feeder.regulators),
+        loads=(*feeder.loads, Load(bus="610", connection="Y", model="P", S=(40e3 + 1e4j, 2e4 + 0j, 3e4 + 2e4j))),
+    )
+
+    theirs = voltages(export_glm(feeder, PlantSettings(), 1, "voltages.csv"), tmp_path)
+
+    assert largest_difference(feeder, theirs) < TOLERANCE
+
+
+def test_exported_inverters_start_at_our_operating_point(tmp_path: Path) -> None:
+    """GridLAB-D begins with the terminal voltages that our plant has with the same parameters and set-points."""
+    feeder = read_feeder("microgrid123", "event2")
+    roof, lateral = (replace(feeder.inverters[i], P_rated=5e4) for i in (1, 0))
+    added = (replace(roof, name="roof", bus="47", phases="C"), replace(lateral, name="lateral", bus="96", phases="B"))
+    feeder = replace(feeder, inverters=(*feeder.inverters, *added))
+    settings = PlantSettings(P_set0=0.5, gfm=GfmParameters(X_f=0.2))
+
+    text = export_glm(feeder, settings, 1, "voltages.csv")
+    theirs = voltages(text, tmp_path)
+
+    assert text.count("Xfilter 0.2;") == 4
+    ours = Plant(Network(feeder), settings, settings.h, settings.h).measure()
+    for row in feeder.inverters:
+        V = np.mean([abs(theirs[f"n{row.bus}"]["ABC".index(phase)]) for phase in row.phases])
+        assert abs(V - ours[row.name].V) / row.V_nom < TOLERANCE, row.name
+
+
+def test_everything_that_cannot_be_exported_is_named_at_once() -> None:
+    """No substation, another frequency, names that it does not take, or twice; and a GFM that it does not have."""
+    feeder = read_feeder("microgrid123")
+    first, second, *others = feeder.inverters
+    inverters = (replace(first, name="1.st"), replace(second, name="n13"), *others)
+    feeder = replace(feeder, source=None, f_nom=50.0, inverters=inverters)
+
+    with pytest.raises(FeederError) as error:
+        export_glm(feeder, PlantSettings(), 1, "voltages.csv")
+    crowded = replace(feeder, inverters=(*inverters, replace(others[2], name="leg", bus="80", phases="B")))
+    with pytest.raises(FeederError, match='bus "80" has inv4, leg; GridLAB-D takes one inverter a bus'):
+        export_glm(crowded, PlantSettings(), 1, "voltages.csv")
+    with pytest.raises(FeederError, match='inv1 has model = "regfm_a1", which no GFM of GridLAB-D has'):
+        export_glm(read_feeder("microgrid123"), PlantSettings(gfm=REGFM_A1), 1, "voltages.csv")
+
+    assert error.value.problems == (
+        "microgrid123 has no source.csv; GridLAB-D needs a substation as its swing bus",
+        "microgrid123 has 50 Hz; the model is written for 60 Hz",
+        'bus "13": another object of the model has its name n13; rename it',
+        'inverter "1.st": GridLAB-D takes letters, digits, _ and - for a name; rename it',
+        'inverter "n13": another object of the model has its name n13; rename it',
+    )

@@ -1,0 +1,151 @@
+"""Feeders written for GridLAB-D have its voltages after the import, whatever is in them."""
+
+from pathlib import Path
+
+import pytest
+
+from gridpeers.bridges.gridlabd.model.export_glm import export_glm
+from gridpeers.bridges.gridlabd.reading.glm_loads import V_MIN
+from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.write import write_feeder
+from tests.unit.bridges.gridlabd.reading.glm_models import (
+    ASYMMETRIC,
+    HEAD,
+    LOADS,
+    SWITCHES,
+    TOLERANCE,
+    TRANSFORMERS,
+    largest_difference,
+    write,
+)
+
+pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
+
+
+@pytest.mark.parametrize(("model", "count"), [(TRANSFORMERS, 23), (LOADS, 9), (SWITCHES, 16), (ASYMMETRIC, 21)])
+def test_voltages_are_gridlabds(tmp_path: Path, model: str, count: int) -> None:
+    """Every voltage is GridLAB-D's within 1e-6 pu."""
+    difference, nodes = largest_difference(write(tmp_path, model))
+
+    assert nodes == count
+    assert difference < TOLERANCE
+
+
+@pytest.mark.parametrize(("name", "leave_out"), [("standard123", ()), ("microgrid123", ("inverter_dyn.*",))])
+def test_our_own_feeder_comes_back(tmp_path: Path, name: str, leave_out: tuple[str, ...]) -> None:
+    """The 123-node feeder of our tables, exported for GridLAB-D and imported, has the voltages of the tables."""
+    own = Network(read_feeder(name))
+    V = dict(zip(own.nodes, solve_power_flow(own, own.closed0, tolerance=1e-11).V, strict=True))
+    path = write(tmp_path, export_glm(read_feeder(name), PlantSettings(), 1, "voltages.csv"))
+    back = Network(read_glm(path, leave_out=leave_out))
+    solved = solve_power_flow(back, back.closed0, tolerance=1e-11)
+
+    differences = [
+        abs(V[bus[1:], phase] - voltage) / V_nom
+        for (bus, phase), voltage, V_nom in zip(back.nodes, solved.V, back.V_nom, strict=True)
+        if bus[0] == "n"
+        and "~" not in bus
+        and bus != "n610"  # behind a delta winding: to ground it has no voltage of its own
+    ]
+    assert len(differences) >= 270
+    assert max(differences) < TOLERANCE
+    assert [path.name for path in tmp_path.iterdir()] == ["feeder.glm"]
+
+
+def test_tables_of_an_import_are_read_again(tmp_path: Path) -> None:
+    """The tables that an import is saved as give the same voltages."""
+    feeder = read_glm(write(tmp_path, TRANSFORMERS))
+    write_feeder(feeder, tmp_path / "tables")
+
+    first, again = (Network(each) for each in (feeder, read_feeder(str(tmp_path / "tables"))))
+
+    assert first.nodes == again.nodes
+    ours, theirs = (solve_power_flow(each, each.closed0).V for each in (first, again))
+    assert abs(ours - theirs).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("phases", "balanced"),
+    [
+        (("6321.985447626403+3650j", "0-7300j", "-6321.985447626403+3650j"), True),
+        (("7300+100j", "-3600-6200j", "-3650+6400j"), False),
+    ],
+    ids=["turned", "unbalanced"],
+)
+def test_the_substation_has_the_models_voltages(tmp_path: Path, phases: tuple[str, str, str], balanced: bool) -> None:
+    """A substation that is turned, or whose phases differ, feeds as in GridLAB-D; of unequal phases a note tells."""
+    first = HEAD.index("  voltage_A")
+    last = HEAD.index("\n", first)
+    voltages = " ".join(f"voltage_{letter} {V};" for letter, V in zip("ABC", phases, strict=True))
+    path = write(tmp_path, SWITCHES.replace(HEAD[first:last], f"  {voltages} }}"))
+
+    assert largest_difference(path)[0] < TOLERANCE
+    assert any("its voltages are unbalanced" in note for note in read_glm(path).notes) != balanced
+
+
+def test_constant_power_ends_where_the_voltage_collapses(tmp_path: Path) -> None:
+    """Loads of constant power and current have a limit below their usual voltage; impedances need none."""
+    parts = read_glm(write(tmp_path, LOADS)).load_parts
+
+    assert {part.exponents for part in parts} == {(0.0, 0.0), (1.0, 1.0), (2.0, 2.0)}
+    for part in parts:
+        assert part.V_min <= V_MIN
+        assert (part.V_min > 0.6) == (part.exponents != (2.0, 2.0))
+        assert part.edge == part.exponents[0] or not part.V_min  # its current does not jump at the limit
+
+
+def test_switches_are_switches(tmp_path: Path) -> None:
+    """Switches and reclosers open and close here, too; a fuse stays, and a note says so."""
+    feeder = read_glm(write(tmp_path, SWITCHES), switches=["overhead_line.back"])
+
+    assert {switch.alias: switch.closed for switch in feeder.switches} == {
+        "sw": True,
+        "rec": True,
+        "tie": False,
+        "back": True,
+    }
+    assert "fuse.lateral: stays as it is" in feeder.notes
+    network = Network(feeder)
+    names = {switch.alias: switch.name for switch in feeder.switches}
+    solved = solve_power_flow(network, network.closed0 - {names["back"]})
+    assert solved.V[network.index("nf", "B")] == 0.0
+    solved = solve_power_flow(network, network.closed0 - {names["back"]} | {names["tie"]})
+    assert abs(solved.V[network.index("nf", "B")]) > 7000.0
+
+
+def test_a_nominal_voltage_that_is_wrong_is_told_and_mended(tmp_path: Path) -> None:
+    """A bus whose nominal voltage is stated line-to-line has the voltage that GridLAB-D finds there."""
+    path = write(
+        tmp_path,
+        SWITCHES.replace("name ne; phases ABCN; nominal_voltage 7200", "name ne; phases ABCN; nominal_voltage 12470"),
+    )
+
+    feeder = read_glm(path)
+
+    assert any(note.startswith("load.ne: nominal_voltage 12470 V, and 72") for note in feeder.notes)
+    assert next(bus.V_nom for bus in feeder.buses if bus.name == "ne") == pytest.approx(7250.0, rel=0.01)
+    assert sum(feeder.load_by_bus().values()) == pytest.approx(2.9e5)
+
+
+@pytest.mark.parametrize("stated", [7200, 12470])
+@pytest.mark.parametrize(
+    "feeding",
+    [
+        "object switch { name sw; phases ABCN; from b; to x; operating_mode INDIVIDUAL; phase_B_state OPEN; }",
+        "object fuse { name f; phases ABCN; from b; to x; current_limit 1000; phase_B_status BLOWN; "
+        "phase_A_status GOOD; phase_C_status GOOD; }",
+    ],
+    ids=["switch", "fuse"],
+)
+def test_a_de_energised_phase_has_no_part_in_a_nominal_voltage(tmp_path: Path, stated: int, feeding: str) -> None:
+    """A right nominal voltage stays where a phase is open; in place of a wrong one comes that of the live phases."""
+    load = f"object load {{ name x; phases ABCN; nominal_voltage {stated}; constant_impedance_A 300+50j; "
+    model = HEAD + feeding + load + "constant_impedance_B 300+50j; constant_impedance_C 300+50j; }\n"
+
+    feeder = read_glm(write(tmp_path, model))
+
+    assert next(bus.V_nom for bus in feeder.buses if bus.name == "x") == pytest.approx(7250.0, rel=0.01)
+    assert any("nominal_voltage" in note for note in feeder.notes) == (stated != 7200)

@@ -1,0 +1,146 @@
+"""Lines, transformers, capacitors, reactors and switches have the voltages that the OpenDSS engine gives them."""
+
+from pathlib import Path
+
+import pytest
+
+from gridpeers.bridges.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from tests.unit.bridges.opendss.opendss_scripts import ELEMENTS, LINES, LOADS, TRANSFORMERS
+from tests.unit.bridges.opendss.opendss_solutions import (
+    LINE,
+    STEP_DOWN,
+    TOLERANCE,
+    engine_voltages,
+    largest_difference,
+    our_voltages,
+    write,
+)
+
+pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+
+
+@pytest.mark.parametrize("connection", TRANSFORMERS)
+def test_a_transformer_is_the_engines(tmp_path: Path, connection: str) -> None:
+    """Transformers of every connection, with uneven loads, have the engine's voltages."""
+    assert largest_difference(write(tmp_path, LINE, TRANSFORMERS[connection])) < TOLERANCE
+
+
+@pytest.mark.parametrize("element", ELEMENTS)
+def test_a_capacitor_reactor_or_fault_is_the_engines(tmp_path: Path, element: str) -> None:
+    """Capacitors, reactors and faults, shunt and in series, have the engine's voltages."""
+    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, LOADS, ELEMENTS[element])) < TOLERANCE
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_line_is_the_engines(tmp_path: Path, line: str) -> None:
+    """Lines by sequence impedances or geometry, with crossed phases, in parallel, with a neutral: all the engine's."""
+    load = "New Load.d bus1=d.2 phases=1 kv=0.277 kw=50 kvar=10"
+
+    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, LOADS, LINES[line], load)) < TOLERANCE
+
+
+def test_an_admittance_matrix_may_be_asymmetric(tmp_path: Path) -> None:
+    """An element whose matrix differs from its transpose, by unequal sequence impedances, comes over as it is."""
+    reactor = "New Reactor.x bus1=c bus2=d phases=3 z1=(0.01 0.04) z2=(0.02 0.01) z0=(0.03 0.09)"
+    load = "New Load.d bus1=d.2 phases=1 kv=0.277 kw=50 kvar=10"
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, reactor, load)
+    (element,) = [element for element in read_opendss(path).elements if element.name == "reactor.x"]
+
+    assert element.Y[0][1] != pytest.approx(element.Y[1][0])
+    assert largest_difference(path) < TOLERANCE
+
+
+@pytest.mark.parametrize("state", ["closed", "open"])
+def test_a_switch_stands_as_in_the_script(tmp_path: Path, state: str) -> None:
+    """Line with `switch=yes` becomes a switch that stands as in the script; what it cuts off has no voltage."""
+    ring = """New Line.tie bus1=c bus2=d switch=yes r1=0.001 x1=0.001 r0=0.001 x0=0.001 c1=0 c0=0
+New Line.l bus1=c bus2=e r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Line.m bus1=e bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
+"""
+    path = write(tmp_path, LINE, STEP_DOWN, ring, "Open Line.tie 1" if state == "open" else "")
+    feeder = read_opendss(path)
+
+    assert [(switch.alias, switch.closed) for switch in feeder.switches] == [("tie", state == "closed")]
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_a_line_with_a_control_that_switches_it_is_a_switch(tmp_path: Path) -> None:
+    """A line that a SwtControl can open becomes a switch, though the script does not call it one."""
+    line = "New Line.tie bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05\nNew Load.d bus1=d kv=0.48 kw=90 kvar=30"
+    path = write(tmp_path, LINE, STEP_DOWN, line, "New SwtControl.s SwitchedObj=Line.tie SwitchedTerm=1")
+
+    assert [switch.alias for switch in read_opendss(path).switches] == ["tie"]
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_a_bus_without_a_voltage_base_has_its_own_voltage(tmp_path: Path) -> None:
+    """Where a script sets no voltage bases, the voltage that a bus has is its nominal one."""
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS)
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if "VoltageBases" not in line))
+    theirs = engine_voltages(path)
+
+    for bus in read_opendss(path).buses:
+        if bus.name in "bc":
+            assert bus.V_nom == pytest.approx(max(abs(theirs[f"{bus.name}.{number}"]) for number in (1, 2, 3)))
+
+
+def test_opening_a_switch_is_opening_the_line(tmp_path: Path) -> None:
+    """Opened after the import, a switch gives the voltages that the engine has with the line opened in the script."""
+    ring = """New Line.tie bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Line.l bus1=c bus2=d r1=0.02 x1=0.02 r0=0.02 x0=0.05 length=1
+New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
+"""
+    network = Network(read_opendss(write(tmp_path, LINE, STEP_DOWN, ring), switches=["Line.tie"]))
+    solved = solve_power_flow(network, network.closed0 - {network.switch_name("tie")}, tolerance=1e-12)
+    theirs = engine_voltages(write(tmp_path, LINE, STEP_DOWN, ring, "Open Line.tie 1"))
+
+    for number, letter in enumerate("ABC", start=1):
+        i = network.index("d", letter)
+        assert abs(solved.V[i] - theirs[f"d.{number}"]) / network.V_nom[i] < TOLERANCE
+
+
+def test_a_line_that_is_opened_becomes_a_switch(tmp_path: Path) -> None:
+    """A line that the script opens is an open switch; the section behind it is dead, and its loads take nothing."""
+    far = """New Line.l bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1
+New Load.d bus1=d phases=3 kv=0.48 kw=90 kvar=30
+Open Line.l 2
+"""
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, far)
+    ours, nominal = our_voltages(path)
+    theirs = engine_voltages(path)
+
+    assert [switch.closed for switch in read_opendss(path).switches] == [False]
+    assert all(ours[f"d.{number}"] == 0.0 for number in (1, 2, 3))
+    for name, V in theirs.items():
+        if not name.startswith("d."):
+            assert abs(ours[name] - V) / nominal[name] < TOLERANCE
+
+
+def test_a_line_may_be_open_in_one_phase(tmp_path: Path) -> None:
+    """A line that the script opens in one phase alone keeps the others, and is no switch."""
+    line = "New Line.l bus1=c bus2=d r1=0.01 x1=0.02 r0=0.02 x0=0.05 length=1\nOpen Line.l 1 2"
+    load = "New Load.da bus1=d.1 phases=1 kv=0.277 kw=40\nNew Load.dc bus1=d.3 phases=1 kv=0.277 kw=30"
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, line, load)
+
+    assert read_opendss(path).switches == ()
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_a_feeder_of_50_hertz_has_its_frequency(tmp_path: Path) -> None:
+    """Reactances are those of the script's frequency, which becomes the feeder's nominal one."""
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, ELEMENTS["capacitor, wye"])
+    path.write_text(path.read_text().replace("DefaultBaseFrequency=60", "DefaultBaseFrequency=50"))
+
+    assert read_opendss(path).f_nom == 50.0
+    assert largest_difference(path) < TOLERANCE
+
+
+def test_disabled_elements_are_not_there(tmp_path: Path) -> None:
+    """Elements that the script disables are not imported, as the engine does without them."""
+    more = "New Load.off bus1=c phases=3 kv=0.48 kw=200 kvar=50 enabled=no\nNew Capacitor.k bus1=c kvar=100 kv=0.48\n"
+    path = write(tmp_path, LINE, STEP_DOWN, LOADS, more, "Disable Capacitor.k")
+
+    assert largest_difference(path) < TOLERANCE
+    assert not [element for element in read_opendss(path).elements if element.name == "capacitor.k"]

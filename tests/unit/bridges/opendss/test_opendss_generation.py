@@ -1,0 +1,118 @@
+"""Generators, photovoltaic systems and storage deliver the power that they deliver in the OpenDSS engine."""
+
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from gridpeers.bridges.opendss import read_opendss
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.tables.write import write_feeder
+from tests.unit.bridges.opendss.opendss_solutions import (
+    LETTERS,
+    LINE,
+    STEP_DOWN,
+    TOLERANCE,
+    engine_voltages,
+    largest_difference,
+    write,
+)
+
+pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+
+UNEVEN = "New Load.uneven bus1=c.1.2 phases=1 kv=0.48 kw=60 kvar=10 vminpu=0.5"
+"""A load that makes the voltages unequal."""
+
+SCRIPTS = {
+    "generator": "New Generator.g bus1=c kv=0.48 kw=50 kvar=10",
+    "one phase": "New Generator.g bus1=c.1 phases=1 kv=0.277 kw=20 pf=0.9",
+    "two phases": "New Generator.g bus1=c.2.3 phases=2 kv=0.48 kw=30 pf=0.9",
+    "delta": "New Generator.g bus1=c conn=delta kv=0.48 kw=50 pf=-0.9",
+    "below its limits": "New Generator.g bus1=c kv=0.48 kw=50 pf=-0.9 vminpu=1.1 vmaxpu=1.2",
+    "partly above its limits": "New Generator.g bus1=c kv=0.48 kw=50 vminpu=0.7 vmaxpu=0.99",
+    "impedance": "New Generator.g bus1=c kv=0.48 kw=50 model=2",
+    "voltage-controlled": "New Generator.g bus1=c kv=0.48 kw=50 model=3 maxkvar=40 minkvar=-40 vpu=1.0",
+    "photovoltaic": "New PVSystem.p bus1=c.1.2 phases=1 kv=0.48 kva=50 pmpp=40 irradiance=0.8",
+    "volt-var": (
+        "New PVSystem.p bus1=c kv=0.48 kva=50 pmpp=40\n"
+        "New XYcurve.vv npts=4 Yarray=(1 1 -1 -1) XArray=(0.5 0.95 1.05 1.5)\n"
+        "New InvControl.i mode=voltvar voltage_curvex_ref=rated vvc_curve1=vv derlist=(pvsystem.p)"
+    ),
+    "discharging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=discharging",
+    "charging": "New Storage.s bus1=c kv=0.48 kwrated=50 kwhrated=100 state=charging %stored=20",
+}
+
+
+@pytest.mark.parametrize("kind", SCRIPTS)
+def test_generation_delivers_what_the_engine_says(tmp_path: Path, kind: str) -> None:
+    """Generation of each class, connection and range of voltage agrees with the engine."""
+    assert largest_difference(write(tmp_path, LINE, STEP_DOWN, UNEVEN, SCRIPTS[kind])) < TOLERANCE
+
+
+LIMITS = "kv=0.48 vminpu=0.9 vmaxpu=1.1"
+BEYOND = {
+    **{f"model {model}": f"New Generator.g bus1=c kw=50 kvar=10 model={model} {LIMITS}" for model in (1, 2, 4, 5)},
+    "voltage-controlled": f"New Generator.g bus1=c kw=50 kvar=20 model=3 maxkvar=20 minkvar=20 {LIMITS}",
+    "limited current": f"New Generator.g bus1=c kw=50 pf=1 model=7 {LIMITS}",
+    "fixed kvar, delta": f"New Generator.g bus1=c kw=50 kvar=10 model=4 conn=delta {LIMITS}",
+    "photovoltaic": f"New PVSystem.p bus1=c kva=50 pmpp=40 kvar=12 {LIMITS}",
+    "photovoltaic of limited current": f"New PVSystem.p bus1=c kva=50 pmpp=40 kvar=12 limitcurrent=yes {LIMITS}",
+    "storage": f"New Storage.s bus1=c kwrated=50 kwhrated=100 state=discharging {LIMITS}",
+    "storage of limited current": f"New Storage.s bus1=c kwrated=50 limitcurrent=yes state=discharging {LIMITS}",
+    "negative load": f"New Load.l bus1=c phases=3 kw=-90 kvar=30 {LIMITS}",
+}
+"""Generation of each law; that of the Generator's model 7 beyond its limit has its vars reversed in the engine."""
+
+
+@pytest.mark.parametrize("pu", [0.6, 0.8, 1.16])
+@pytest.mark.parametrize("kind", BEYOND)
+def test_generation_beyond_its_limits_is_that_of_the_engine(tmp_path: Path, kind: str, pu: float) -> None:
+    """A snapshot at 1.02 pu, taken to a voltage below Vminpu or above Vmaxpu, has the engine's voltages there."""
+    uneven = "New Load.uneven bus1=c.1.2 phases=1 kv=0.48 kw=60 kvar=10 model=2"
+    path = write(tmp_path, LINE, STEP_DOWN, uneven, BEYOND[kind])
+    feeder = read_opendss(path)
+    path.write_text(path.read_text().replace("pu=1.02", f"pu={pu}"))
+    assert feeder.source
+
+    network = Network(replace(feeder, source=replace(feeder.source, V_pu=feeder.source.V_pu * pu / 1.02)))
+    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+
+    for name, theirs in engine_voltages(path).items():
+        bus, _, number = name.rpartition(".")
+        node = network.index(bus, LETTERS[int(number) - 1])
+        assert abs(V[node] - theirs) < TOLERANCE * network.V_nom[node]
+
+
+@pytest.mark.parametrize("kind", BEYOND)
+def test_tables_have_generation_of_each_law(tmp_path: Path, kind: str) -> None:
+    """What is read from the tables of an imported feeder is what was imported."""
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, BEYOND[kind]))
+
+    write_feeder(feeder, tmp_path / "tables")
+
+    assert read_feeder(str(tmp_path / "tables")).load_parts == feeder.load_parts
+
+
+@pytest.mark.parametrize("kind", ["photovoltaic", "negative load"])
+def test_generation_disconnects_above_1_2_pu(tmp_path: Path, kind: str) -> None:
+    """At 1.25 pu nothing is delivered: beyond Vmaxpu the engine has a negative impedance at any voltage."""
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, BEYOND[kind]))
+    assert feeder.source
+
+    network = Network(replace(feeder, source=replace(feeder.source, V_pu=1.25)))
+
+    assert solve_power_flow(network, network.closed0).S_loads == pytest.approx(0.0, abs=1.0)
+
+
+def test_generation_is_told_and_no_load(tmp_path: Path) -> None:
+    """A note says how much an element delivers; it counts as generation, and one that delivers nothing is left out."""
+    idle = "New Generator.idle bus1=c kv=0.48 kw=0 kvar=0"
+    feeder = read_opendss(write(tmp_path, LINE, STEP_DOWN, UNEVEN, SCRIPTS["generator"], idle))
+
+    assert feeder.notes == (
+        "generator.g: delivers the 50 kW and 10 kvar of the snapshot, constant",
+        "generator.idle: delivers nothing; left out",
+    )
+    assert feeder.generation_by_bus() == {"c": pytest.approx(50e3)}
+    assert feeder.load_by_bus() == {"c": pytest.approx(60e3)}

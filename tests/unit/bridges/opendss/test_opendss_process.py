@@ -1,0 +1,137 @@
+"""The OpenDSS engine has a process of its own: what it does there ends no import without one line that says so."""
+
+import os
+import resource
+import signal
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from gridpeers.bridges.opendss import dss_process, read_opendss
+from gridpeers.bridges.opendss.dss_circuit import ImportRequest
+from gridpeers.plant.tables.read import FeederError
+from tests.command_line import invoke
+from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN, write
+
+CRASHING = """import os, signal
+class DSSException(Exception):
+    pass
+class Anything:
+    NumCircuits = 0
+    def __init__(self):
+        self.__dict__.update(Text=Text(), Error=Text())
+class Text:
+    def __setattr__(self, name, command):
+        if "boom" in str(command):
+            os.kill(os.getpid(), signal.SIGSEGV)
+class DSS:
+    NewContext = Anything
+"""
+"""An engine that crashes at a command with "boom"."""
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A file that stands in the place of the package dss, in a process that begins and ends with the test."""
+    dss_process.close_engine()
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
+    yield tmp_path / "dss.py"
+    dss_process.close_engine()
+
+
+def problem(path: Path) -> str:
+    """The only problem of a script that the import refuses."""
+    with pytest.raises(FeederError) as refused:
+        read_opendss(path)
+    (found,) = refused.value.problems
+    assert "\n" not in found
+    return found
+
+
+def test_a_crash_of_the_engine_is_one_line(tmp_path: Path, package: Path) -> None:
+    """It has file, line, command, signal, and what to do; the command ends with 2, and the next import works."""
+    package.write_text(CRASHING)
+    path = tmp_path / "Master.dss"
+    path.write_text("Clear\nRedirect lines.dss\n")
+    (tmp_path / "lines.dss").write_text("New Line.good\nNew Line.boom\n")
+
+    assert problem(path).startswith("lines.dss:2: the OpenDSS engine itself crashes (SIGSEGV); change this, or take it")
+    assert problem(path).endswith(": New Line.boom")
+    code, text = invoke("feeder", "import", str(path))
+    assert (code, text.count("\n")) == (2, 1)
+    assert "lines.dss:2: the OpenDSS engine itself crashes (SIGSEGV)" in text
+    (tmp_path / "lines.dss").write_text("New Line.good\n")
+    assert "makes no circuit" in problem(path)
+
+
+@pytest.mark.parametrize(
+    ("damage", "reason"),
+    [
+        ("raise OSError('libdss.so: cannot open')", "(OSError: libdss.so: cannot open)"),
+        ("import dss_backend_that_is_missing", "(ModuleNotFoundError: No module named 'dss_backend_that_is_missing')"),
+        ("DSS_is_missing = 1", "(ImportError: cannot import name 'DSS' from 'dss'"),
+        ("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)", "(its process was killed by SIGSEGV)"),
+    ],
+)
+def test_a_damaged_wheel_is_one_line(tmp_path: Path, package: Path, damage: str, reason: str) -> None:
+    """A package that is there and does not load is not missing: the line says why, and how to mend it."""
+    package.write_text(damage + "\n")
+
+    text = problem(write(tmp_path, LINE))
+
+    assert text.startswith(f"dss is installed, but cannot be imported {reason}")
+    assert text.endswith("pip install --force-reinstall dss-python dss-python-backend")
+
+
+def test_an_import_that_is_interrupted_leaves_no_process_and_no_wrong_answer(tmp_path: Path) -> None:
+    """After an error while the engine reads, its process and folder are gone, and the next import is its own."""
+    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+    path = write(tmp_path, LINE, STEP_DOWN)
+
+    with pytest.raises(KeyboardInterrupt), dss_process.reading(ImportRequest(path, None, (), ())) as engine:  # noqa: PT012
+        folder = Path(f"/proc/{engine.pid}/cwd").readlink()
+        raise KeyboardInterrupt
+
+    assert not folder.exists()
+    assert not Path(f"/proc/{engine.pid}").exists()
+    assert read_opendss(write(tmp_path, LINE)).name == "test"
+
+
+def test_a_killed_engine_is_told_and_started_again(tmp_path: Path) -> None:
+    """Whoever ends the engine's process ends one import at most."""
+    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+    path = write(tmp_path, LINE)
+    read_opendss(path)
+    with dss_process.reading(ImportRequest(path, None, (), ())) as engine:
+        engine.circuit(path)
+        os.kill(engine.pid, signal.SIGKILL)
+
+    with pytest.raises(FeederError, match="its process was killed by SIGKILL"):
+        read_opendss(path)
+    assert read_opendss(path).name == "test"
+
+
+def test_a_full_disk_is_not_a_crash_of_the_engine(tmp_path: Path) -> None:
+    """Where the answer of the engine's process finds no room, the line has folder and cause, and nothing is left."""
+    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+    path = write(tmp_path, LINE)
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    dss_process.close_engine()
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024, before[1]))
+    try:
+        text = problem(path)
+        with dss_process.reading(ImportRequest(path, None, (), ())) as engine:
+            folder = Path(f"/proc/{engine.pid}/cwd").readlink()
+            with pytest.raises(FeederError):
+                engine.circuit(path)
+            assert list(folder.iterdir()) == []
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        dss_process.close_engine()
+
+    assert text.startswith(f"{path.name}: what the OpenDSS engine reads cannot be written in {tempfile.gettempdir()} (")
+    assert "File too large" in text
+    assert read_opendss(path).name == "test"
