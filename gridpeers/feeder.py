@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -13,6 +14,7 @@ from gridpeers.plant.equipment import Feeder as Tables
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.rooms import READERS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -52,7 +54,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """
         from gridpeers.plant.tables import read_feeder
 
-        return cls._of(read_feeder(str(name), load_set))
+        tables = read_feeder(str(name), load_set)
+        return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
 
     @classmethod
     def from_opendss(
@@ -81,9 +84,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         gridpeers.plant.tables.FeederError
             With everything that the engine refuses, and everything that cannot be represented.
         """
-        from gridpeers.bridges.opendss import read_opendss
-
-        return cls._of(read_opendss(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
+        return _imported("dss", path, f_nom, leave_out=leave_out, switches=switches)
 
     @classmethod
     def from_glm(
@@ -112,13 +113,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         gridpeers.plant.tables.FeederError
             With everything that GridLAB-D refuses, and everything that cannot be represented.
         """
-        from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
-
-        return cls._of(read_glm(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches)))
-
-    @classmethod
-    def _of(cls, tables: Tables) -> Feeder:
-        return cls(**{name: getattr(tables, name) for name in tables.__struct_fields__})
+        return _imported("glm", path, f_nom, leave_out=leave_out, switches=switches)
 
     def add_inverter(
         self,
@@ -265,8 +260,22 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return Path(folder)
 
 
-READERS = {".dss": Feeder.from_opendss, ".glm": Feeder.from_glm}
-"""Readers of feeders that were written for another program, by the end of the file's name."""
+def reader_of(name: str) -> Callable[..., Feeder] | None:
+    """Return the reader of a file that was written for another program, by the end of its name; None of other files."""
+    format = Path(name).suffix.lower().removeprefix(".")
+    return partial(_imported, format) if format in READERS.names else None
+
+
+def _imported(
+    format: str,
+    path: str | Path,
+    f_nom: float | None = None,
+    *,
+    leave_out: Sequence[str] = (),
+    switches: Sequence[str] = (),
+) -> Feeder:
+    tables = READERS.resolve(format)(path, f_nom, leave_out=_listed(leave_out), switches=_listed(switches))
+    return Feeder(**{name: getattr(tables, name) for name in tables.__struct_fields__})
 
 
 def _listed(names: Sequence[str]) -> Sequence[str]:

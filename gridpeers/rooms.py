@@ -5,9 +5,19 @@ The face and what is below it import no room, so that each may be missing.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
+from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.plugins.registry import Registry
 
 ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")
 """Functions, classes and modules by name."""
+
+READERS: Registry[Callable[..., Feeder]] = Registry(
+    "reader of feeders", "feeder readers", lambda it: "" if callable(it) else "it cannot be called"
+)
+"""Readers of feeders that were written for other programs, by the end of the file's name without its dot.
+
+Each takes the path and the nominal frequency (Hz) or None, and by name `leave_out` and `switches`.
+"""

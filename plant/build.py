@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec.structs import replace
+
 from gridpeers.plant.dynamics.kernel.compiled import is_compiled
 from gridpeers.plant.dynamics.kernel.step import run_steps
 from gridpeers.plant.equipment import Feeder
@@ -10,6 +12,7 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.simulators import OURS, SIMULATORS
 from gridpeers.plant.tables import read_feeder
 
 
@@ -23,24 +26,12 @@ def start_plant(config: PlantConfig) -> LivePlant:
     RuntimeError
         If it cannot start; the message says why, and what to do.
     """
-    if config.settings.simulator == "helics":
-        from gridpeers.bridges.helics.helics_plant import HelicsPlant  # only a run that uses it needs the wheel
-
-        return HelicsPlant(config, _feeder(config))
     if config.bridged:
-        from gridpeers.bridges.helics.bridged_plant import BridgedPlant
-
-        return BridgedPlant(lambda: _here(config), config)
-    return _here(config)
-
-
-def _here(config: PlantConfig) -> LivePlant:
-    """Start a plant that we run ourselves."""
-    if config.settings.simulator == "gridlabd":
-        from gridpeers.bridges.gridlabd.start import start_gridlabd
-
-        return start_gridlabd(config, _feeder(config))
-    return build_plant(config)
+        alone = replace(config, bridged=False)
+        return SIMULATORS.resolve(str(config.bridged)).offer(lambda: start_plant(alone), config)
+    if config.settings.simulator == OURS:
+        return build_plant(config)
+    return SIMULATORS.resolve(config.settings.simulator).start(config, _feeder(config))
 
 
 def build_plant(config: PlantConfig) -> Plant:

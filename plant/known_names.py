@@ -1,15 +1,6 @@
-"""What others know of the plant without importing it: simulators, words of its start, names and settings of trips."""
+"""What others know of the plant without importing it: words of its start, names and settings of trips."""
 
 from __future__ import annotations
-
-from typing import Literal
-
-OwnSimulator = Literal["gridpeers", "gridlabd"]
-"""A simulator that the run starts itself: our own plant, or GridLAB-D (docs/plant.md)."""
-
-Simulator = Literal[OwnSimulator, "helics"]
-"""The same, or a federate of a HELICS co-simulation (docs/helics.md)."""
-
 
 LISTENING = "listening"
 """Its session is open."""

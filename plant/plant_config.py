@@ -6,11 +6,9 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
-from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.plant.equipment.inverter_parameters import GflParameters as GflParameters
 from gridpeers.plant.equipment.inverter_parameters import GfmParameters as GfmParameters
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
-from gridpeers.plant.known_names import Simulator
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.plausible import Plausible, Unit
@@ -128,13 +126,13 @@ Method = Literal["first-order", "second-order"]
 `gridpeers.plant.dynamics.kernel.second_order_step`."""
 
 
-class PlantSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """All settings that determine the plant's numbers."""
+class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
+    """All settings that determine the plant's numbers; of older records, others are passed over."""
 
-    simulator: Simulator = "gridpeers"
-    """What simulates the plant."""
-    helics: HelicsSettings = HelicsSettings()
-    """The HELICS federation, with simulator "helics" or a bridge."""
+    simulator: str = "gridpeers"
+    """What simulates the plant: a name in `gridpeers.plant.simulators.SIMULATORS`."""
+    simulators: dict[str, dict[str, Any]] = {}
+    """Own table of each simulator that the scenario has, as a tree, by the simulator's name."""
     feeder: str = "microgrid123"
     """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
     load_set: str = "main"
@@ -179,9 +177,9 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     """Processes that carry these agents, each with one link to the plant; unset, as in a record: one each."""
     schedule: tuple[ScheduledAction, ...] = ()
     """Scheduled joins, leaves and deaths; an agent that joins need not be among `agents`."""
-    bridged: bool = False
-    """Whether the plant is a federate of a HELICS federation, and inverters without an agent follow set-points from
-    there."""
+    bridged: str | bool = False
+    """Simulator, e.g. "helics", by which inverters without an agent follow set-points of programs outside; False: none.
+    Older records have True."""
     T_c: float
     """Control period (s), a multiple of h."""
     end: float | None

@@ -17,12 +17,12 @@ from gridpeers.agents import graphs
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.carriers.law_registry import LAWS
 from gridpeers.agents.graphs import GRAPHS
-from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.netem.models import own_fault
 from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.netem.schema.partition import Partition
+from gridpeers.plant import simulators
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
@@ -45,7 +45,7 @@ from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import KINDS
 from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.schema.table_reading import in_words, kinds_of, shown
-from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, OtherKeys, fields_of
+from gridpeers.wire.schema.table_schema import INLINE, NO_KEY, Field, NamedTables, OtherKeys, fields_of
 
 
 class FieldDoc(NamedTuple):
@@ -71,7 +71,7 @@ def field_table(cls: type, *, left_out: Iterable[str] = ()) -> Iterator[str]:
     skipped, docs = set(left_out), {doc.name: doc.text for doc in field_docs(cls)}
     rows = []
     for field in fields_of(cls):
-        if not (field.name in skipped or INLINE in field.marks or NO_KEY in field.marks):
+        if not (field.name in skipped or INLINE in field.marks or NO_KEY in field.marks or field.mark(NamedTables)):
             text = field.help or docs.get(field.name, "")
             key = '"mine:Name"' if field.mark(OtherKeys) else field.key
             rows.append((f"`{key}`", _type(field), field.unit, field.span, _default(field), text))
@@ -170,7 +170,6 @@ _SCENARIO_TABLES: tuple[tuple[str, type[msgspec.Struct]], ...] = (
     ("[plant.gfm]", GfmParameters),
     ("[plant.gfl]", GflParameters),
     ("[plant.sync_check]", SyncCheck),
-    ("[plant.helics]", HelicsSettings),
     ("[protection]", Protection),
     ("[gains]", Gains),
     ("[degraded_communication]", DegradedCommunication),
@@ -224,7 +223,9 @@ def _scenario() -> Iterator[str]:
     yield "TOML. A key that is a time, a frequency or a per-unit value ends in its unit: `_s`, `_Hz`, `_pu` (of the"
     yield "inverter's own rating or nominal voltage); parameters of laws alone have no suffix. What has no default"
     yield "must be given. A value out of its range is an error, and so is an unknown key."
-    for title, cls in _SCENARIO_TABLES:
+    own = [(f"[plant.{name}]", table) for name, table in simulators.tables().items()]
+    after = 1 + [title for title, _ in _SCENARIO_TABLES].index("[plant.sync_check]")
+    for title, cls in (*_SCENARIO_TABLES[:after], *own, *_SCENARIO_TABLES[after:]):
         yield from ("", f"## {title}", "", class_doc(cls), "")
         elsewhere = [field.name for field in fields_of(cls) if _has_section(field.type)] if cls is not Case else []
         yield from field_table(cls, left_out=elsewhere)

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import msgspec
 
 from gridpeers.plant.realtime.pacer import sentence
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
 from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
@@ -178,6 +179,6 @@ def _notes(recorded: Mapping[str, Recorded], clock: Clock) -> list[str]:
 
 
 def _as_run(request: Request) -> dict[str, Any]:
-    simulator = request.scenario.plant.simulator
-    own = {simulator: version_of(simulator)} if simulator != "gridpeers" else {}
+    package = SIMULATORS.resolve(request.scenario.plant.simulator).package
+    own = {package: version_of(package)} if package else {}
     return {"driver": request.driver} | versions() | own

@@ -114,9 +114,9 @@ def _configs(request: Request, case: str) -> tuple[PlantConfig, tuple[AgentConfi
     plant, agents = configs(request.scenario, request.feeder, case, listen, real_nodes=real)
     plant = msgspec.structs.replace(plant, record=request.scenario.record)
     agents = tuple(msgspec.structs.replace(agent, record=request.scenario.record) for agent in agents)
-    if request.outside is not None:
+    if request.bridge:
         plant = msgspec.structs.replace(
-            plant, bridged=True, agents=tuple(name for name in plant.agents if name not in request.outside)
+            plant, bridged=request.bridge, agents=tuple(name for name in plant.agents if name not in request.outside)
         )
         agents = tuple(agent for agent in agents if agent.name not in request.outside)
     if request.keys is not None:

@@ -9,6 +9,7 @@ import msgspec
 
 from gridpeers.bridges.helics import topics
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.bridges.helics.topics import SENSORS, Value, number
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant, ReadingLike
@@ -38,8 +39,9 @@ class BridgedPlant:
     """
 
     def __init__(self, build: Callable[[], LivePlant], config: PlantConfig) -> None:
+        helics = settings_of(config.settings)
         # its broker must be there at once: others give up to connect while a plant is compiled for the first time
-        self._federate = HelicsFederate(config.settings.helics, config.deadline)
+        self._federate = HelicsFederate(helics, config.deadline)
         try:
             plant = self._plant = build()
         except BaseException as error:
@@ -47,7 +49,7 @@ class BridgedPlant:
             raise
         self._T_c, self._record = config.T_c, config.record_step
         self._end_tick = None if config.end is None else round(config.end / config.T_c)
-        self._prefix = prefix = config.settings.helics.prefix
+        self._prefix = prefix = helics.prefix
         self.inverters = plant.inverters
         self._outside = tuple(name for name in plant.inverters if name not in config.agents)
         """Inverters that outside federates control."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from gridpeers.bridges.helics.helics_settings import HelicsSettings, endpoint
+from gridpeers.bridges.helics.helics_simulator import HelicsSettings, endpoint
 from gridpeers.bridges.helics.topics import Topic, Value
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
 from gridpeers.wire.packages import damaged

@@ -10,6 +10,7 @@ import msgspec
 
 from gridpeers.bridges.helics import topics
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.bridges.helics.topics import ACT, Value, number
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.feeder.plant import Reading
@@ -46,7 +47,7 @@ class HelicsPlant:
 
     def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
         settings = config.settings
-        helics = self._helics = settings.helics
+        helics = self._helics = settings_of(settings)
         self.inverters = tuple(row.name for row in feeder.inverters)
         self.tick = 0
         self._T_c, self._record = config.T_c, config.record_step

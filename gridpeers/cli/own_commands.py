@@ -49,7 +49,6 @@ OWN_COMMANDS = {
         ("link", "link:link", "Hurt and heal links while a run goes on."),
         ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
         ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
-        ("bridge", "bridge_command:app", "Offer our plant to simulators of others."),
     )
 }
 """All of them, by name."""

@@ -34,11 +34,6 @@ TRYING = (
     "still at work: the plant is tried; the first use ever compiles its inner loop, which takes some 20 seconds ..."
 )
 
-RESTING = (
-    "still starting: GridLAB-D solves the feeder and comes to rest before t = 0; the first run ever compiles our "
-    "operating point before that, which takes some 10 seconds ..."
-)
-
 MEMORY = 300.0
 """Window of a bar's estimate of the time left (s); runs differ in how long they take."""
 

@@ -8,6 +8,7 @@ from typing import TypedDict, get_args
 
 import msgspec
 
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.metrics_file import Clock
 from gridpeers.scenarios.run_request import SPEEDS, Driver
 from gridpeers.scenarios.schema import ScenarioError
@@ -48,7 +49,7 @@ class Pace(TypedDict, total=False):
 def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str = "") -> None:
     """Check the options of a scenario's run; `dash` stands before their names: "--" on a command line."""
     clock, speed, strict = pace.get("clock", "simulated"), pace.get("speed", 1.0), pace.get("strict", False)
-    processes, keys, simulator = pace.get("processes", 0), pace.get("keys"), spec.plant.simulator
+    processes, keys, simulator = pace.get("processes", 0), pace.get("keys"), SIMULATORS.resolve(spec.plant.simulator)
     problem = ""
     for word, value, choices in (("driver", driver, get_args(Driver)), ("clock", clock, get_args(Clock))):
         if not isinstance(value, str) or value not in choices:
@@ -65,13 +66,13 @@ def check_how(driver: str, pace: Pace, spec: model.ScenarioModel, *, dash: str =
         problem = f"processes: agents of one process have one certificate; leave it out with {dash}keys"
     elif keys is None and driver == "processes" and spec.security == "mtls":
         raise ScenarioError([model.NEEDS_KEYS])
-    elif simulator == "helics" and len(spec.cases) > 1:
-        problem = f"case: a HELICS federation runs once, so choose one case of {', '.join(spec.cases)}"
+    elif simulator.elsewhere and len(spec.cases) > 1:
+        problem = f"case: {simulator.words} runs once, so choose one case of {', '.join(spec.cases)}"
     elif clock == "simulated" and (speed != 1.0 or strict):
         name = "strict" if strict else "speed"
         problem = f"{name}: simulated time has no pace to keep; use it with {dash}clock wall"
-    elif clock == "wall" and simulator != "gridpeers":
-        problem = f'clock wall: the plant of "{simulator}" keeps no real time; use {dash}clock simulated'
+    elif clock == "wall" and spec.plant.simulator != "gridpeers":
+        problem = f'clock wall: the plant of "{spec.plant.simulator}" keeps no real time; use {dash}clock simulated'
     elif clock == "wall" and driver == "inprocess":
         problem = f"clock wall: needs a process per agent; use {dash}driver processes"
     elif clock == "wall" and not (isinstance(speed, int | float) and SPEEDS[0] <= speed <= SPEEDS[1]):

@@ -12,6 +12,7 @@ import numpy as np
 
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name, switch_names
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.history import Floats, History, Nameplates
 from gridpeers.scenarios.schema.participants import inverters_of
@@ -26,7 +27,7 @@ def switch_events(scenario: ScenarioModel, feeder: Feeder, recorded: Iterable[Pl
     event means no operation; a run folder without its events.csv cannot be read.
     """
     told = tuple(event for event in recorded if event.kind == "switch")
-    if told or scenario.plant.simulator != "helics":
+    if told or not SIMULATORS.resolve(scenario.plant.simulator).elsewhere:
         return told
     return tuple(
         PlantEvent(t=event.t_s, kind="switch", subject=switch_name(feeder, name), text="as planned", closed=closed)

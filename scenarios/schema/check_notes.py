@@ -10,6 +10,7 @@ from gridpeers.netem.models.lie import lie_in_words
 from gridpeers.plant.build import plant_at_rest
 from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of, netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
@@ -95,9 +96,9 @@ def security_notes(scenario: ScenarioModel, feeder: Feeder, file: str) -> Iterat
 def start_problem(scenario: ScenarioModel, feeder: Feeder) -> str:
     """Return why the plant has no operating point at t = 0, or cannot operate an event's switches; "" if it can.
 
-    All cases start from the same one, GridLAB-D too. Another simulator finds its own.
+    All cases start from the same one, GridLAB-D too. A plant elsewhere finds its own.
     """
-    if scenario.plant.simulator not in ("gridpeers", "gridlabd"):
+    if SIMULATORS.resolve(scenario.plant.simulator).elsewhere:
         return ""
     plant, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     try:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from gridpeers.agents.agent_config import MAX_AGE, AgentConfig, Control
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.derived_feeders import changed
@@ -57,7 +59,7 @@ def configs(
         run=run,
         settings=PlantSettings(
             simulator=scenario.plant.simulator,
-            helics=scenario.plant.helics,
+            simulators={name: msgspec.to_builtins(table) for name, table in scenario.plant.simulators.items()},
             feeder=scenario.plant.feeder,
             load_set=scenario.plant.load_set,
             h=time.h_s,

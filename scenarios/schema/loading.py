@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.plant.equipment import F_NOM, Feeder
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.plant.tables import FeederError, feeders, is_folder, read_feeder
 from gridpeers.scenarios.catalogue_files import CATALOGUE, names_in
 from gridpeers.scenarios.schema.checks import (
@@ -27,7 +28,6 @@ from gridpeers.scenarios.schema.checks import (
     name_of,
 )
 from gridpeers.scenarios.schema.configs import as_in
-from gridpeers.scenarios.schema.gridlabd_checks import check_gridlabd
 from gridpeers.scenarios.schema.participants import (
     check_agentless,
     check_netem,
@@ -149,7 +149,8 @@ def check_tables(
         check_loads(scenario, feeder, problems)
         check_start(scenario, feeder, problems)
         check_supply(scenario, feeder, problems)
-        check_gridlabd(scenario, feeder, problems)
+        if not problems.touch("plant.simulator"):
+            SIMULATORS.resolve(scenario.plant.simulator).check(scenario, feeder, problems)
     return scenario, feeder
 
 

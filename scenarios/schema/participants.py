@@ -8,16 +8,18 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.bridges.helics.helics_settings import settings_problems
 from gridpeers.netem.schema.netem import Netem, NodeFault
 from gridpeers.netem.schema.trace_file import with_traces
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import SwitchOperations, islands_after
 from gridpeers.plant.plant_config import ScheduledAction
+from gridpeers.plant.simulators import OURS, SIMULATORS
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.schema.scenario_errors import Problems, multiple
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
+from gridpeers.wire.schema.table_reading import shown
 from gridpeers.wire.schema.table_schema import NO_KEY, Problem, fields_of
+from gridpeers.wire.wording import suggestion
 
 
 def inverters_of(scenario: ScenarioModel, feeder: Feeder) -> tuple[InverterRow, ...]:
@@ -73,25 +75,32 @@ def check_schedule(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
 
 
 def check_simulator(scenario: ScenarioModel, problems: Problems) -> None:
-    """Note joins, leaves, loads and methods of time stepping that other simulators lack, and wrong HELICS settings."""
+    """Note a simulator that is not there, what others than ours lack, and what is wrong with their tables."""
     simulator = scenario.plant.simulator
-    if scenario.time.method != "first-order" and simulator != "gridpeers":
+    if simulator != OURS and simulator not in SIMULATORS.names:
+        wrong = f"there is no {shown(simulator)}; {suggestion(simulator, SIMULATORS.names, 'choices')}"
+        problems.add("plant.simulator", wrong)
+        return
+    for name, table in scenario.plant.simulators.items():
+        for problem in getattr(table, "relations", list)():
+            if not problems.touch(path := f"plant.{name}.{problem.path}"):
+                problems.add(path, problem.text)
+    if simulator == OURS:
+        return
+    if scenario.time.method != "first-order":
         problems.add(
             "time.method",
             f'"{scenario.time.method}" is a method of plant.simulator = "gridpeers"; "{simulator}" has its own time '
             "stepping; leave time.method out",
         )
-    for key, problem in settings_problems(scenario.plant.helics).items():
-        if not problems.touch(f"plant.helics.{key}"):
-            problems.add(f"plant.helics.{key}", problem)
     for i, event in enumerate(scenario.events):
         for key in ("leave", "join"):
-            if getattr(event, key) and simulator != "gridpeers":
+            if getattr(event, key):
                 problems.add(
                     f"event[{i}].{key}",
                     f'plant.simulator = "{simulator}" lets no inverter leave or join; use simulator = "gridpeers"',
                 )
-        if event.load and simulator != "gridpeers":
+        if event.load:
             problems.add(
                 f"event[{i}].load",
                 f'plant.simulator = "{simulator}" keeps the loads of its own model; use simulator = "gridpeers"',

@@ -11,15 +11,14 @@ from typing import Annotated, Any, Literal
 import msgspec
 
 from gridpeers.agents.agent_config import DegradedCommunication, Gains, Secondary
-from gridpeers.bridges.helics.helics_settings import HelicsSettings
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.equipment.named_loads import FACTOR
-from gridpeers.plant.known_names import Simulator
 from gridpeers.plant.plant_config import Method, OnLawFailure, Protection, SyncCheck
+from gridpeers.plant.simulators import OURS, tables
 from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.schema.plausible import Plausible, Unit
-from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Divides, Example, Label, MultipleOf
+from gridpeers.wire.schema.table_schema import INHERITED, INLINE, Divides, Example, Label, MultipleOf, NamedTables
 
 AS_RUN = "as_run"
 """Table that a run adds to its copy of the scenario; it is skipped when the copy is read."""
@@ -94,7 +93,7 @@ class InverterTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Table `[plant]`: the feeder, its loads, and where the inverters start."""
 
-    simulator: Simulator = "gridpeers"
+    simulator: str = OURS
     """What simulates the plant: "gridpeers"; "gridlabd", GridLAB-D in its delta mode (plant.md); or "helics", a
     federate of a HELICS co-simulation (helics.md)."""
     feeder: str = "microgrid123"
@@ -122,8 +121,8 @@ class PlantTable(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """Table `[plant.gfm]`: parameters of the grid-forming inverters."""
     gfl: GflParameters = GflParameters()
     """Table `[plant.gfl]`: parameters of the grid-following inverters."""
-    helics: HelicsSettings = HelicsSettings()
-    """Table `[plant.helics]`: the HELICS federation, with simulator "helics" or `gridpeers bridge helics`."""
+    simulators: Annotated[dict[str, msgspec.Struct], NamedTables(tables)] = {}
+    """Tables `[plant.NAME]`: of simulators by their names, e.g. `[plant.helics]`."""
     sync_check: SyncCheck = SyncCheck()
     """Table `[plant.sync_check]`: how far two islands may be apart when an event joins them `synchronised`."""
 

@@ -11,7 +11,7 @@ import msgspec
 
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.scenarios.schema.scenario_model import AS_RUN, ScenarioModel
-from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, OtherKeys, fields_of
+from gridpeers.wire.schema.table_schema import INHERITED, INLINE, NO_KEY, NamedTables, OtherKeys, fields_of
 
 
 def to_toml(
@@ -77,7 +77,7 @@ def _lines(
             tables.append(_entries(value, where, common, terse=terse))
         elif isinstance(value, dict) and not entry and any(isinstance(it, msgspec.Struct) for it in value.values()):
             for name, item in value.items():
-                key = f"{where}.{_key(name)}"
+                key = f"{path if field.mark(NamedTables) else where}.{_key(name)}"
                 tables.append(_table(f"[{key}]", item, key, common, terse=terse))
         elif value or not isinstance(value, tuple | dict):
             keys.append(f"{field.key} = {inline(msgspec.to_builtins(value))}")

@@ -19,6 +19,7 @@ from gridpeers.wire.schema.table_schema import (
     NO_KEY,
     Example,
     Field,
+    NamedTables,
     OtherKeys,
     Problem,
     below,
@@ -103,7 +104,8 @@ def inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
 
 def keys_of(struct: type) -> list[str]:
     """Return the keys of a table."""
-    return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(OtherKeys))]
+    nameless = (OtherKeys, NamedTables)
+    return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(nameless))]
 
 
 def _named(kinds: typing.Sequence[Any], field: Field) -> str:
@@ -222,7 +224,8 @@ class _Reader:
         fields = [field for field in fields_of(struct) if not (INLINE in field.marks or NO_KEY in field.marks)]
         inline = [field for field in fields_of(struct) if INLINE in field.marks]
         others = next((field for field in fields if field.mark(OtherKeys)), None)
-        keys = [field.key for field in fields if field is not others]
+        named = next((field for field in fields if field.mark(NamedTables)), None)
+        keys = [field.key for field in fields if field not in (others, named)]
         keys += [key for field in inline for key in keys_of(field.type)]
         values: dict[str, Any] = self._top if struct is self._root else {}
         tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
@@ -236,15 +239,21 @@ class _Reader:
             )
         if others is not None:
             values[others.name] = ()
+        if named is not None:
+            values[named.name] = {}
         for key in data:
             if others is not None and key not in keys and others.mark(OtherKeys).accepts(key):
                 found: list[Problem] = []
                 values[others.name] += others.mark(OtherKeys).read(key, data[key], found)
                 self.problems += [Problem(_join(path, problem.path), problem.text) for problem in found]
             elif key not in keys and key != tag:
-                self._add(_join(path, key), self._unknown(key, struct, keys))
+                tables = named.mark(NamedTables).known() if named else {}
+                if key in tables and named:
+                    values[named.name][key] = self.table(tables[key], data[key], _join(path, key))
+                else:
+                    self._add(_join(path, key), self._unknown(key, struct, [*keys, *tables]))
         for field in fields:
-            if field is others:
+            if field in (others, named):
                 continue
             start = self._top.get(field.name) if INHERITED in field.marks else None
             if field.key in data:
@@ -344,6 +353,8 @@ def _tables(root: type) -> Iterator[tuple[str, type]]:
             kind, key = field.type, _join(path, field.key)
             if INLINE in field.marks:
                 further.append((path, kind))
+            elif mark := field.mark(NamedTables):
+                yield from ((f"into [{path}.{name}]", table) for name, table in mark.known().items())
             elif structs_in(kind) == [kind]:
                 yield f"into [{key}]", kind
                 further.append((key, kind))

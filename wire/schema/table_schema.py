@@ -16,7 +16,7 @@ scenarios and the axes of plots take keys, units and ranges from them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin, get_type_hints
@@ -71,6 +71,14 @@ class OtherKeys:
     accepts: Callable[[str], bool]
     read: Callable[[str, Any, list[Problem]], tuple[Any, ...]]
     write: Callable[[Any], tuple[str, Any]]
+
+
+@dataclass(frozen=True)
+class NamedTables:
+    """The field, a dict, takes tables under keys that no other field has, each of the struct of its name."""
+
+    known: Callable[[], Mapping[str, type[msgspec.Struct]]]
+    """Returns the structs by name; called when there is another key."""
 
 
 @dataclass(frozen=True)

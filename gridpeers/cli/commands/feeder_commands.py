@@ -194,10 +194,10 @@ app.command()(glm)
 
 def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
     """Read a feeder that was written for another program, or end with every problem in it."""
-    from gridpeers.feeder import READERS
+    from gridpeers.feeder import reader_of
     from gridpeers.plant.tables import FeederError
 
-    read = READERS.get(Path(name).suffix.lower())
+    read = reader_of(name)
     if read is None:
         fail(
             [f"{name}: a feeder is a .dss file (OpenDSS) or a .glm file (GridLAB-D), by the end of its name"], BAD_INPUT
@@ -210,13 +210,14 @@ def read_script(name: str, switches: list[str], leave_out: list[str]) -> Feeder:
 
 def save_readable(feeder: Feeder, folder: Path, script: str) -> None:
     """Write the tables of a script's feeder and read them again; end with every problem if a run could not."""
-    from gridpeers.bridges.import_checks import of_script
     from gridpeers.plant.tables import FeederError
+    from gridpeers.rooms import ROOMS
 
     feeder.save(folder)
     try:
         feeder.read(folder)
     except FeederError as error:
+        of_script = ROOMS.resolve("of_script")
         problems = dict.fromkeys(of_script(problem, folder, script, feeder.places) for problem in error.problems)
         refuse(FeederError(script, tuple(problems)))
 
@@ -234,10 +235,10 @@ def folder_of(name: str) -> str:
 
 def _read(name: str, load_set: str | None, switch: list[str] | None, leave_out: list[str] | None) -> Feeder:
     """Read a feeder of tables or a script, or end with every problem in it."""
-    from gridpeers.feeder import READERS, Feeder
+    from gridpeers.feeder import Feeder, reader_of
     from gridpeers.plant.tables import FeederError
 
-    if Path(name).suffix.lower() in READERS:
+    if reader_of(name):
         if load_set is not None:
             fail(
                 [f"--load-set is for a folder of tables; {name} has the one set of loads that it describes"], BAD_INPUT

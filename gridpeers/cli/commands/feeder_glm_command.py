@@ -36,20 +36,20 @@ def glm(
     """
     from tempfile import gettempdir
 
-    from gridpeers.bridges.gridlabd.model.export_glm import export_glm
-    from gridpeers.feeder import READERS
+    from gridpeers.feeder import reader_of
     from gridpeers.plant.dynamics import PlantError
     from gridpeers.plant.tables import FeederError
+    from gridpeers.rooms import ROOMS
     from gridpeers.scenarios.results.run_files import refusal, shown, write_whole
 
-    if Path(feeder).suffix.lower() in READERS:
+    if reader_of(feeder):
         fail([f"{feeder}: no feeder of our own tables; only those can be written for GridLAB-D"], BAD_INPUT)
     if case is not None and scenario is None:
         fail(["--case: is a case of a scenario; name it with --scenario"], BAD_INPUT)
     tables, settings = _of_scenario(feeder, scenario, case, load_set) if scenario else _own(feeder, load_set)
     file = out or Path(f"{tables.name}.glm")
     try:
-        text = export_glm(tables, settings, seconds, f"{file.stem}_voltages.csv")
+        text = ROOMS.resolve("export_glm")(tables, settings, seconds, f"{file.stem}_voltages.csv")
     except FeederError as error:
         refuse(error)
     except PlantError as error:

@@ -25,7 +25,7 @@ from gridpeers.cli.usage import (
     require_loadable,
     terminal,
 )
-from gridpeers.plant.known_names import Simulator
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.rooms import ROOMS
 
 if TYPE_CHECKING:
@@ -54,8 +54,10 @@ def run(
         bool, typer.Option("--strict", help="With --clock wall: break the run when it cannot keep pace.")
     ] = False,
     plant: Annotated[
-        Simulator | None,
-        typer.Option(help="What simulates the plant; as the scenario says when left out."),
+        str | None,
+        typer.Option(
+            metavar="NAME", help="What simulates the plant: gridpeers, gridlabd or helics; else as the scenario says."
+        ),
     ] = None,
     processes: Annotated[
         int, typer.Option(metavar="N", help="Processes that the agents share; one an agent when left out.")
@@ -140,7 +142,8 @@ def carry_out(
     pace: Pace,
     *,
     require_checks: bool = False,
-    outside: tuple[str, ...] | None = None,
+    bridge: str = "",
+    outside: tuple[str, ...] = (),
     page: socket.socket | None = None,
 ) -> NoReturn:
     """Run a checked scenario into a folder, show its report, and end with its exit code.
@@ -159,13 +162,12 @@ def carry_out(
     if pace.get("keys") is not None:
         _check_keys(Path(pace["keys"] or ""), spec, feeder)
     require(RUN | ({"zenoh": "the driver with processes"} if driver == "processes" else {}))
-    if spec.plant.simulator == "gridlabd":
-        require_loadable("gridlabd", 'the plant of simulator "gridlabd"')
-    federate = outside is not None or spec.plant.simulator == "helics"
-    if federate:
-        require_loadable("helics", "a HELICS federate")
+    simulators = {name: SIMULATORS.resolve(name) for name in (spec.plant.simulator, bridge) if name}
+    for simulator in simulators.values():
+        if simulator.package:
+            require_loadable(simulator.package, simulator.words)
 
-    from gridpeers.cli.progress import COMPILING, RESTING, progress
+    from gridpeers.cli.progress import COMPILING, progress
     from gridpeers.scenarios.drivers.free_endpoint import ListenError, free_endpoint, local_endpoint
     from gridpeers.scenarios.results.file_sizes import file_sizes, require_room
     from gridpeers.scenarios.results.run_files import RUNS, FolderError, new_folder, shown
@@ -184,15 +186,18 @@ def carry_out(
     console = terminal()
     if sizes.sentence:
         typer.echo(f"{spec.name}: {sizes.sentence}")
-    broker = spec.plant.helics.broker
-    explanation = f"still starting: waiting for the HELICS federation at {broker} ..." if federate else COMPILING
-    if spec.plant.simulator == "gridlabd":
-        explanation = RESTING
-    request = Request(scenario=spec, feeder=feeder, driver=driver, folder=folder, outside=outside, **pace)
+    own = [simulator.starting(spec.plant.simulators.get(name)) for name, simulator in simulators.items()]
+    said = next(filter(None, own), COMPILING)
+    request = Request(
+        scenario=spec, feeder=feeder, driver=driver, folder=folder, bridge=bridge, outside=outside, **pace
+    )
     left = f"what came until then is in {shown(folder)}/"
     with ROOMS.resolve("page_beside")(folder, page, spec.name) if page else nullcontext():
         try:
-            with ended_by_signals(left), progress(console, tuple(spec.cases), explanation) as tell:
+            with (
+                ended_by_signals(left),
+                progress(console, tuple(spec.cases), said) as tell,
+            ):
                 report = run_scenario(request, tell)
         except LawStopError as error:
             fail([f"FAILED  {error}", *([left] if folder.is_dir() else [])], CLAIM_FAILED)

@@ -22,6 +22,7 @@ from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
+from gridpeers.plant.simulators import SIMULATORS
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.results.history import Flags, Floats
@@ -219,8 +220,9 @@ class PowerBalance(Check):
 
 def _flows_of(case: CheckedCase) -> IslandPowerFlow:
     plant = case.scenario.plant
-    if plant.simulator == "helics":
-        raise NotJudgedError("the network is that of a HELICS federate, which only that knows")
+    simulator = SIMULATORS.resolve(plant.simulator)
+    if simulator.elsewhere:
+        raise NotJudgedError(f"the network is that of {simulator.words}, which only that knows")
     nodes = sum(len(bus.phases) for bus in case.feeder.buses)
     if nodes > MOST_NODES:
         raise NotJudgedError(f"the feeder has {nodes} nodes, more than the {MOST_NODES} that a verdict has time for")

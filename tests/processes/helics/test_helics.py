@@ -18,7 +18,7 @@ from gridpeers import Result, Scenario
 from gridpeers.bridges.helics import topics
 from gridpeers.bridges.helics.bridged_plant import BridgedPlant
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
-from gridpeers.bridges.helics.helics_settings import HelicsSettings
+from gridpeers.bridges.helics.helics_simulator import HelicsSettings
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.run_request import BrokenRunError
@@ -229,7 +229,7 @@ class Controller(threading.Thread):
 def test_a_bridged_plant_takes_set_points_from_the_tick_on_in_which_they_are_decided() -> None:
     """Set-points published after t_k hold from t_k to t_(k+1); inverters without a controller stay, and are named."""
     broker = free_broker()
-    settings = PlantSettings(feeder="toy2", helics=HelicsSettings(broker=broker, name="plant", federates=2))
+    settings = PlantSettings(feeder="toy2", simulators={"helics": {"broker": broker, "name": "plant", "federates": 2}})
     config = PlantConfig(
         run="toy", settings=settings, agents=(), T_c=0.02, end=0.06, record_step=0.02, deadline=30.0, listen=()
     )

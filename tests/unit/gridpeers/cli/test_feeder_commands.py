@@ -13,7 +13,7 @@ import pytest
 
 from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.bridges.proposal import feeder_proposal
-from gridpeers.cli.commands import init
+from gridpeers.cli.commands.keys_command import init
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from tests.command_line import invoke

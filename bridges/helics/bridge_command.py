@@ -9,7 +9,6 @@ import typer
 
 from gridpeers.cli.commands.run_command import carry_out
 from gridpeers.cli.usage import BAD_INPUT, ScenarioName, check_choice, chosen, fail, load
-from gridpeers.plant.known_names import OwnSimulator
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.schema import ScenarioModel
@@ -35,7 +34,7 @@ def helics(
         str, typer.Option(metavar="NAMES", help="Inverters that others control: all, none, or e.g. inv1,inv4.")
     ] = "all",
     plant: Annotated[
-        OwnSimulator | None,
+        Literal["gridpeers", "gridlabd"] | None,
         typer.Option(help="What simulates the plant; as the scenario says when left out."),
     ] = None,
     broker: Annotated[
@@ -78,7 +77,7 @@ def helics(
     if len(spec.cases) > 1:
         fail([f"--case: a HELICS federation runs once, so choose one case, got {case}"], BAD_INPUT)
     known = [row.name for row in feeder.inverters]
-    carry_out(spec, feeder, driver, out, {}, outside=_outside(outside, known, spec))
+    carry_out(spec, feeder, driver, out, {}, bridge="helics", outside=_outside(outside, known, spec))
 
 
 def _outside(text: str, known: list[str], spec: ScenarioModel) -> tuple[str, ...]:

@@ -1,13 +1,19 @@
-"""Refuse what a scenario asks of GridLAB-D as the plant beyond its abilities, by name, before anything starts."""
+"""GridLAB-D as the plant of a run: its start, and what a scenario asks beyond its abilities, before anything starts."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import pairwise
+
+from msgspec.structs import replace
 
 from gridpeers.bridges.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters, InverterParameters
+from gridpeers.plant.plant_config import FeederChanges, PlantConfig
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.simulators import Simulator
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.supply import supply_states
@@ -17,13 +23,61 @@ _SHOWN = 4
 _OTHERWISE = 'or use simulator = "gridpeers"'
 
 
-def check_gridlabd(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
-    """Note what a scenario with `simulator = "gridlabd"` asks for beyond GridLAB-D's delta mode and our model of it.
+class GridlabdSimulator(Simulator):
+    """GridLAB-D in its delta mode."""
 
-    That no inverter leaves or joins is noted for all other simulators together (`check_simulator`).
-    """
-    if scenario.plant.simulator != "gridlabd":
-        return
+    package = "gridlabd"
+    words = 'the plant of simulator "gridlabd"'
+
+    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+        """Start GridLAB-D on a feeder, with the powers of our operating point.
+
+        Raises
+        ------
+        RuntimeError
+            If there is no operating point, the wheel is missing, or GridLAB-D refuses the model.
+        """
+        from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
+        from gridpeers.bridges.gridlabd.model.export_glm import write_tables
+        from gridpeers.plant.feeder import Plant
+        from gridpeers.plant.network import Network
+        from gridpeers.plant.request_process import TransientFolder
+
+        assert config.end is not None, "a scenario in simulated time has an end"
+        settings = config.settings
+        ours = Plant(Network(feeder), settings, config.T_c, config.record_step)
+        with closing(TransientFolder("gridpeers-tables-")) as folder:
+            if settings.changes != FeederChanges():  # else GridLAB-D's model is written from the tables as they stand
+                write_tables(feeder, folder.path)
+                settings = replace(settings, feeder=str(folder.path))
+            return GridlabdPlant(
+                ours,
+                settings,
+                config.T_c,
+                config.end,
+                record_step=config.record_step,
+                deadline=0.8 * config.deadline,  # the plant tells the agents before they give it up
+            )
+
+    def check(self, scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+        """Note what a scenario asks for beyond GridLAB-D's delta mode and our model of it."""
+        _check_network(scenario, feeder, problems)
+        _check_parameters(scenario, feeder, problems)
+        _check_supply(scenario, feeder, problems)
+
+    def starting(self, table: None) -> str:
+        """Return what to tell a person who waits for the start."""
+        return (
+            "still starting: GridLAB-D solves the feeder and comes to rest before t = 0; the first run ever compiles "
+            "our operating point before that, which takes some 10 seconds ..."
+        )
+
+
+GRIDLABD = GridlabdSimulator()
+
+
+def _check_network(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:
+    """Note what the feeder, the step and the events ask for beyond GridLAB-D."""
     for text in unrepresentable(feeder):
         path = "plant.feeder" if scenario.plant.f_nom_Hz is None else "plant.f_nom_Hz"
         problems.add(path, f"{text}; change it, {_OTHERWISE}")
@@ -39,8 +93,6 @@ def check_gridlabd(scenario: ScenarioModel, feeder: Feeder, problems: Problems) 
                 f'event "{event.label}": GridLAB-D as the plant has no synchronism check; '
                 f"close at a time that you know to be good, without it, {_OTHERWISE}",
             )
-    _check_parameters(scenario, feeder, problems)
-    _check_supply(scenario, feeder, problems)
 
 
 def _check_parameters(scenario: ScenarioModel, feeder: Feeder, problems: Problems) -> None:

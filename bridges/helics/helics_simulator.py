@@ -1,0 +1,106 @@
+"""HELICS as the plant of a run, or as the way of other programs to ours: table `[plant.helics]`, and the start."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Annotated
+
+import msgspec
+
+from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.plant_config import PlantConfig, PlantSettings
+from gridpeers.plant.plant_interface import LivePlant
+from gridpeers.plant.simulators import Simulator
+from gridpeers.wire.bounds import NAME
+from gridpeers.wire.schema.plausible import Plausible, Unit
+from gridpeers.wire.schema.table_schema import Example, Problem
+
+BROKER = "tcp://127.0.0.1:23404"
+"""Address of a HELICS broker that was started without options on this machine."""
+
+_ADDRESS = re.compile(r"(tcp://)?([A-Za-z0-9_.-]+)(:(?P<port>\d{1,5}))?")
+
+
+class HelicsSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The federate of a run, and its broker."""
+
+    broker: Annotated[str, Example('"tcp://10.0.0.5:23404"')] = BROKER
+    """Address of the broker, of HELICS's core type ZMQ."""
+    name: str = "gridpeers"
+    """Name of the federate; no other of the federation has it."""
+    prefix: str = "grid"
+    """First part of every topic: "grid" gives grid/inv1/P."""
+    wait: Annotated[float, Unit("s"), Plausible("a wait for federates", 0.1, 3600.0)] = 180.0
+    """Longest wait (s of real time) for the other federates to begin: some are started by hand, or compile first."""
+    federates: Annotated[int, Plausible("a number of federates", 0, 1000)] = 0
+    """Above 0, the run starts the broker itself, and the federation waits for so many federates, this one included;
+    at 0 there must be a broker."""
+
+    def relations(self) -> list[Problem]:
+        """Return what is wrong with the values.
+
+        Examples
+        --------
+        >>> HelicsSettings(broker="tcp://127.0.0.1:99999").relations()[0].text
+        'must be like tcp://127.0.0.1:23404, got "tcp://127.0.0.1:99999"'
+        """
+        found = []
+        match = _ADDRESS.fullmatch(self.broker)
+        if match is None or not 0 < int(match["port"] or 1) < 65536:
+            found.append(Problem("broker", f'must be like {BROKER}, got "{self.broker}"'))
+        for key in ("name", "prefix"):
+            value = getattr(self, key)
+            if not re.fullmatch(NAME, value):
+                found.append(Problem(key, f'must be up to 64 letters, digits, "_", "-" or ".", got "{value}"'))
+        if self.federates == 1:
+            text = "must be at least 2, this one and an outside one, or 0 to start no broker; got 1"
+            found.append(Problem("federates", text))
+        return found
+
+
+def settings_of(settings: PlantSettings) -> HelicsSettings:
+    """Return the federate of a run."""
+    return msgspec.convert(settings.simulators.get("helics", {}), HelicsSettings)
+
+
+class HelicsSimulator(Simulator):
+    """A HELICS federation, which has the plant, or takes part in ours."""
+
+    package = "helics"
+    words = "a HELICS federate"
+    elsewhere = True
+    table = HelicsSettings
+
+    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+        """Join the federation that has the plant."""
+        from gridpeers.bridges.helics.helics_plant import HelicsPlant  # scenarios are checked without it
+
+        return HelicsPlant(config, feeder)
+
+    def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
+        """Join the federation with our plant."""
+        from gridpeers.bridges.helics.bridged_plant import BridgedPlant
+
+        return BridgedPlant(build, config)
+
+    def starting(self, table: HelicsSettings | None) -> str:
+        """Return what to tell a person who waits for the start."""
+        return f"still starting: waiting for the HELICS federation at {table.broker if table else BROKER} ..."
+
+
+HELICS = HelicsSimulator()
+
+
+def endpoint(broker: str) -> tuple[str, int]:
+    """Return host and port of a broker's address.
+
+    Examples
+    --------
+    >>> endpoint("tcp://10.0.0.5:24000"), endpoint("localhost")
+    (('10.0.0.5', 24000), ('127.0.0.1', 23404))
+    """
+    match = _ADDRESS.fullmatch(broker)
+    assert match is not None, broker
+    host = "127.0.0.1" if match[2] == "localhost" else match[2]  # HELICS listens at numbers
+    return host, int(match["port"] or 23404)

@@ -1,0 +1,66 @@
+"""The port to simulators of others, which take the place of our plant or take part in its run: found by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import msgspec
+
+from gridpeers.wire.plugins.registry import Registry
+
+if TYPE_CHECKING:
+    from gridpeers.plant.equipment import Feeder
+    from gridpeers.plant.plant_config import PlantConfig
+    from gridpeers.plant.plant_interface import LivePlant
+
+OURS = "gridpeers"
+"""Name of our own plant."""
+
+
+class Simulator:
+    """What `plant.simulator` of a scenario names: an object of a class derived from this one, by an entry point."""
+
+    package: ClassVar[str] = ""
+    """Package that it needs; the extra of gridpeers has the same name. "" for none."""
+    words: ClassVar[str] = ""
+    """What needs the package, and what simulates the plant, e.g. "a HELICS federate"."""
+    elsewhere: ClassVar[bool] = False
+    """Whether the plant runs elsewhere: we do not know its network and its operating point, and it runs once."""
+    table: ClassVar[type[msgspec.Struct] | None] = None
+    """Its own table of a scenario, `[plant.NAME]`; a method `relations` returns what is wrong with the values."""
+
+    def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
+        """Start the plant on a feeder with the scenario's changes; RuntimeError says why it cannot start."""
+        raise NotImplementedError
+
+    def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
+        """Build a plant at t = 0 whose sensors programs outside read, and to which they give set-points."""
+        raise RuntimeError(f"{self.words} takes no plant of others")
+
+    def check(self, scenario: Any, feeder: Feeder, problems: Any) -> None:
+        """Note what a scenario asks for beyond this simulator.
+
+        Types: `gridpeers.scenarios.schema.scenario_model.ScenarioModel`, and `Problems` beside it.
+        """
+
+    def starting(self, table: Any) -> str:
+        """Return what to tell a person who waits for the start; `table` is its own of the scenario, or None."""
+        return ""
+
+
+SIMULATORS: Registry[Simulator] = Registry(
+    "simulator",
+    "simulators",
+    lambda it: "" if isinstance(it, Simulator) else "it is no object of a class derived from Simulator",
+    own={OURS: f"{__name__}:_ours"},
+)
+"""Simulators by name."""
+
+_ours = Simulator()
+
+
+def tables() -> dict[str, type[msgspec.Struct]]:
+    """Return the structs of the simulators' own tables, by name."""
+    found = {name: SIMULATORS.resolve(name).table for name in SIMULATORS.names}
+    return {name: table for name, table in found.items() if table is not None}
