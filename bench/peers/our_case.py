@@ -16,8 +16,8 @@ from unittest.mock import patch
 import gridpeers as gp
 from bench.harness import DEADLINE, GRIDPEERS, checked, processor_time
 from gridpeers.agents.lockstep_agent import LockstepAgent
+from gridpeers.bridges.gridlabd import delta_mode_process
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
-from gridpeers.bridges.gridlabd.process import delta_mode_process
 from gridpeers.plant.build import build_plant
 from gridpeers.plant.lockstep_plant import LockstepPlant
 from gridpeers.scenarios.drivers.inprocess import run_inprocess

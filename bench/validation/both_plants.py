@@ -1,6 +1,6 @@
 """Part "gridlabd": our plant and GridLAB-D through the same run, step by step.
 
-GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `gridpeers.bridges.gridlabd.model.glm` writes from
+GridLAB-D 6.0.0 (its delta mode, `inverter_dyn`) reads a model that `gridpeers.bridges.gridlabd.glm` writes from
 the feeder's tables without the code of `gridpeers.plant.network`. Both plants start from their own equilibrium; in
 closed loop each has its own agents.
 """
@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from bench.validation.gridlabd_runs import ON_ONE_PHASE, RUNS, SHORT, ComparedRun, Reclosing, shortened
 from bench.validation.validation_part import CaseResult, ToleranceCheck, ValidationPart, inverter_row
 from gridpeers.agents.agent_config import AgentConfig
+from gridpeers.bridges.gridlabd.export_glm import write_tables
 from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant
-from gridpeers.bridges.gridlabd.model.export_glm import write_tables
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network

@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.bridges.gridlabd.process.delta_mode import CLOCK_UPDATE, DESIRED, STAY, GridlabdCore
+from gridpeers.bridges.gridlabd.delta_mode import CLOCK_UPDATE, DESIRED, STAY, GridlabdCore
 
 START = 946684800
 """GridLAB-D's clock at the start of the model (s since 1970): 2000-01-01. Delta mode begins one second later."""

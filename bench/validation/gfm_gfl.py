@@ -11,8 +11,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from bench.validation.delta_mode import COMPLEX, REAL, Property, RecordedRun, delta_header, record
-from gridpeers.bridges.gridlabd.model.glm_block import block
-from gridpeers.bridges.gridlabd.model.glm_inverters import inverter_blocks
+from gridpeers.bridges.gridlabd.glm import inverter_blocks
+from gridpeers.bridges.gridlabd.glm_network import block
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 
 from bench.validation.delta_mode import COMPLEX, REAL, RecordedRun, delta_header, record
 from bench.validation.secondary_feeder import INVERTERS, island_tables
-from gridpeers.bridges.gridlabd.model.glm_block import block
-from gridpeers.bridges.gridlabd.model.glm_inverters import inverter_blocks
-from gridpeers.bridges.gridlabd.model.glm_network import network_blocks
+from gridpeers.bridges.gridlabd.glm import inverter_blocks
+from gridpeers.bridges.gridlabd.glm_network import block, network_blocks
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
 
 Z_0, Z_2 = 0.005 + 0.05j, 0.0072 + 0.254j

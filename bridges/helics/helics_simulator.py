@@ -80,7 +80,7 @@ class HelicsSimulator(Simulator):
 
     def offer(self, build: Callable[[], LivePlant], config: PlantConfig) -> LivePlant:
         """Join the federation with our plant."""
-        from gridpeers.bridges.helics.bridged_plant import BridgedPlant
+        from gridpeers.bridges.helics.helics_plant import BridgedPlant
 
         return BridgedPlant(build, config)
 

@@ -8,11 +8,8 @@ from typing import Any, NamedTuple
 
 from gridpeers.bridges.import_checks import left_out_by, refuse_if, report_powers
 from gridpeers.bridges.opendss.dss_elements import DssElements, complex_of, nodes_of, numbered_nodes
-from gridpeers.bridges.opendss.dss_engine import DssEngine
-from gridpeers.bridges.opendss.dss_generation import GENERATION, read_generation
-from gridpeers.bridges.opendss.dss_loads import read_loads
-from gridpeers.bridges.opendss.dss_script import METERS
-from gridpeers.bridges.opendss.dss_values import unusual_voltages
+from gridpeers.bridges.opendss.dss_engine import METERS, DssEngine, unusual_voltages
+from gridpeers.bridges.opendss.dss_loads import GENERATION, read_generation, read_loads
 from gridpeers.plant.equipment import NODES, Feeder
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.wire.wording import suggestion

@@ -12,10 +12,16 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.bridges.import_checks import SHOWN_NAMES, number_of, refuse_if, refuse_unsolvable, without_unfed
+from gridpeers.bridges.import_checks import (
+    SHOWN_NAMES,
+    number_of,
+    refuse_if,
+    refuse_unsolvable,
+    with_plain_names,
+    without_unfed,
+)
 from gridpeers.bridges.opendss.dss_circuit import ImportRequest
 from gridpeers.bridges.opendss.dss_process import reading
-from gridpeers.bridges.plain_names import with_plain_names
 from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.wording import first_of
 

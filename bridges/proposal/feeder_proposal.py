@@ -2,18 +2,305 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter, defaultdict
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import accumulate
+from math import ceil
 from typing import NamedTuple
 
-from gridpeers.bridges.proposal.feeder_walk import depth_first, neighbours
-from gridpeers.bridges.proposal.inverter_groups import GROUP, MOST_GROUPS, group_sizes
-from gridpeers.bridges.proposal.inverter_places import most_rated, possible_places, spread, three_phase
-from gridpeers.bridges.proposal.islanding_switch import islanding_switch
-from gridpeers.bridges.proposal.phase_loads import heaviest_phase, phase_powers
-from gridpeers.bridges.proposal.proposal_errors import NoProposalError, TooLargeError
-from gridpeers.plant.equipment import Feeder, InverterRow
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from gridpeers.plant.equipment import PHASES, Feeder, InverterRow
 from gridpeers.plant.equipment.connectivity import Connectivity, by_bus
+from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
+from gridpeers.plant.network import Network
+from gridpeers.plant.network.powerflow import solve_power_flow
+from gridpeers.plant.tables.feeder_columns import RATED_CURRENT, power_of
+
+ENOUGH = 0.5
+"""Part of the feeder's load that the switch must cut off, to be worth islanding."""
+LINES = {"line": "Line", "overhead_line": "overhead_line", "underground_line": "underground_line"}
+"""Classes of lines in OpenDSS and GridLAB-D, as a line that is to be a switch is written."""
+
+
+def islanding_switch(feeder: Feeder) -> tuple[str, str, frozenset[str]]:
+    """Return the closed switch that cuts most load off the substation, its far bus, and the buses beyond it."""
+    if feeder.source is None:
+        raise NoProposalError("the feeder has no substation to island from")
+    graph, load = Connectivity(feeder), feeder.load_by_bus()
+    if sum(load.values()) <= 0.0:
+        raise NoProposalError("the feeder has no load, which inverters are rated by")
+    places = set(three_phase(feeder))
+    best, head, beyond, most = "", "", frozenset[str](), (False, 0.0, 0)
+    for switch in feeder.switches:
+        buses = graph.cut_off(switch) if switch.closed else frozenset()
+        # a lumped load beside the feeder is no island, however large
+        weight = len(buses & places) >= GROUP, sum(load.get(bus, 0.0) for bus in buses), len(buses)
+        if weight > most:
+            best, beyond, most = switch.alias or switch.name, buses, weight
+            head = switch.to_bus if switch.to_bus in buses else switch.from_bus
+    large, cut_off, _ = most
+    if not large or cut_off < ENOUGH * sum(load.values()):
+        lines = heads(feeder, more_than=1.01 * cut_off, small=not large)
+        if lines or cut_off <= 0.0:
+            raise NoSwitchError(lines)
+    return best, head, beyond
+
+
+def heads(feeder: Feeder, more_than: float, *, small: bool, count: int = 3) -> list[str]:
+    """Return three-phase lines that would make switches, the best first.
+
+    They cut off more than so much load (W): half of all load or more as near to the substation as possible, else
+    as much as possible. Lines that cut off a lumped load come last, and only with `small`.
+    """
+    if feeder.source is None:
+        return []
+    load, near = feeder.load_by_bus(), neighbours(feeder)
+    total = sum(load.values())
+    where = {bus: place for place, bus in enumerate(depth_first(near, [feeder.source.bus]))}
+    number = defaultdict[frozenset[str], int](int)
+    for one, other, _ in feeder.branches():
+        number[frozenset((one, other))] += 1
+    below = cut_off_sums(near, feeder.source.bus, load)
+    places = cut_off_sums(near, feeder.source.bus, dict.fromkeys(three_phase(feeder), 1.0))
+    found: list[tuple[bool, bool, float, int, str]] = []
+    for row in feeder.elements:
+        kind, _, name = row.name.partition(".")
+        buses = {bus for bus, _ in row.nodes}
+        if kind in LINES and len(row.nodes) >= 6 and len(buses) == 2 and number[frozenset(buses)] == 1:
+            one, other = sorted(buses, key=lambda bus: where.get(bus, -1))
+            weight = below.get((one, other), 0.0)
+            if weight > more_than:
+                enough = weight >= ENOUGH * total
+                nearness = where[one] if enough else -weight
+                lumped = places.get((one, other), 0.0) < GROUP
+                if small or not lumped:
+                    found.append((lumped, not enough, nearness, where[one], f"{LINES[kind]}.{name}"))
+    return [name for *_, name in sorted(found)[:count]]
+
+
+def three_phase(feeder: Feeder) -> list[str]:
+    """Return the buses that have phases A, B and C, unless some of them are de-energised and others not."""
+    graph = Connectivity(feeder)
+    fed = {node for part in graph.fed(graph.closed_at_start(), ())[0] for node in part}
+    rows = [bus for bus in feeder.buses if set("ABC") <= set(bus.phases)]
+    return [bus.name for bus in rows if len({(bus.name, phase) in fed for phase in "ABC"}) == 1]
+
+
+def possible_places(
+    feeder: Feeder, known: Collection[str], section: Collection[str], rating: float, count: int
+) -> list[str]:
+    """Return the buses of a section, out of those with three phases, at which inverters of this rating (W) can stand.
+
+    They are of the highest voltage that has as many as `count`, else of the most frequent one: behind a customer's
+    transformer an inverter that carries its neighbours, too, raises the voltage beyond all bounds.
+    """
+    within = set(section).intersection(known)
+    rows = [bus for bus in feeder.buses if bus.name in within]
+    rows = [bus for bus in rows if not is_behind(bus.name)] or rows
+    rows = [bus for bus in rows if rating <= most_rated(bus.V_nom)] or rows
+    if not rows:
+        return []
+    ends = {bus for switch in feeder.switches for bus in (switch.from_bus, switch.to_bus)}
+    rows = [bus for bus in rows if bus.name not in ends] or rows
+    number = Counter(round(bus.V_nom) for bus in rows)
+    enough = [V for V, many in number.items() if many >= count]
+    chosen = max(enough) if enough else max(number, key=lambda V: number[V])
+    return [bus.name for bus in rows if round(bus.V_nom) == chosen]
+
+
+def spread(along: Sequence[str], places: Collection[str], count: int, load: Mapping[str, float]) -> list[str]:
+    """Return so many places, if there are, with equal parts of the load (W, by bus) around them, along a section."""
+    until = list(accumulate((load[bus] for bus in along), initial=0.0))[1:]
+    if not until[-1] > 0.0:
+        until = [float(k) for k, _ in enumerate(along, start=1)]
+    there = [(bus, upto) for bus, upto in zip(along, until, strict=True) if bus in places]
+    count = min(count, len(there))
+    found: list[str] = []
+    at = 0
+    for k in range(count):
+        middle = (k + 0.5) / count * until[-1]
+        last = len(there) - (count - k)  # one is left for each of the others
+        while at < last and there[at][1] < middle:
+            at += 1
+        found.append(there[at][0])
+        at += 1
+    return found
+
+
+def most_rated(V_nom: float) -> float:
+    """Return the largest plausible rating (W) of an inverter at this voltage (V, line-to-neutral)."""
+    return 1e3 * power_of("an inverter", V_nom, RATED_CURRENT, 3).high
+
+
+GROUP = 3
+"""Inverters of a group, a microgrid of its own: one leader and its followers. A section has one group or several."""
+GROUP_LOAD = 2e6
+"""Load (W) beyond which a section has more groups: one leader does not hold the ends of a long feeder."""
+MOST_GROUPS = 12
+"""Groups that are proposed without being told how many inverters, those of most load first."""
+
+
+def group_sizes(loads: Sequence[float], places: Sequence[int], count: int | None) -> list[list[int]]:
+    """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit.
+
+    Parameters
+    ----------
+    loads
+        Load of each section (W), in falling order.
+    places
+        Inverters for which each has a bus, one or more.
+    count
+        Inverters, or None for as many as the load needs.
+    """
+    whole = ceil(count / GROUP) if count else MOST_GROUPS
+    number = [1 for _ in loads[:whole]]
+
+    def most_loaded(room: Sequence[int]) -> int | None:
+        return max(
+            (k for k, most in enumerate(room) if number[k] < most), key=lambda k: loads[k] / number[k], default=None
+        )
+
+    while sum(number) < whole:  # the next group goes where a group has most load
+        k = most_loaded([many // GROUP for many in places[: len(number)]])
+        if k is None or (count is None and loads[k] / number[k] <= GROUP_LOAD):
+            break
+        number[k] += 1
+    while count and sum(min(many, GROUP * groups) for many, groups in zip(places, number, strict=False)) < count:
+        k = most_loaded([ceil(many / GROUP) for many in places[: len(number)]])  # others have too few buses
+        if k is not None:
+            number[k] += 1
+        elif len(number) < len(loads):
+            number.append(1)
+        else:
+            break
+    sizes = [[0] * many for many in number]
+    for _ in range(count or GROUP * sum(number)):
+        open_ = [group for group, many in zip(sizes, places, strict=False) if sum(group) < many and min(group) < GROUP]
+        if open_:
+            smallest = min(open_, key=min)
+            smallest[smallest.index(min(smallest))] += 1
+    return [[size for size in group if size] for group in sizes]
+
+
+def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex128]:
+    """Return the power (VA) through a switch of each phase of its far side, while the substation feeds everything.
+
+    It is without fixed generation. So loads between phases, behind transformers and on split-phase services count where
+    they come from.
+
+    Parameters
+    ----------
+    feeder
+        The feeder; its power flow has a solution, else the result is empty.
+    switch
+        Name or alias of the closed switch.
+    head
+        Its bus away from the substation.
+    """
+    loads = tuple(part for part in feeder.load_parts if part.S.real >= 0.0)
+    network = Network(replace(feeder, load_parts=loads, inverters=()))
+    try:
+        V = solve_power_flow(network, network.closed0).V
+    except ArithmeticError:
+        return np.empty(0, np.complex128)
+    without = network.closed0 - {network.switch_name(switch)}
+    merge = network.merge(without)
+    through = network.admittance(without) @ V + merge.gather(network.loads().currents(V))
+    at = [int(merge.representative[network.index(head, phase)]) for phase in PHASES if network.has(head, phase)]
+    S: NDArray[np.complex128] = V[at] * through[at].conj()
+    return S
+
+
+def heaviest_phase(S: NDArray[np.complex128]) -> float:
+    """Return the load of the heaviest phase in relation to the mean of all, from the power (VA) of each; 1 of none."""
+    P = S.real
+    return float(3.0 * P.max() / P.sum()) if P.sum() > 0.0 else 1.0
+
+
+def neighbours(feeder: Feeder) -> dict[str, list[str]]:
+    """Return the buses beside each bus, over branches and switches that are closed."""
+    near: dict[str, list[str]] = {bus.name: [] for bus in feeder.buses}
+    ties = [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.closed]
+    for one, other in [*((one, other) for one, other, _ in feeder.branches()), *ties]:
+        near[one].append(other)
+        near[other].append(one)
+    return near
+
+
+def depth_first(near: Mapping[str, Sequence[str]], roots: Iterable[str]) -> list[str]:
+    """Return the buses that are reached, each branch to its end before the next one."""
+    found: dict[str, None] = {}
+    for root in roots:
+        waiting = [root]
+        while waiting:
+            bus = waiting.pop()
+            if bus not in found:
+                found[bus] = None
+                waiting += reversed(near[bus])
+    return list(found)
+
+
+def cut_off_sums(
+    near: Mapping[str, Sequence[str]], root: str, what: Mapping[str, float]
+) -> dict[tuple[str, str], float]:
+    """Return what each branch, (nearer bus, farther bus), cuts off of a sum over buses; in a loop none does."""
+    order = depth_first(near, [root])
+    place = {bus: k for k, bus in enumerate(order)}
+    above: dict[str, str] = {}
+    for bus in order:  # in the order of a depth-first search the last neighbour before a bus is the one it came from
+        before = [other for other in near[bus] if place[other] < place[bus]]
+        if before:
+            above[bus] = max(before, key=lambda other: place[other])
+    lowest, weight = dict(place), {bus: what.get(bus, 0.0) for bus in order}
+    cut: dict[tuple[str, str], float] = {}
+    for bus in reversed(order):
+        for other in near[bus]:
+            if other != above.get(bus):
+                lowest[bus] = min(lowest[bus], lowest[other] if above.get(other) == bus else place[other])
+        if bus in above:
+            if lowest[bus] >= place[bus]:
+                cut[above[bus], bus] = weight[bus]
+            weight[above[bus]] += weight[bus]
+    return cut
+
+
+class NoProposalError(ValueError):
+    """A feeder that cannot be islanded as it is; the text says what to add."""
+
+
+class NoSwitchError(NoProposalError):
+    """No switch cuts half of the load off the substation.
+
+    Attributes
+    ----------
+    lines : tuple of str
+        Lines near the substation that would make switches.
+    """
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self.lines = tuple(lines)
+        hint = (
+            f"name a line to be one, such as {', '.join(lines)}" if lines else "no single three-phase line does either"
+        )
+        super().__init__(f"no switch cuts half of the load off the substation; {hint}")
+
+
+class TooLargeError(NoProposalError):
+    """An inverter would be larger than its voltage allows."""
+
+    def __init__(self, row: InverterRow, most: float, load: float, count: int) -> None:
+        self.needed = ceil(count * row.P_rated / most)
+        """Inverters that may be enough."""
+        super().__init__(
+            f"{count} inverters for the load of {load / 1e3:.0f} kW need one of {row.P_rated / 1e3:.0f} kW at bus "
+            f"{row.bus}, where {most / 1e3:.0f} kW are plausible; give more --inverters, if there are buses for "
+            "them, or another --switch"
+        )
+
 
 RATING = 1.3
 """Rating of all inverters of a section beside its load at nominal voltage, were all phases loaded as the heaviest."""

@@ -16,8 +16,8 @@ import pytest
 import gridpeers
 from gridpeers import Result, Scenario
 from gridpeers.bridges.helics import topics
-from gridpeers.bridges.helics.bridged_plant import BridgedPlant
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
+from gridpeers.bridges.helics.helics_plant import BridgedPlant
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint

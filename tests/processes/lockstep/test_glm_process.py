@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.tables.read import FeederError
-from tests.unit.bridges.gridlabd.reading.glm_models import HEAD
+from tests.unit.bridges.gridlabd.glm_models import HEAD
 
 WAITING = """import os, signal, sys
 with open(os.environ["TOLD"], "w") as told:
@@ -22,7 +22,7 @@ signal.pause()
 """
 """A package gridlabd that tells its process and folder, and then loads for ever."""
 
-READ = "import sys; from gridpeers.bridges.gridlabd.reading.read_glm import read_glm; read_glm(sys.argv[1])"
+READ = "import sys; from gridpeers.bridges.gridlabd.read_glm import read_glm; read_glm(sys.argv[1])"
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """Names of an imported feeder that its tables cannot hold have others, each bus its own."""
 
-from gridpeers.bridges.plain_names import with_plain_names
+from gridpeers.bridges.import_checks import with_plain_names
 from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart, bus_behind
 

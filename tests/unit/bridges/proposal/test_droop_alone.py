@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 import gridpeers as gp
-from gridpeers.bridges.proposal.droop_alone import unsteady
+from gridpeers.bridges.proposal.proposed_project import unsteady
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.bridges.proposal.feeder_proposal import propose
-from gridpeers.bridges.proposal.proposal_errors import NoProposalError, NoSwitchError
+from gridpeers.bridges.proposal.feeder_proposal import NoProposalError, NoSwitchError, propose
 from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.scenarios.results.plots.feeder_diagram import feeder_diagram

@@ -9,10 +9,7 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.bridges.proposal.feeder_proposal import RATING, propose
-from gridpeers.bridges.proposal.feeder_walk import cut_off_sums
-from gridpeers.bridges.proposal.inverter_groups import GROUP
-from gridpeers.bridges.proposal.proposal_errors import NoProposalError
+from gridpeers.bridges.proposal.feeder_proposal import GROUP, RATING, NoProposalError, cut_off_sums, propose
 from gridpeers.plant.equipment import Bus, Feeder, Source, Switch
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.tables import read_feeder

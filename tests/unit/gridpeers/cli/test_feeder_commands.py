@@ -17,7 +17,7 @@ from gridpeers.cli.commands.keys_command import init
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from tests.command_line import invoke
-from tests.unit.bridges.gridlabd.reading.glm_models import HEAD, LOADS
+from tests.unit.bridges.gridlabd.glm_models import HEAD, LOADS
 
 pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
 pytest.importorskip("gridlabd", reason="GridLAB-D is not installed")

@@ -5,8 +5,8 @@ from typing import Any, Literal, get_args, get_origin
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.bridges.gridlabd.model.glm_inverters import inverter_blocks
-from gridpeers.bridges.gridlabd.model.unrepresentable import beyond_gridlabd
+from gridpeers.bridges.gridlabd.glm import inverter_blocks
+from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd
 from gridpeers.plant.equipment.inverter_parameters import BOUNDS_OF_SET_POINTS, PARAMETERS_OF
 from gridpeers.wire.schema.table_schema import Field, fields_of
 

@@ -10,14 +10,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from gridpeers.bridges.gridlabd.process.gridlabd_messages import messages
-from gridpeers.bridges.gridlabd.reading.glm_text import GlmText
+from gridpeers.bridges.gridlabd.delta_mode_process import messages
+from gridpeers.bridges.gridlabd.glm_text import GlmText
 from gridpeers.plant.request_process import TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.packages import damaged
 from gridpeers.wire.wording import printable
 
-POWER_FLOW = "gridpeers.bridges.gridlabd.reading.gridlabd_power_flow"
+POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
 
 MISSING = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
 
@@ -28,7 +28,7 @@ LONGEST = 600.0
 
 
 def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
-    """Return what GridLAB-D's solver holds of a model (`gridpeers.bridges.gridlabd.reading.gridlabd_power_flow`).
+    """Return what GridLAB-D's solver holds of a model (`gridpeers.bridges.gridlabd.gridlabd_power_flow`).
 
     Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
     no solution on the way, its `solved` is false, and all else is of the first moment.

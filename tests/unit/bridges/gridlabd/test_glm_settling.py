@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.network import Network, solve_power_flow
-from tests.unit.bridges.gridlabd.reading.glm_models import HEAD, TOLERANCE, write
+from tests.unit.bridges.gridlabd.glm_models import HEAD, TOLERANCE, write
 
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
 

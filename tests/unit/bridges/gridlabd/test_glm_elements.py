@@ -4,14 +4,14 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.bridges.gridlabd.model.export_glm import export_glm
-from gridpeers.bridges.gridlabd.reading.glm_loads import V_MIN
-from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
+from gridpeers.bridges.gridlabd.export_glm import export_glm
+from gridpeers.bridges.gridlabd.glm_elements import V_MIN
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
 from gridpeers.plant.tables.write import write_feeder
-from tests.unit.bridges.gridlabd.reading.glm_models import (
+from tests.unit.bridges.gridlabd.glm_models import (
     ASYMMETRIC,
     HEAD,
     LOADS,

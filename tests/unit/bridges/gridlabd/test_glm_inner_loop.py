@@ -7,8 +7,8 @@ import pytest
 from msgspec.structs import replace
 
 from bench.validation.kirchhoff import kirchhoff_residual, solved_voltages
-from gridpeers.bridges.gridlabd.model.export_glm import export_glm
-from gridpeers.bridges.gridlabd.reading.read_glm import read_glm
+from gridpeers.bridges.gridlabd.export_glm import export_glm
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.dynamics import Dynamics, reduction
 from gridpeers.plant.equipment import InverterRow
 from gridpeers.plant.feeder.circuits import circuit_of
@@ -16,7 +16,7 @@ from gridpeers.plant.feeder.plant import installed_inverters
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import read_feeder
-from tests.unit.bridges.gridlabd.reading.glm_models import ASYMMETRIC, TOLERANCE, gridlabd_voltages, write
+from tests.unit.bridges.gridlabd.glm_models import ASYMMETRIC, TOLERANCE, gridlabd_voltages, write
 
 pytest.importorskip("gridlabd", reason="the import of .glm files needs the extra gridlabd")
 

@@ -6,10 +6,9 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from gridpeers.bridges.gridlabd.model.glm import START, read_table, write_glm
-from gridpeers.bridges.gridlabd.model.glm_block import TableRow
-from gridpeers.bridges.gridlabd.model.glm_network import network_blocks
-from gridpeers.bridges.gridlabd.model.unrepresentable import beyond_gridlabd, unrepresentable
+from gridpeers.bridges.gridlabd.glm import START, read_table, write_glm
+from gridpeers.bridges.gridlabd.glm_network import TableRow, network_blocks
+from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd, unrepresentable
 from gridpeers.plant.equipment import Feeder, Regulator
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network

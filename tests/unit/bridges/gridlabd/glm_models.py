@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.bridges.gridlabd.reading.glm_elements import letters_of
-from gridpeers.bridges.gridlabd.reading.glm_text import GlmText
-from gridpeers.bridges.gridlabd.reading.gridlabd_process import solved_model
-from gridpeers.bridges.gridlabd.reading.read_glm import read_glm, voltage_of
+from gridpeers.bridges.gridlabd.glm_elements import letters_of
+from gridpeers.bridges.gridlabd.glm_text import GlmText
+from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
+from gridpeers.bridges.gridlabd.read_glm import read_glm, voltage_of
 from gridpeers.plant.network import Network, solve_power_flow
 
 TOLERANCE = 1e-6

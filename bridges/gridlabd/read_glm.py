@@ -16,7 +16,8 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from gridpeers.bridges.gridlabd.reading.glm_classes import (
+from gridpeers.bridges.gridlabd.glm_elements import SPLIT, BusLoads, GlmElements, letters_of
+from gridpeers.bridges.gridlabd.glm_text import (
     CHILD_OF_BUS,
     CONTROLS,
     DATA,
@@ -25,12 +26,10 @@ from gridpeers.bridges.gridlabd.reading.glm_classes import (
     LINES,
     SWITCHES,
     WATCHING,
+    GlmText,
 )
-from gridpeers.bridges.gridlabd.reading.glm_elements import SPLIT, GlmElements, letters_of
-from gridpeers.bridges.gridlabd.reading.glm_loads import BusLoads
-from gridpeers.bridges.gridlabd.reading.glm_text import GlmText
-from gridpeers.bridges.gridlabd.reading.gridlabd_power_flow import PV, SWING
-from gridpeers.bridges.gridlabd.reading.gridlabd_process import solved_model
+from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
+from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
 from gridpeers.bridges.import_checks import (
     BEYOND,
     left_out_by,
@@ -38,10 +37,10 @@ from gridpeers.bridges.import_checks import (
     refuse_if,
     refuse_unsolvable,
     report_powers,
+    with_plain_names,
     without_unfed,
 )
 from gridpeers.bridges.import_comparison import MATCH, difference
-from gridpeers.bridges.plain_names import with_plain_names
 from gridpeers.plant.equipment import Feeder, Source
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.plant.tables.read import FeederError

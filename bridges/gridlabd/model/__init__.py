@@ -1,1 +1,0 @@
-"""Our tables as a model of GridLAB-D, and what it cannot represent."""
