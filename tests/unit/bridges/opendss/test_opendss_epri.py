@@ -24,7 +24,7 @@ pytest.importorskip("dss", reason="the import of .dss files needs the extra open
 if importlib.util.find_spec("py_dss_interface") is None:
     pytest.skip("EPRI's engine comes with the extra validation (py-dss-interface)", allow_module_level=True)
 
-FEEDERS = Path(__file__).parents[4] / "feeders"
+FEEDERS = Path(__file__).parents[3] / "feeders"
 
 FEEDER_NAMES = ("ieee13", "ieee34", "standard123")
 

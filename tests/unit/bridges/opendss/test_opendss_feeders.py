@@ -17,7 +17,7 @@ from tests.unit.bridges.opendss.opendss_solutions import TOLERANCE, engine_volta
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
 
-FEEDERS = Path(__file__).parents[4] / "feeders"
+FEEDERS = Path(__file__).parents[3] / "feeders"
 
 
 def published(name: str) -> Iterator[tuple[str, str, float, float]]:
