@@ -12,8 +12,7 @@ import pandas as pd
 import pytest
 
 from gridpeers import BrokenRunError, Feeder, Scenario
-from gridpeers.bridges.proposal import feeder_proposal
-from gridpeers.cli.commands.keys_command import init
+from gridpeers.bridges.proposal import feeder_proposal, proposed_project
 from gridpeers.plant.tables import read_feeder
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from tests.command_line import invoke
@@ -212,7 +211,7 @@ def test_gains_are_chosen_with_which_the_agents_share_vars(elsewhere: Path) -> N
 
 def test_a_check_that_no_gains_pass_is_said(elsewhere: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The note names the check and what it found, and the gains stay as they are by default."""
-    monkeypatch.setattr(init, "BETAS", (1.5,))
+    monkeypatch.setattr(proposed_project, "BETAS", (1.5,))
     Path("long.dss").write_text(string_of_loads(9, 1.0, 1400.0))
 
     made = invoke("init", "mine", "--feeder", "long.dss", "--switch", "Line.sw", "--inverters", "6")[1]
