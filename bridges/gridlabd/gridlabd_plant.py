@@ -23,8 +23,8 @@ from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantSettings
-from gridpeers.plant.tables.read import DATA, PowerLimit
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 
