@@ -222,7 +222,8 @@ def run_inprocess(
         if messages or messages_decide(plant_config, tuple(known.values())):
             side = _run_on_bus(plant_config, known, laws, agents, plant, note, on_other)
         else:
-            laws += [make_law(config.control) for config in known.values()]
+            for config in known.values():  # one by one: those that are made are closed if the next cannot be
+                laws.append(make_law(config.control))
             side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
