@@ -13,6 +13,7 @@ import msgspec
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.scenarios.checks.check_registry import ALWAYS, CHECKS
 from gridpeers.scenarios.drivers.free_endpoint import local_endpoint
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.figure_processes import prepare_figures
@@ -29,11 +30,10 @@ if TYPE_CHECKING:
 
 _AFTER_RUN = (
     *("results.event_windows", "results.findings", "results.evaluation.claims", "results.report"),
-    *("results.plots.drawing", "checks.judging", "checks.physics.balance_check"),
-    "checks.communication.record_content",
+    *("results.plots.drawing", "checks.judging"),
 )
-"""Modules of `gridpeers.scenarios` that are used after a run, with numpy and scipy, and imported while it goes on: this
-process has little to do then."""
+"""Modules of `gridpeers.scenarios` that are used after a run, with numpy and scipy, and imported while it goes on, as
+the checks are: this process has little to do then."""
 
 
 def run_case(
@@ -60,6 +60,8 @@ def run_case(
                 prepare_figures()
                 for module in _AFTER_RUN:
                     import_module(f"gridpeers.scenarios.{module}")
+                for check in ALWAYS:
+                    CHECKS.resolve(check)
             recorder(telemetry)
             progress(case, recorder.ended, time.end_s)
 

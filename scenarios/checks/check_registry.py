@@ -28,39 +28,43 @@ from gridpeers.wire.plugins.registry import Registry
 CHOICE_KEYS = (*KEYS, "name", "off")
 """Keys of an entry of `checks` that are no limits of the check."""
 
-_PLACES = {
-    "frequency": "physics.band_checks:Frequency",
-    "voltage": "physics.band_checks:Voltage",
-    "power_sharing": "physics.sharing_checks:PowerSharing",
-    "var_sharing": "physics.sharing_checks:VarSharing",
-    "rating": "physics.band_checks:Rating",
-    "oscillation": "physics.rest_checks:Oscillation",
-    "steady": "physics.rest_checks:SteadyEnd",
-    "power_balance": "physics.balance_check:PowerBalance",
-    "returns": "event_checks:Returned",
-    "message_account": "communication.account_check:MessageAccount",
-    "law_failed": "event_checks:LawFailed",
-    "heal": "communication.heal_check:Rejoined",
-    "stale_values": "communication.stale_check:StaleValues",
-    "last_words": "communication.last_words_check:LastWords",
-}
-
-CHECKS: Registry[Any] = Registry(
-    "check",
-    "checks",
-    lambda it: callable_objection(it, "case", CHOICE_KEYS),
-    own={name: f"gridpeers.scenarios.checks.{place}" for name, place in _PLACES.items()},
-)
-"""Checks by name; those of gridpeers come first."""
-
 RETURNS = "returns"
 """Judges a run whose scenario asks for it: many end before an inverter that trips may return."""
 
 LAW_FAILED = "law_failed"
 """Fails a run also without `--require-checks`: the numbers are not those of the law that the scenario names."""
 
-ALWAYS = tuple(name for name in CHECKS.own if name != RETURNS)
-"""Checks that judge every run, unless its scenario switches one off."""
+ALWAYS = (
+    "frequency", "voltage", "power_sharing", "var_sharing", "rating", "oscillation", "steady", "power_balance",
+    "message_account", LAW_FAILED, "heal", "stale_values", "last_words",
+)  # fmt: skip
+"""Checks that judge every run, unless its scenario switches one off, in the order of the verdict."""
+
+CHECKS: Registry[Any] = Registry(
+    "check",
+    "checks",
+    lambda it: callable_objection(it, "case", CHOICE_KEYS),
+    own={
+        name: f"gridpeers.scenarios.checks.{place}"
+        for name, place in {
+            "frequency": "physics.band_checks:Frequency",
+            "voltage": "physics.band_checks:Voltage",
+            "power_sharing": "physics.sharing_checks:PowerSharing",
+            "var_sharing": "physics.sharing_checks:VarSharing",
+            "rating": "physics.band_checks:Rating",
+            "oscillation": "physics.rest_checks:Oscillation",
+            "steady": "physics.rest_checks:SteadyEnd",
+            "power_balance": "physics.balance_check:PowerBalance",
+            "returns": "event_checks:Returned",
+            "law_failed": "event_checks:LawFailed",
+        }.items()
+    },
+    reserved=ALWAYS,
+)
+"""Checks by name; those of plant and events come first. Those of messages are entry points of `gridpeers.lab`."""
+
+READERS: Registry[Any] = Registry("reader of a record", "record readers", lambda it: callable_objection(it, "path"))
+"""Functions of the path of a run.mcap, by the attribute of `CheckedCase` that has what they return."""
 
 
 def chosen_checks(entries: Iterable[str | Mapping[str, Any]]) -> dict[str, Plugin]:

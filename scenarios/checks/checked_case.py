@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import Any
 
 import numpy as np
 
 from gridpeers.plant.equipment import Feeder
+from gridpeers.scenarios.checks.check_registry import READERS
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window
 from gridpeers.scenarios.results.history import Flags, History, Nameplates, read_only
@@ -19,12 +20,6 @@ from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
-
-if TYPE_CHECKING:
-    from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
-    from gridpeers.scenarios.checks.communication.record_content import RecordContent
-
-Read = TypeVar("Read")
 
 NEAR = 0.02
 """Part of its available power within which an inverter counts as at that limit."""
@@ -87,27 +82,23 @@ class CheckedCase:
         )
 
     @cached_property
-    def communication(self) -> CommunicationSummary:
+    def communication(self) -> Any:
         """What one pass over the record, of any size, finds of messages and decisions; `NotJudgedError` without one."""
-        from gridpeers.scenarios.checks.communication.communication_summary import summarise
-
-        return self._of_record(summarise)
+        return self._read("communication")
 
     @cached_property
-    def content(self) -> RecordContent:
+    def content(self) -> Any:
         """States, decisions and accounts of links from the record; `NotJudgedError` where the run has none."""
-        from gridpeers.scenarios.checks.communication.record_content import read_content
+        return self._read("content")
 
-        return self._of_record(read_content)
-
-    def _of_record(self, read: Callable[[Path], Read]) -> Read:
+    def _read(self, reader: str) -> Any:
         from gridpeers.scenarios.record.record_file import RecordFileError
         from gridpeers.scenarios.record.record_info import FILE
 
         if self.folder is None or not (self.folder / FILE).exists():
             raise NotJudgedError("the run has no record run.mcap")
         try:
-            return read(self.folder / FILE)
+            return READERS.resolve(reader)(self.folder / FILE)
         except RecordFileError as error:
             raise NotJudgedError(str(error)) from error
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cache
 from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
@@ -46,6 +46,8 @@ class Registry(Generic[T]):
         Why an object is none of this kind, as the end of a sentence; "" if it is one.
     own : dict[str, str], optional
         References (`module:Name`) of those that come with gridpeers, by name; imported when they are asked for.
+    reserved : Collection[str], optional
+        Names of entry points of gridpeers that no decorator may take over.
 
     Examples
     --------
@@ -62,11 +64,16 @@ class Registry(Generic[T]):
     """
 
     def __init__(
-        self, kind: str, plural: str, objection: Callable[[Any], str], own: dict[str, str] | None = None
+        self,
+        kind: str,
+        plural: str,
+        objection: Callable[[Any], str],
+        own: dict[str, str] | None = None,
+        reserved: Collection[str] = (),
     ) -> None:
         self.kind, self.plural = kind, plural
         self._objection = objection
-        self.own = dict(own or {})
+        self.own, self._reserved = dict(own or {}), reserved
         self._added: dict[str, T] = {}
 
     @property
@@ -95,7 +102,7 @@ class Registry(Generic[T]):
         def add(it: T) -> T:
             before = self._added.get(name)
             same = before is not None and _home(before) == _home(it)  # a cell of a notebook that is run again
-            if name in self.own or (before is not None and not same):
+            if name in self.own or name in self._reserved or (before is not None and not same):
                 raise PluginError(f'there is a {self.kind} "{name}" already; choose another name')
             self._check(it, name)
             self._added[name] = it
