@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
+from gridpeers.lab.communication.record_content import read_content
 from gridpeers.lab.replay.replay import replay
-from gridpeers.scenarios.checks.communication.record_content import read_content
 from gridpeers.scenarios.record.journal_coverage import JournalCoverage, inside
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.viewer.record_view import RecordView

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from gridpeers.agents.session_health import SessionHealth
-from gridpeers.scenarios.checks.communication.account_check import MessageAccount
-from gridpeers.scenarios.checks.communication.communication_summary import LINKED_WITHIN, summarise
+from gridpeers.lab.communication.account_check import MessageAccount
+from gridpeers.lab.communication.communication_summary import LINKED_WITHIN, summarise
 from tests.record.fake_clock import fake_clock_record
 
 LOST = ("inv1", "inv2")

@@ -9,9 +9,9 @@ from typing import Any, cast
 import msgspec
 from msgspec.structs import replace
 
+from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.record_pass import read_into
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
-from gridpeers.scenarios.checks.communication.record_pass import read_into
 from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.record.record_file import RecordFile, RecordMessage
 from gridpeers.scenarios.record.record_info import RecordInfo

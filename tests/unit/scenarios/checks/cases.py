@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 import gridpeers as gp
+from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.record_content import RecordContent
 from gridpeers.scenarios.checks.check_registry import chosen_checks
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
-from gridpeers.scenarios.checks.communication.record_content import RecordContent
 from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.scenarios.results.history import History
 

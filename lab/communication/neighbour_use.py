@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
-from gridpeers.scenarios.checks.communication.state_window import StateWindow
+from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.state_window import StateWindow
 from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, inside
 from gridpeers.wire.journal import Decision
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
+from gridpeers.lab.communication.communication_summary import CommunicationSummary
+from gridpeers.lab.communication.link_accounts import Missing
+from gridpeers.lab.communication.record_sink import Link
 from gridpeers.netem.ledger import LinkCounts
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation, require_longer
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
-from gridpeers.scenarios.checks.communication.link_accounts import Missing
-from gridpeers.scenarios.checks.communication.record_sink import Link
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
 

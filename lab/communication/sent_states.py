@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from gridpeers.scenarios.checks.communication.record_sink import SentState
-from gridpeers.scenarios.checks.communication.state_window import StateWindow
+from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.state_window import StateWindow
 
 _WINDOWS = 3
 """Number of processes of which states are kept: decisions are looked at some seconds later, when others may speak."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from math import inf
 from typing import NamedTuple, Protocol
 
+from gridpeers.lab.communication.dropped_states import DroppedStates
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
 from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole
 from gridpeers.wire.journal import Decision
 

@@ -8,8 +8,8 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.scenarios.checks.checked_case import CheckedCase
+from tests.unit.lab.communication.records import KILLED
 from tests.unit.scenarios.checks.cases import ran, ran_with, verdict, with_content
-from tests.unit.scenarios.checks.communication.records import KILLED
 
 
 def test_a_silence_longer_than_the_run_is_not_judged(sound: CheckedCase) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 
-from gridpeers.scenarios.checks.communication.record_sink import SentState
+from gridpeers.lab.communication.record_sink import SentState
 
 KEPT = 8192
 """Number of states that a window holds: 2.7 minutes at a control period of 20 ms."""

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import msgspec
 
+from gridpeers.lab.communication.record_content import RecordContent
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.record_content import RecordContent
 
 LOSSY = (("case.IV.link", repr([{"on": "* <-> *", "loss": 0.2, "delay": 0.03}])),)
 CUT = (("case.IV.link", repr([{"on": "inv2 <-> *", "cut": True, "from_s": 2.0, "to_s": 2.16}])), ("time.end_s", "5.0"))

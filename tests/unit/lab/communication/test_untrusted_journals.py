@@ -7,9 +7,9 @@ from typing import Any
 import msgspec
 import pytest
 
+from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.state_window import KEPT, StateWindow
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.checks.communication.record_sink import SentState
-from gridpeers.scenarios.checks.communication.state_window import KEPT, StateWindow
 from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
 from gridpeers.wire.messages import State

@@ -13,10 +13,10 @@ from typing import Any
 
 import msgspec
 
+from gridpeers.lab.communication.dropped_states import OF_SENDER, DropTimes
+from gridpeers.lab.communication.record_sink import PassEnd, RecordSink, SentState
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
-from gridpeers.scenarios.checks.communication.dropped_states import OF_SENDER, DropTimes
-from gridpeers.scenarios.checks.communication.record_sink import PassEnd, RecordSink, SentState
 from gridpeers.scenarios.emulation.link_data import data_of
 from gridpeers.scenarios.record.decision_entries import is_periodic
 from gridpeers.scenarios.record.journal_coverage import JournalCoverage

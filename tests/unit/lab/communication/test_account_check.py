@@ -9,12 +9,12 @@ from typing import Any
 import msgspec
 import pytest
 
+from gridpeers.lab.communication.link_accounts import Missing
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.link_accounts import Missing
 from gridpeers.scenarios.checks.judging import judge_by
 from gridpeers.wire.plugins.plugin import Plugin
+from tests.unit.lab.communication.records import LOSSY, in_real_time
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
-from tests.unit.scenarios.checks.communication.records import LOSSY, in_real_time
 
 
 @pytest.mark.parametrize(("in_flight_s", "status"), [(7.0, "not judged"), (6.0, "passed")])

@@ -12,19 +12,19 @@ from typing import Any, cast
 
 import pytest
 
+from gridpeers.lab.communication.account_check import MessageAccount
+from gridpeers.lab.communication.arrival_accounts import ArrivalAccounts
+from gridpeers.lab.communication.communication_summary import summarise
+from gridpeers.lab.communication.dropped_states import DroppedStates
+from gridpeers.lab.communication.record_content import read_content
+from gridpeers.lab.communication.record_sink import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.account_check import MessageAccount
-from gridpeers.scenarios.checks.communication.arrival_accounts import ArrivalAccounts
-from gridpeers.scenarios.checks.communication.communication_summary import summarise
-from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
-from gridpeers.scenarios.checks.communication.record_content import read_content
-from gridpeers.scenarios.checks.communication.record_sink import SentState
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.wire.journal import RecordLevel
 from tests.fuzz.journals import judged
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
-from tests.unit.scenarios.checks.communication.test_untrusted_journals import packed, sent
+from tests.unit.lab.communication.test_untrusted_journals import packed, sent
 
 LOST = range(50, 60)
 """Numbers of the messages from inv1 to inv2 that never arrive: those of 1.0 to 1.2 s."""

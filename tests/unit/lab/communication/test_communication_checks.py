@@ -8,15 +8,15 @@ from dataclasses import replace
 import msgspec
 import pytest
 
+from gridpeers.lab.communication import record_content
+from gridpeers.lab.communication.communication_summary import SummaryPass
+from gridpeers.lab.communication.record_sink import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication import record_content
-from gridpeers.scenarios.checks.communication.communication_summary import SummaryPass
-from gridpeers.scenarios.checks.communication.record_sink import SentState
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.wire.journal import Decision
+from tests.unit.lab.communication.records import CUT, LOSSY, QUIET
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
-from tests.unit.scenarios.checks.communication.records import CUT, LOSSY, QUIET
 
 COMMUNICATION = ("message_account", "heal", "stale_values", "last_words")
 EVENT = [{"label": "islanding", "t_s": 0.5, "open": ["13-152"]}]

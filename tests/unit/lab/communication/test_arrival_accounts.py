@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 
 import pytest
 
-from gridpeers.scenarios.checks.communication.arrival_accounts import MOST_WAITING, ArrivalAccounts
-from gridpeers.scenarios.checks.communication.record_sink import SentState
+from gridpeers.lab.communication.arrival_accounts import MOST_WAITING, ArrivalAccounts
+from gridpeers.lab.communication.record_sink import SentState
 
 LINK = ("inv1", "inv2")
 

@@ -10,8 +10,8 @@ import pytest
 
 import gridpeers as gp
 from gridpeers.scenarios.checks.checked_case import CheckedCase
+from tests.unit.lab.communication.records import CUT
 from tests.unit.scenarios.checks.cases import ran_with, verdict, with_content
-from tests.unit.scenarios.checks.communication.records import CUT
 
 
 def deaf(entry: Any) -> Any:

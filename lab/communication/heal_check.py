@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from math import inf
 from typing import Annotated
 
+from gridpeers.lab.communication.heals import Heal
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.heals import Heal
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
 

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from gridpeers.lab.communication.heals import Heal, Heals
+from gridpeers.lab.communication.neighbour_use import NeighbourUse, Uses
+from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.sent_states import SentStates
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.checks.communication.heals import Heal, Heals
-from gridpeers.scenarios.checks.communication.neighbour_use import NeighbourUse, Uses
-from gridpeers.scenarios.checks.communication.record_sink import SentState
-from gridpeers.scenarios.checks.communication.sent_states import SentStates
 
 T_C = 0.02
 LINK = ("inv2", "inv1")

@@ -14,15 +14,15 @@ from math import inf
 from pathlib import Path
 from types import MappingProxyType
 
+from gridpeers.lab.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
+from gridpeers.lab.communication.dropped_states import DroppedStates
+from gridpeers.lab.communication.heals import Heal, Heals
+from gridpeers.lab.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
+from gridpeers.lab.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
+from gridpeers.lab.communication.record_pass import end_of, opened, read_into
+from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.sent_states import SentStates
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.checks.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
-from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
-from gridpeers.scenarios.checks.communication.heals import Heal, Heals
-from gridpeers.scenarios.checks.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
-from gridpeers.scenarios.checks.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from gridpeers.scenarios.checks.communication.record_pass import end_of, opened, read_into
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
-from gridpeers.scenarios.checks.communication.sent_states import SentStates
 from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision

@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 
+from gridpeers.lab.communication.neighbour_use import Uses
+from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.sent_states import SentStates
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.checks.communication.neighbour_use import Uses
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
-from gridpeers.scenarios.checks.communication.sent_states import SentStates
 from gridpeers.scenarios.record.journal_coverage import Hole, inside
 from gridpeers.wire.messages import PLANT
 

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import msgspec
 
+from gridpeers.lab.communication.communication_summary import CommunicationSummary
 from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation, require_longer
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.scenarios.checks.communication.communication_summary import CommunicationSummary
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import LIVE
 from gridpeers.wire.messages import PlantEvent

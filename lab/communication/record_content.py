@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from gridpeers.lab.communication.dropped_states import DroppedStates
+from gridpeers.lab.communication.record_pass import end_of, opened, read_into
+from gridpeers.lab.communication.record_sink import Link, SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
-from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
-from gridpeers.scenarios.checks.communication.record_pass import end_of, opened, read_into
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
 from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision

@@ -9,13 +9,13 @@ from math import inf
 
 import msgspec
 
+from gridpeers.lab.communication.neighbour_use import Uses
+from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.sent_states import SentStates
+from gridpeers.lab.communication.state_window import StateWindow
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds
-from gridpeers.scenarios.checks.communication.neighbour_use import Uses
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
-from gridpeers.scenarios.checks.communication.sent_states import SentStates
-from gridpeers.scenarios.checks.communication.state_window import StateWindow
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 

@@ -9,9 +9,9 @@ from itertools import takewhile
 from math import inf, nextafter
 from operator import attrgetter
 
-from gridpeers.scenarios.checks.communication.dropped_states import DroppedStates
-from gridpeers.scenarios.checks.communication.link_accounts import Missing
-from gridpeers.scenarios.checks.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.dropped_states import DroppedStates
+from gridpeers.lab.communication.link_accounts import Missing
+from gridpeers.lab.communication.record_sink import Link, SentState
 
 MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
