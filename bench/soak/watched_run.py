@@ -21,7 +21,7 @@ import gridpeers as gp
 from bench.harness import GRIDPEERS
 from bench.soak.judging import LAST_WORDS, ProcessSize
 from bench.soak.soak_monitor import HOLD, SoakMonitor
-from gridpeers.lab.communication.last_words_check import LastWords
+from gridpeers.lab.communication.communication_checks import LastWords
 from gridpeers.scenarios.checks.check_verdict import FILE as CHECKS
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, Violation, read_verdicts
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint

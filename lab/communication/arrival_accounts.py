@@ -1,4 +1,4 @@
-"""Accounts of what arrives over links in wall-clock time, kept while a pass over a record goes on."""
+"""Accounts of what arrives over links in real time, kept while a pass over a record goes on."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from itertools import takewhile
 from math import inf, nextafter
 from operator import attrgetter
 
-from gridpeers.lab.communication.dropped_states import DroppedStates
 from gridpeers.lab.communication.link_accounts import Missing
-from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.record_pass import DroppedStates, Link
+from gridpeers.lab.communication.sent_states import SentState
 
 MOST_WAITING = 6000
 """Numbers of one link that are kept while they wait for their counterpart, or for the end of their process."""
@@ -26,22 +26,18 @@ time is sought: a process that was frozen wakes beside the next one, and they ma
 
 @dataclass
 class Presence:
-    """A time in which one process of an agent spoke with one session, without a long pause."""
+    """A time (s) in which one process of an agent spoke with one session, without a long pause."""
 
     epoch: int
-    """Its epoch."""
     since: float
-    """Run time (s) of its first state."""
     until: float
-    """Run time (s) of its last one."""
 
 
 @dataclass
 class ArrivalAccount:
-    """Wall-clock time: what came over a link while both of its ends were there."""
+    """What came over a link while its sender and its receiver were there."""
 
     ends: tuple[Presence, Presence]
-    """Sender and receiver."""
     began: bool = False
     """Whether the link must be there: something came, or both ends have been there for long."""
     early: Missing = field(default_factory=Missing)
@@ -51,7 +47,6 @@ class ArrivalAccount:
 
     @property
     def since(self) -> float:
-        """Run time (s) from which on both ends were there."""
         return max(end.since for end in self.ends)
 
     @property
@@ -64,14 +59,10 @@ _since = attrgetter("since")
 
 
 class ArrivalAccounts:
-    """Wall-clock time: every state that was sent arrives, from the first one on that does, or that should have.
+    """Every state that was sent in real time arrives, from the first one on that does, or that should have.
 
-    Parameters
-    ----------
-    pause : float
-        Silence of a process (s of run time) after which its links are given up, so that they have to be made anew.
-    linked_within : float
-        Time (s of run time) within which two processes that are both there have made their link.
+    A process that is silent for a `pause` (s of run time) has its links given up, so that they have to be made anew;
+    two processes that are both there have made theirs `linked_within` (s of run time).
     """
 
     def __init__(self, pause: float, linked_within: float) -> None:
@@ -81,15 +72,12 @@ class ArrivalAccounts:
         self._states: dict[str, deque[SentState]] = defaultdict(deque)
         self._arrived: dict[Link, dict[tuple[int, int], None]] = {}
         self._dropped: dict[Link, deque[DroppedStates]] = defaultdict(lambda: deque(maxlen=MOST_DROPPED))
-        """Numbers of dropped states that receivers told, kept until every state that they may mean is known."""
         self._links_of: dict[str, list[Link]] = defaultdict(list)
         self._open: dict[Link, deque[ArrivalAccount]] = defaultdict(lambda: deque(maxlen=3))
         """The last accounts of each link: what comes later than others did is still missing there."""
         self.accounts: dict[Link, list[ArrivalAccount]] = {}
-        """Accounts of each link."""
 
     def state(self, agent: str, state: SentState) -> None:
-        """Note a state."""
         there = self._there[agent]
         if not there or there[-1].epoch != state.epoch or state.t > there[-1].until + self._pause:
             there.append(Presence(state.epoch, state.t, state.t))
@@ -118,7 +106,6 @@ class ArrivalAccounts:
             self._links_of[link[0]].append(link)
 
     def heard(self, link: Link, epoch: int, number: int) -> None:
-        """Note that a state has arrived."""
         self.listens(link)
         for account in self._open[link]:
             if account.late and account.late.pop((epoch, number), None) is not None:
@@ -129,7 +116,6 @@ class ArrivalAccounts:
             del arrived[next(iter(arrived))]
 
     def dropped(self, link: Link, states: DroppedStates) -> None:
-        """Note that a receiver dropped some states."""
         self.listens(link)
         self._dropped[link].append(states)
 

@@ -15,13 +15,11 @@ from pathlib import Path
 from types import MappingProxyType
 
 from gridpeers.lab.communication.arrival_accounts import ArrivalAccount, ArrivalAccounts
-from gridpeers.lab.communication.dropped_states import DroppedStates
 from gridpeers.lab.communication.heals import Heal, Heals
 from gridpeers.lab.communication.link_accounts import Missing, TickAccounts, VerdictAccounts
 from gridpeers.lab.communication.neighbour_use import DecidedStates, DecidedTicks, NeighbourUse, Uses
-from gridpeers.lab.communication.record_pass import end_of, opened, read_into
-from gridpeers.lab.communication.record_sink import Link, SentState
-from gridpeers.lab.communication.sent_states import SentStates
+from gridpeers.lab.communication.record_pass import DroppedStates, Link, RecordSink, end_of, opened, read_into
+from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
@@ -31,7 +29,7 @@ from gridpeers.wire.timing import PATIENCE
 
 DELAY_TICKS, DELAY = 300, 5.0
 """How long after its run time a decision is looked at: ticks of simulated time, where a journal comes every 100
-ticks at the latest; seconds of wall-clock time, where it comes every 0.2 s."""
+ticks at the latest; seconds of real time, where it comes every 0.2 s."""
 
 PAUSE = 1.5
 """Silence of a process (s of wall time) after which its links may be given up: Zenoh gives them 2 s."""
@@ -58,7 +56,6 @@ class CommunicationSummary:
     """Accounts of links, ages of values, heals, and the last states of each agent."""
 
     info: RecordInfo
-    """The run."""
     t_end: float
     """Latest run time in the record (s)."""
     unreadable: int
@@ -72,7 +69,7 @@ class CommunicationSummary:
     unheard: Mapping[Link, Missing]
     """Simulated time: decisions without the state of the tick before, by link; for those without faults."""
     arrivals: Mapping[Link, Sequence[ArrivalAccount]]
-    """Wall-clock time: what came over each link, for each time in which both of its ends were there."""
+    """Real time: what came over each link, for each time in which both of its ends were there."""
     oldest: Mapping[Link, list[OldUse]]
     """The oldest value that was used of each link, then the oldest of what was used later, and so on: ages fall."""
     used: bool
@@ -90,22 +87,9 @@ class CommunicationSummary:
         """Whether the record has what arrived: in simulated time decisions say it."""
         return self.simulated or self.info.level == "all"
 
-    @property
-    def agents(self) -> tuple[str, ...]:
-        """All configured agents."""
-        return self.info.agent_names
-
 
 def summarise(path: Path) -> CommunicationSummary:
-    """Go through the file of a record once; twice if parts of it are lost.
-
-    Raises
-    ------
-    NotJudgedError
-        If it has no messages and decisions.
-    RecordFileError
-        If it is none.
-    """
+    """Go through the file of a record once, twice if parts of it are lost; NotJudgedError if it has no decisions."""
     file = opened(path)
     sums = SummaryPass(file.info, end_of(file))
     end = read_into(file, sums)
@@ -115,18 +99,8 @@ def summarise(path: Path) -> CommunicationSummary:
     return sums.finish(end.unreadable)
 
 
-class SummaryPass:
-    """One pass over a record; a `RecordSink`.
-
-    Parameters
-    ----------
-    info
-        The run.
-    t_end
-        Latest run time in the record (s).
-    lost
-        Simulated time: run times (s) between which parts of a node's journal are lost.
-    """
+class SummaryPass(RecordSink):
+    """One pass over a record that ends at t_end (s); `lost` has the parts of journals that an earlier pass missed."""
 
     def __init__(
         self, info: RecordInfo, t_end: float, lost: Mapping[str, Sequence[Hole]] = MappingProxyType({})
@@ -139,10 +113,9 @@ class SummaryPass:
         self._decided: dict[str, DecidedTicks | DecidedStates] = {}
         self._ticks = TickAccounts(self._sent, info.T_c, lost.get(PLANT, ()))
         self._verdicts = VerdictAccounts(self._sent)
-        self._arrivals, self._heals = (
-            ArrivalAccounts(PAUSE * max(1.0, info.plant.speed), LINKED_WITHIN * max(1.0, info.plant.speed)),
-            Heals(info, t_end, self._sent),
-        )
+        speed = max(1.0, info.plant.speed)
+        self._arrivals = ArrivalAccounts(PAUSE * speed, LINKED_WITHIN * speed)
+        self._heals = Heals(info, t_end, self._sent)
         self._counts: dict[Link, LinkCounts] = {}
         self._oldest: defaultdict[Link, list[OldUse]] = defaultdict(list)
         self._used = False
@@ -152,7 +125,6 @@ class SummaryPass:
         self._t = self._flushed = 0.0
 
     def state(self, agent: str, state: SentState) -> None:
-        """Take a state that an agent sent."""
         if agent not in self._names or not self._sent[agent].put(state):
             return
         self._of(agent).state(state)
@@ -165,7 +137,6 @@ class SummaryPass:
             self._flush(self._t - self._delay)
 
     def decision(self, agent: str, epoch: int, decision: Decision) -> None:
-        """Take how an agent decided."""
         if agent not in self._names:
             return
         self._of(agent).decision(epoch, decision)
@@ -174,37 +145,30 @@ class SummaryPass:
                 self._arrivals.listens((name, agent))
 
     def heard(self, link: Link, epoch: int, number: int, rejected: str) -> None:
-        """Take a state that arrived in wall-clock time."""
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.heard(link, epoch, number)
 
     def dropped(self, link: Link, states: DroppedStates) -> None:
-        """Take the number of states that a receiver dropped in wall-clock time."""
         if not self._simulated and self._names.issuperset(link):
             self._arrivals.dropped(link, states)
 
     def renewed(self, agent: str, t: float) -> None:
-        """Take that an agent opened a new session in wall-clock time, after its state of a run time (s)."""
         if agent in self._names:
             self._arrivals.renewed(agent, t)
 
     def counts(self, link: Link, counts: LinkCounts) -> None:
-        """Take the account of an emulated link up to now."""
         self._counts[link] = counts
 
     def trace(self, trace: LinkTrace) -> None:
-        """Take further verdicts of an emulated link."""
         self._heals.trace(trace)
         if self._simulated:
             self._verdicts.trace(trace)
 
     def known_until(self, agent: str, t: float) -> None:
-        """Take the run time (s) up to which it is known how an agent decided."""
         if agent in self._names and isinstance(decided := self._of(agent), DecidedTicks):
             decided.known_until = t
 
     def finish(self, unreadable: int) -> CommunicationSummary:
-        """Return what was found, once the record is at its end."""
         self._flush(inf)
         self._decided.clear()  # they tell this object what they find: in a cycle all of it would stay
         return CommunicationSummary(
@@ -242,7 +206,6 @@ class SummaryPass:
             self._arrivals.flush(until)
 
     def _use(self, agent: str, state: SentState, uses: Uses, *, new: bool) -> None:
-        """Look at the states of neighbours that an own state came of."""
         alike = self._alike.get(agent)
         if alike is not None and alike[0] is uses:
             for old in alike[1]:
@@ -254,7 +217,6 @@ class SummaryPass:
         self._heals.use(agent, state, uses, new=new)
 
     def _note_ages(self, agent: str, state: SentState, uses: Uses) -> None:
-        """Note the ages of all values that an own state came of."""
         used = [use for use in uses.each if not use.unused]
         for use in used:
             self._used = True

@@ -10,9 +10,8 @@ from math import inf
 import msgspec
 
 from gridpeers.lab.communication.neighbour_use import Uses
-from gridpeers.lab.communication.record_sink import Link, SentState
-from gridpeers.lab.communication.sent_states import SentStates
-from gridpeers.lab.communication.state_window import StateWindow
+from gridpeers.lab.communication.record_pass import Link
+from gridpeers.lab.communication.sent_states import SentState, SentStates, StateWindow
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.pattern import Link as LinkEnds
@@ -26,7 +25,7 @@ LOSSES = (*CUTS, "loss", "flap")
 """Faults during which a link that was cut does not count as whole again."""
 
 STANDSTILL, PERIODS = 0.5, 5.0
-"""Wall-clock time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood
+"""Real time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood
 still. Its numbers have no gap then. Shorter pauses are those of a busy host, and count as work."""
 
 
@@ -39,29 +38,19 @@ class Heal:
     """When (s)."""
     took: float | None = None
     """After what time (s) the receiver used something that the sender has sent since; None if it never did. It counts
-    from when one of them last stood still (left out ticks; in wall-clock time `STANDSTILL`), if that was later."""
+    from when one of them last stood still (left out ticks; in real time `STANDSTILL`), if that was later."""
     lost_again: float = inf
     """When (s) the link was next cut, or began to lose messages."""
     at_work_since: float | None = None
     """Since when (s) the receiver has been at work without standing still, if the sender was there and has spoken since
-    the heal. In simulated time the sender has left out no tick since, either; in wall-clock time one that stands still
+    the heal. In simulated time the sender has left out no tick since, either; in real time one that stands still
     is there until its last state."""
     waited: float = 0.0
     """Longest time (s) of that kind in which the link was whole and nothing new was used."""
 
 
 class Heals:
-    """The heals of all links over which agents listen.
-
-    Parameters
-    ----------
-    info
-        The run; it has the planned cuts.
-    t_end
-        Latest run time in the record (s).
-    sent
-        States of each agent.
-    """
+    """The heals of all links over which agents listen up to t_end (s): planned ones, and those that verdicts tell."""
 
     def __init__(self, info: RecordInfo, t_end: float, sent: Mapping[str, SentStates]) -> None:
         self._sent = sent
@@ -79,7 +68,6 @@ class Heals:
         self._was_cut: set[Link] = set()
         self._listens: set[Link] = set()
         self._receivers: set[str] = set()
-        """Receivers of links with a heal."""
         self._losses: dict[Link, list[Span]] = {}
         """Planned cuts and losses of each link."""
         for link, spans in _planned(info):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from math import inf
 
 from gridpeers.lab.communication.neighbour_use import Uses
-from gridpeers.lab.communication.record_sink import Link, SentState
-from gridpeers.lab.communication.sent_states import SentStates
+from gridpeers.lab.communication.record_pass import Link
+from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.scenarios.record.journal_coverage import Hole, inside
 from gridpeers.wire.messages import PLANT
@@ -22,12 +22,10 @@ class Missing:
     """States that are missing on a link."""
 
     count: int = 0
-    """Number of them."""
     first: float = 0.0
     """Run time of the first one (s)."""
 
     def add(self, t: float) -> None:
-        """Count one, of a run time (s)."""
         if not self.count:
             self.first = t
         self.count += 1
@@ -44,7 +42,6 @@ class TickAccounts:
         """What each link over which an agent listens lacks."""
 
     def state(self, agent: str, state: SentState) -> None:
-        """Note a state."""
         if not (state.quiet or state.idle):
             if state.number not in self._spoken:
                 self._spoken[state.number] = set()
@@ -74,6 +71,16 @@ class TickAccounts:
                 self.missing[use.link].add(state.t)
 
 
+@dataclass
+class _Verdicts:
+    """Verdicts of one link: all numbers up to `done` are decided, those ahead have a verdict."""
+
+    done: int
+    highest: int = -1
+    ahead: set[int] = field(default_factory=set)
+    missing: Missing = field(default_factory=Missing)
+
+
 class VerdictAccounts:
     """Simulated time with emulated links: every state between the first and the last verdict of a link has one."""
 
@@ -82,7 +89,6 @@ class VerdictAccounts:
         self._links: dict[Link, _Verdicts] = {}
 
     def trace(self, trace: LinkTrace) -> None:
-        """Take verdicts of a link."""
         link = trace.src, trace.dst
         if PLANT in link or not trace.seq:
             return
@@ -110,16 +116,3 @@ class VerdictAccounts:
         else:
             of.ahead.difference_update(range(of.done + 1, until + 1))
         of.done = until
-
-
-@dataclass
-class _Verdicts:
-    """Verdicts of one link."""
-
-    done: int
-    """Number up to which all is decided."""
-    highest: int = -1
-    """Highest number with a verdict."""
-    ahead: set[int] = field(default_factory=set)
-    """Numbers with a verdict that are not decided yet."""
-    missing: Missing = field(default_factory=Missing)

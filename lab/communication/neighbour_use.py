@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from math import inf
 from typing import NamedTuple
 
-from gridpeers.lab.communication.record_sink import Link, SentState
-from gridpeers.lab.communication.state_window import StateWindow
+from gridpeers.lab.communication.record_pass import Link
+from gridpeers.lab.communication.sent_states import SentState, StateWindow
 from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, inside
 from gridpeers.wire.journal import Decision
 
@@ -22,9 +22,9 @@ class NeighbourUse(NamedTuple):
     link: Link
     """The neighbour, and the agent."""
     ticks: int | None
-    """Simulated time: age of its state (ticks); None if there was none."""
+    """Simulated time: age of its state; None if there was none."""
     number: int | None
-    """Wall-clock time: number of its state; None if there was none."""
+    """Real time: number of its state; None if there was none."""
     age: float | None
     """Age of that state (s); None if there was none."""
     unused: str
@@ -39,13 +39,11 @@ class Uses(NamedTuple):
     """All neighbours at one decision, or at several that treat them alike."""
 
     each: tuple[NeighbourUse, ...]
-    """Each neighbour."""
     last_tick: frozenset[str] | None
     """The neighbours, if the states of all are of the tick before; None else."""
 
 
 def uses_of(agent: str, decision: Decision, T_c: float, *, simulated: bool) -> Uses:
-    """Return the neighbours of an agent's decision."""
     found = []
     unused, weights, ages = decision.unused, decision.weights, decision.ages
     for i, name in enumerate(decision.neighbours):
@@ -79,11 +77,9 @@ class DecidedTicks:
         self._new = False
 
     def state(self, state: SentState) -> None:
-        """Note a state, in the order of their numbers."""
         self._states.append(state)
 
     def decision(self, epoch: int, decision: Decision) -> None:
-        """Note how the agent decides from a tick on."""
         self._coming.append(decision)
 
     def flush(self, until: float) -> None:
@@ -100,7 +96,7 @@ class DecidedTicks:
 
 
 class DecidedStates:
-    """The decisions of one agent in wall-clock time, each with the state that came out."""
+    """The decisions of one agent in real time, each with the state that came out."""
 
     def __init__(self, agent: str, T_c: float, window: Callable[[int], StateWindow | None], tell: TellUse) -> None:
         self._agent, self._T_c, self._tell, self._window = agent, T_c, tell, window
@@ -108,11 +104,9 @@ class DecidedStates:
         self._now = 0.0
 
     def state(self, state: SentState) -> None:
-        """Note how far the agent is."""
         self._now = max(self._now, state.t)
 
     def decision(self, epoch: int, decision: Decision) -> None:
-        """Note a decision."""
         self._decisions.append((self._now, epoch, decision))
 
     def flush(self, until: float) -> None:

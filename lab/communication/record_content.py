@@ -11,9 +11,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from gridpeers.lab.communication.dropped_states import DroppedStates
-from gridpeers.lab.communication.record_pass import end_of, opened, read_into
-from gridpeers.lab.communication.record_sink import Link, SentState
+from gridpeers.lab.communication.record_pass import DroppedStates, Link, RecordSink, end_of, opened, read_into
+from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.record.journal_coverage import Hole
@@ -40,9 +39,9 @@ class RecordContent:
     """Simulated time: run times (s) between which it is not known how an agent decided, or what the plant heard: the
     file is damaged there, or the rest of a journal is missing."""
     heard: Mapping[Link, dict[tuple[int, int], str]] = field(default_factory=dict)
-    """Wall-clock time: epoch and number of each state that arrived, and why it was rejected, if it was."""
+    """Real time: epoch and number of each state that arrived, and why it was rejected, if it was."""
     dropped: Mapping[Link, list[DroppedStates]] = field(default_factory=dict)
-    """Wall-clock time: numbers of states that a receiver dropped, without more."""
+    """Real time: numbers of states that a receiver dropped, without more."""
     counts: Mapping[Link, LinkCounts] = field(default_factory=dict)
     """Last account of each emulated link."""
     traces: Mapping[Link, list[LinkTrace]] = field(default_factory=dict)
@@ -72,40 +71,34 @@ class RecordContent:
 
 
 def read_content(path: Path) -> RecordContent:
-    """Read the file of a record.
-
-    Raises
-    ------
-    NotJudgedError
-        If it has no messages and decisions, or is too large for the memory.
-    RecordFileError
-        If it is none.
-    """
-    file, all_of_it = opened(path), _Content()
+    """Read the file of a record; raise NotJudgedError if it has no decisions, or is too large for the memory."""
+    file, found = opened(path), _Content()
     if (size := path.stat().st_size) > MOST_BYTES:
         raise NotJudgedError(
             f"its record has {size / 1e6:.0f} MB, more than the {MOST_BYTES / 1e6:.0f} MB that are taken into memory"
         )
-    end = read_into(file, all_of_it)
-    simulated = file.info.simulated
+    end = read_into(file, found)
+    decisions = {
+        agent: [(epoch, decision) for (epoch, _), decision in of.items()] for agent, of in found.decisions.items()
+    }
+    if file.info.simulated:
+        decisions = {agent: sorted(of, key=lambda each: each[1].tick) for agent, of in decisions.items()}
     return RecordContent(
         info=file.info,
         t_end=end_of(file),
-        states=all_of_it.states,
-        decisions={agent: _in_order(of, simulated=simulated) for agent, of in all_of_it.decisions.items()},
+        states=found.states,
+        decisions=decisions,
         holes=end.holes,
-        heard=all_of_it.arrivals,
-        dropped=all_of_it.drops,
-        counts=all_of_it.last_counts,
-        traces=all_of_it.traces,
+        heard=found.arrivals,
+        dropped=found.drops,
+        counts=found.last_counts,
+        traces=found.traces,
         unreadable=end.unreadable,
         complete=file.complete,
     )
 
 
-class _Content:
-    """Keeps all of a record."""
-
+class _Content(RecordSink):
     def __init__(self) -> None:
         self.states: dict[str, dict[tuple[int, int], SentState]] = defaultdict(dict)
         self.decisions: dict[str, dict[tuple[int, int], Decision]] = defaultdict(dict)
@@ -126,19 +119,8 @@ class _Content:
     def dropped(self, link: Link, states: DroppedStates) -> None:
         self.drops[link].append(states)
 
-    def renewed(self, agent: str, t: float) -> None:
-        """Do nothing: `communication_summary` has the accounts of links."""
-
     def counts(self, link: Link, counts: LinkCounts) -> None:
         self.last_counts[link] = counts
 
     def trace(self, trace: LinkTrace) -> None:
         self.traces[trace.src, trace.dst].append(trace)
-
-    def known_until(self, agent: str, t: float) -> None:
-        """Do nothing: the end of the pass tells all of it."""
-
-
-def _in_order(of: dict[tuple[int, int], Decision], *, simulated: bool) -> list[tuple[int, Decision]]:
-    entries = [(epoch, decision) for (epoch, _), decision in of.items()]
-    return sorted(entries, key=lambda each: each[1].tick) if simulated else entries

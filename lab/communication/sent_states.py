@@ -1,14 +1,86 @@
-"""The states that one agent sent, while a pass over a record goes on."""
+"""The last states that one agent sent, while a pass over a record goes on."""
 
 from __future__ import annotations
 
+from array import array
 from math import inf
+from typing import NamedTuple
 
-from gridpeers.lab.communication.record_sink import SentState
-from gridpeers.lab.communication.state_window import StateWindow
+KEPT = 8192
+"""Number of states that a window holds: 2.7 minutes at a control period of 20 ms."""
 
-_WINDOWS = 3
+WINDOWS = 3
 """Number of processes of which states are kept: decisions are looked at some seconds later, when others may speak."""
+
+_IDLE, _QUIET = 1, 2
+
+
+class SentState(NamedTuple):
+    """A state that an agent sent, at a run time t (s)."""
+
+    number: int
+    t: float
+    epoch: int
+    idle: bool
+    """The agent decided nothing: it was paused, or had no measurement."""
+    quiet: bool
+    """It was not for the neighbours: the law kept its last state in force."""
+
+
+class StateWindow:
+    """The last states of one process by number; of older ones it says that they are not there."""
+
+    def __init__(self) -> None:
+        self._numbers = array("q", [-1]) * KEPT
+        self._t = array("d", [0.0]) * KEPT
+        self._flags = bytearray(KEPT)
+        self._latest = self._loud = -1
+        """Latest number, and latest one of a state that was not quiet."""
+
+    def put(self, state: SentState) -> bool:
+        """Note a state; return whether it is new."""
+        at = state.number % KEPT
+        if self._numbers[at] >= state.number:
+            return False
+        self._numbers[at], self._t[at] = state.number, state.t
+        self._flags[at] = _IDLE * state.idle | _QUIET * state.quiet
+        self._latest = max(self._latest, state.number)
+        if not state.quiet:
+            self._loud = max(self._loud, state.number)
+        return True
+
+    def has(self, number: int) -> bool:
+        return number >= 0 and self._numbers[number % KEPT] == number
+
+    def numbers(self, after: int, until: int) -> list[int]:
+        """Return the numbers behind one and up to another that were sent, in order; at most `KEPT`, however far."""
+        if until - after > KEPT:
+            return sorted(number for number in self._numbers if after < number <= until)
+        return [number for number in range(after + 1, until + 1) if self.has(number)]
+
+    def spoke(self, number: int) -> bool:
+        """Return whether a state of this number was sent to the neighbours."""
+        return self.has(number) and not self._flags[number % KEPT]
+
+    def decided(self, number: int) -> bool:
+        return self.has(number) and not self._flags[number % KEPT] & _IDLE
+
+    def t(self, number: int) -> float | None:
+        """Return when (s) the state of this number was sent; None if it is not there."""
+        return self._t[number % KEPT] if self.has(number) else None
+
+    def is_past(self, number: int) -> bool:
+        """Return whether a number is too old for this window."""
+        return number < 0 or self._numbers[number % KEPT] > number
+
+    def kept_until(self, number: int) -> int:
+        """Return the number up to which quiet states kept the one of this number in force: itself, if none did."""
+        if self.is_past(number + 1):
+            return number if self._loud > number else self._latest
+        while self.has(number + 1) and self._flags[(number + 1) % KEPT] & _QUIET:
+            number += 1
+        return number
+
 
 _NONE = StateWindow()
 """Of an agent that has sent nothing."""
@@ -17,8 +89,7 @@ _NONE = StateWindow()
 class SentStates:
     """The last states of an agent, and when each of its processes spoke first and last.
 
-    In simulated time a state's number is its tick, whichever process sent it; in wall-clock time every process counts
-    anew.
+    In simulated time a state's number is its tick, whichever process sent it; in real time every process counts anew.
     """
 
     def __init__(self, *, simulated: bool) -> None:
@@ -47,7 +118,7 @@ class SentStates:
         if epoch not in self._windows:
             if epoch in self.epochs:
                 return False  # it is not kept any more
-            if len(self._windows) == _WINDOWS:
+            if len(self._windows) == WINDOWS:
                 del self._windows[next(iter(self._windows))]  # epochs have no order: the one that came first goes
             self._windows[epoch] = StateWindow()
         if not self._windows[epoch].put(state):

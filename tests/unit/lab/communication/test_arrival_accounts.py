@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 import pytest
 
 from gridpeers.lab.communication.arrival_accounts import MOST_WAITING, ArrivalAccounts
-from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.sent_states import SentState
 
 LINK = ("inv1", "inv2")
 

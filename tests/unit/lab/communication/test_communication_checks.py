@@ -10,7 +10,7 @@ import pytest
 
 from gridpeers.lab.communication import record_content
 from gridpeers.lab.communication.communication_summary import SummaryPass
-from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_file import RecordFile

@@ -12,12 +12,12 @@ from typing import Any, cast
 
 import pytest
 
-from gridpeers.lab.communication.account_check import MessageAccount
 from gridpeers.lab.communication.arrival_accounts import ArrivalAccounts
+from gridpeers.lab.communication.communication_checks import MessageAccount
 from gridpeers.lab.communication.communication_summary import summarise
-from gridpeers.lab.communication.dropped_states import DroppedStates
 from gridpeers.lab.communication.record_content import read_content
-from gridpeers.lab.communication.record_sink import SentState
+from gridpeers.lab.communication.record_pass import DroppedStates
+from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import FILE

@@ -9,8 +9,7 @@ import pytest
 
 from gridpeers.lab.communication.heals import Heal, Heals
 from gridpeers.lab.communication.neighbour_use import NeighbourUse, Uses
-from gridpeers.lab.communication.record_sink import SentState
-from gridpeers.lab.communication.sent_states import SentStates
+from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkTrace
 
 T_C = 0.02

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.lab.communication.record_sink import SentState
-from gridpeers.lab.communication.sent_states import SentStates
-from gridpeers.lab.communication.state_window import StateWindow
+from gridpeers.lab.communication.sent_states import SentState, SentStates, StateWindow
 
 
 def test_numbers_of_a_later_process_are_not_those_of_an_earlier_one() -> None:

@@ -7,8 +7,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from gridpeers.lab.communication.record_sink import SentState
-from gridpeers.lab.communication.state_window import KEPT, StateWindow
+from gridpeers.lab.communication.sent_states import KEPT, SentState, StateWindow
 from gridpeers.netem.ledger import LinkTrace
 from gridpeers.wire.bounds import MOST_COUNT
 from gridpeers.wire.codec import encode
