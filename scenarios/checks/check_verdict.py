@@ -29,7 +29,6 @@ INTERRUPTED = "interrupted"
 """Reason of a check that was not judged because somebody ended the run while it, or one before it, judged."""
 
 SWITCHED_OFF = "switched off by the scenario"
-"""Reason of a check that is off."""
 
 
 class NotJudgedError(Exception):
@@ -42,10 +41,7 @@ class Check:
     def __call__(self, case: CheckedCase) -> Iterable[Violation]:
         """Return, or yield, the violations of a recorded case; none if it passes.
 
-        Raises
-        ------
-        NotJudgedError
-            If the record has no data for the check, or the run never was in a state that it is about.
+        Raise NotJudgedError if the record has no data for the check, or the run never was in a state that it is about.
         """
         raise NotImplementedError
 
@@ -88,9 +84,7 @@ class CheckVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """The judgement of one check on one case."""
 
     check: str
-    """Name of the check."""
     status: CheckStatus
-    """Its judgement."""
     reason: str = ""
     """Why it was not judged, is off, or what a check that failed has raised, also behind its violations."""
     violations: tuple[Violation, ...] = ()
@@ -138,18 +132,11 @@ _decoder = msgspec.json.Decoder(dict[str, tuple[CheckVerdict, ...]])
 
 
 def verdicts_json(verdicts: Verdicts) -> str:
-    """Return the text of checks.json."""
     return msgspec.json.format(msgspec.json.encode(verdicts), indent=1).decode() + "\n"
 
 
 def read_verdicts(path: Path) -> dict[str, tuple[CheckVerdict, ...]]:
-    """Read a checks.json.
-
-    Raises
-    ------
-    ValueError
-        If it is none.
-    """
+    """Read a checks.json. Raise ValueError if it is none."""
     return _decoder.decode(path.read_bytes())
 
 
@@ -165,17 +152,7 @@ def require_time(history: History, since_s: float) -> None:
 
 
 def require_longer(judged_s: float, limit: str, limit_s: float) -> None:
-    """Raise NotJudgedError if nothing in a run is long enough to break a limit of time: it would pass unjudged.
-
-    Parameters
-    ----------
-    judged_s : float
-        Time of the run that a check judges (s).
-    limit : str
-        Name of the limit.
-    limit_s : float
-        The limit (s).
-    """
+    """Raise NotJudgedError if nothing in a run is long enough to break a limit of time: it would pass unjudged."""
     if judged_s <= limit_s + 1e-9:
         raise NotJudgedError(
             f"the run is shorter than needed: it has {judged_s:g} s to judge, and {limit} = {limit_s:g} s"

@@ -49,9 +49,7 @@ class CheckedCase:
     scenario: ScenarioModel
     """As run."""
     feeder: Feeder
-    """Its feeder."""
     case: str
-    """Name of the case."""
     history: History
     """All rows, as read-only arrays (rows, inverters): t (s), f (Hz), P (W), Q (var), V (V), P_set (W), V_set (V)."""
     windows: Sequence[Window]
@@ -110,12 +108,10 @@ class CheckedCase:
 
     @property
     def f_nom(self) -> float:
-        """Nominal frequency (Hz)."""
         return self.feeder.f_nom
 
     @property
     def T_c(self) -> float:
-        """Control period (s)."""
         return self.scenario.time.T_c_s
 
     def disturbed_at(self, window: Window) -> float:

@@ -14,7 +14,6 @@ class LawFailed(Check):
     """No agent's law, and no graph of a user, fails: its inverter would go on on primary droop."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield each failure."""
         failures = law_failures(case.events)
         if not failures and case.scenario.cases[case.case].secondary == "none":
             raise NotJudgedError("no inverter runs a law")
@@ -31,7 +30,6 @@ class Returned(Check):
     """
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the inverters that are off, the first to trip first: how often each has tripped, and its last cause."""
         trips = Counter(name for event in case.events for name in tripped_by(event))
         if not trips:
             raise NotJudgedError("no inverter tripped")

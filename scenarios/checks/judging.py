@@ -34,13 +34,7 @@ minutes together, all others seconds, and one of a user's may never return."""
 
 
 class JudgingStop:
-    """Takes a request to end while cases are judged, for a caller that writes what is judged by then before it ends.
-
-    Parameters
-    ----------
-    requests : type[BaseException], optional
-        Errors that are such requests.
-    """
+    """Takes a request to end while cases are judged, for a caller that writes what is judged by then before it ends."""
 
     def __init__(self, *requests: type[BaseException]) -> None:
         self.requests = requests or (KeyboardInterrupt,)
@@ -48,21 +42,12 @@ class JudgingStop:
         """The request, for the caller to raise again; None if there was none."""
 
     def end(self) -> None:
-        """Raise the request again, if there was one."""
         if self.raised is not None:
             raise self.raised
 
 
 def judge_case(case: CheckedCase, stop: JudgingStop | None = None) -> tuple[CheckVerdict, ...]:
-    """Return the verdict of each check of the scenario on a case; those that it switches off come last.
-
-    Parameters
-    ----------
-    case : CheckedCase
-        The case.
-    stop : JudgingStop, optional
-        As for `judge_by`.
-    """
+    """Return the verdict of each check of the scenario on a case; those that it switches off come last."""
     off = (CheckVerdict(check=name, status="off", reason=SWITCHED_OFF) for name in switched_off(case.scenario.checks))
     return *judge_by(chosen_checks(case.scenario.checks), case, stop), *off
 
@@ -73,16 +58,8 @@ def judge_by(
     """Return the verdict of each of some checks on a case.
 
     A check that raises an error has failed, with the error as its reason: nothing is taken for right unjudged. What it
-    has yielded before counts, whatever it raises then, also `NotJudgedError`.
-
-    Parameters
-    ----------
-    checks : Mapping[str, Plugin]
-        The checks by their names in the verdict (`check_registry.chosen_checks`).
-    case : CheckedCase
-        The case.
-    stop : JudgingStop, optional
-        Takes a request to end: this check and all further ones are not judged. Without it the request goes through.
+    has yielded before counts, whatever it raises then, also `NotJudgedError`. A `stop` takes a request to end: this
+    check and all further ones are not judged; without it the request goes through.
     """
     with np.errstate(all="ignore"):  # a value that is no number is within no limit, or has its own reason
         return tuple(_unless_stopped(name, plugin, case, stop) for name, plugin in checks.items())
@@ -151,7 +128,6 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
 
 
 def _checked(violation: Any) -> Violation:
-    """Return a violation whose fields are what they are said to be: it is a user's."""
     if not isinstance(violation, Violation):
         raise TypeError(f"yielded {printable(repr(violation), 60)}; yield a gridpeers.Violation")
     return Violation(

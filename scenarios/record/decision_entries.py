@@ -21,19 +21,12 @@ from gridpeers.wire.timing import time_of
 
 
 class DecisionEntries:
-    """Find how an agent decided, and where the record lacks it.
-
-    Parameters
-    ----------
-    index : MessageIndex
-        Messages and entries of the record.
-    """
+    """Find how an agent decided, and where the record lacks it."""
 
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
         self._simulated = self._info.simulated
         self._parts = 0
-        """Parts that were gone through."""
         self._places: dict[str, tuple[list[int], list[int]]] = {}
         """Of each agent: first ticks of the parts that have entries of it, and these parts."""
         self._coverage: dict[str, JournalCoverage] = {}
@@ -125,11 +118,9 @@ class DecisionEntries:
         return (time_of(ticks[0], T_c), time_of(ticks[-1], T_c)) if ticks else None
 
     def _first_tick(self, journal: Journal) -> int | None:
-        """Return the first tick of which a part of the journal of an agent tells."""
         return next((entry.tick for entry in self._index.entries_in(journal) if isinstance(entry, Decision)), None)
 
     def _read_part(self, part: int) -> dict[str, tuple[list[int], list[Decision]]]:
-        """Return the entries of each agent in a part, and their ticks."""
         found: dict[str, dict[int, Decision]] = defaultdict(dict)
         for journal in self._index.journals_in(part):
             if journal.sender != PLANT:

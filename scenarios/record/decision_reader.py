@@ -37,13 +37,7 @@ def hearing_of(links: Mapping[str, Any], sender: str, receiver: str) -> HeardFro
 
 
 class StatesInRecord:
-    """Earlier states of senders, as they were sent.
-
-    Parameters
-    ----------
-    index : MessageIndex
-        Messages of the record.
-    """
+    """Earlier states of senders, as they were sent."""
 
     def __init__(self, index: MessageIndex) -> None:
         self._index = index
@@ -88,25 +82,17 @@ _NOTHING = Decision(0, 0, [], [], [], [])
 
 
 class DecisionReader:
-    """Decisions and heard messages of the agents of a record.
-
-    Parameters
-    ----------
-    index : MessageIndex
-        Messages and entries of the record.
-    """
+    """Decisions and heard messages of the agents of a record."""
 
     def __init__(self, index: MessageIndex) -> None:
         self._index, self._info = index, index.info
         self._nameplates = {config.name: nameplate_of(config) for config in index.info.agents}
         self.entries = DecisionEntries(index)
-        """How the agents decided, where the record has it."""
         self._listens = lru_cache(maxsize=None)(self._all_in_neighbours)
         self._hearing = lru_cache(maxsize=None)(self._heard_from)
         self._true_states = StatesInRecord(index)
 
     def decisions(self, agent: str, since: float, until: float) -> Iterator[RecordedDecision]:
-        """Yield the decisions of an agent; see `RunRecord.decisions`."""
         config = self._info.agent(agent)
         if config is None:
             return iter(())
@@ -252,7 +238,6 @@ class DecisionReader:
     # ---------------------------------------------------------------- messages as they were heard
 
     def heard(self, receiver: str, since: float, until: float) -> Iterator[MessageOnWire]:
-        """Yield messages as they were heard; see `RunRecord.heard`."""
         if self._info.clock == "wall":
             return self._heard_in_real_time(receiver, since, until)
         return self._heard_by_plant(since, until) if receiver == PLANT else self._heard_in_ticks(receiver, since, until)
@@ -292,7 +277,6 @@ class DecisionReader:
 
 
 def _action(config: AgentConfig, state: State, measured: Measurement) -> Action:
-    """Return what the agent did."""
     if state.idle:
         return "idle"
     if measured.island == OFF:

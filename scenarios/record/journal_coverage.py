@@ -17,11 +17,8 @@ INSTANT = 1e-6
 class JournalCoverage:
     """Follow the parts of one journal by their numbers, and find where some are lost.
 
-    Parameters
-    ----------
-    periodic : bool
-        Whether parts come all the time, as of an agent with emulated links. Else one comes with each change, and says
-        nothing about the time since the one before.
+    Parts of a periodic one come all the time, as of an agent with emulated links. Of another, one comes with each
+    change, and says nothing about the time since the one before.
 
     Examples
     --------
@@ -39,7 +36,6 @@ class JournalCoverage:
         self._t = -1.0
         """Run time of the last part (s)."""
         self._span: Callable[[], Hole | None] = _nothing
-        """What the last part tells of."""
         self._since: float | None = None
         """Since when (s) parts are lost, as far as none has come that tells how it went on."""
         self._gaps: list[Hole] = []
@@ -50,16 +46,7 @@ class JournalCoverage:
         return self._t if self._periodic else inf
 
     def take(self, journal: Journal, span: Callable[[], Hole | None]) -> None:
-        """Take the next part.
-
-        Parameters
-        ----------
-        journal : Journal
-            The part.
-        span : Callable[[], tuple of float or None]
-            Gives the first and the last run time (s) of which the part tells everything; None if it tells nothing. It
-            is only asked where a part beside this one is lost.
-        """
+        """Take the next part; `span`, asked beside a lost part, gives the run times (s) of which it tells all."""
         restarted = journal.epoch != self._epoch
         if not restarted and journal.seq <= self._number:
             return  # published again
@@ -74,15 +61,9 @@ class JournalCoverage:
             self._since = None
 
     def holes(self, damaged: Sequence[Hole], *, numbered: bool = True) -> list[Hole]:
-        """Return where parts are lost.
+        """Return where parts are lost, by their numbers or by the run times (s) of damaged chunks of the file.
 
-        Parameters
-        ----------
-        damaged : Sequence[Hole]
-            Run times of the first and the last message of each damaged chunk of the file.
-        numbered : bool, optional
-            Whether numbers that are left out mean lost parts; not in one process, where earlier versions counted the
-            parts of all agents together and only damage can lose one.
+        Not numbered are records of one process of earlier versions, which counted the parts of all agents together.
         """
         if not damaged and not numbered:
             return []
@@ -98,5 +79,4 @@ def _nothing() -> None:
 
 
 def inside(holes: Sequence[Hole], t: float) -> bool:
-    """Return whether a run time (s) is in one of some holes."""
     return any(since < t <= until for since, until in holes)

@@ -21,7 +21,6 @@ _LENGTHS = {kind.__struct_config__.tag: 1 + len(kind.__struct_fields__) for kind
 """Number of values of an entry of each kind, with the kind itself."""
 
 _END = object()
-"""Behind the last value."""
 
 _decoder = msgspec.msgpack.Decoder(list[AnyEntry])
 
@@ -46,18 +45,9 @@ def whole_entries(data: bytes) -> Sequence[Entry] | None:
 def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = None) -> Iterator[Entry]:
     """Yield the entries in the data of a `Journal`; those of unknown kinds are left out.
 
-    Parameters
-    ----------
-    data : bytes
-        The data.
-    note_damage : Callable[[ValueError], None], optional
-        Takes the error of each damaged entry; those behind it are read as far as they can be. When left out, the first
-        such error is raised.
+    With `note_damage`, which takes their errors, damaged entries are left out too.
 
-    Raises
-    ------
-    ValueError
-        Where the bytes end within an entry, or make none.
+    Raise ValueError where the bytes end within an entry, or make none.
     """
     if (entries := whole_entries(data)) is not None:
         yield from entries
@@ -81,10 +71,7 @@ def entries_of(data: bytes, note_damage: Callable[[ValueError], None] | None = N
 def raw_entries(data: bytes) -> Iterator[Any]:
     """Yield what follows each other in the data of a `Journal`: any msgpack values, which `entry_of` checks.
 
-    Raises
-    ------
-    ValueError
-        Where the bytes end within a value, or make none.
+    Raise ValueError where the bytes end within a value, or make none.
     """
     most = LONGEST_MESSAGE
     unpacker = msgpack.Unpacker(max_buffer_size=most, max_array_len=most, max_map_len=most, strict_map_key=False)
@@ -108,12 +95,8 @@ def raw_entries(data: bytes) -> Iterator[Any]:
 def entry_of(raw: Any) -> Entry | None:
     """Return the entry that a value of `raw_entries` makes; None if it is of a kind that a later version has.
 
-    Values that a later version may have added at its end are left out.
-
-    Raises
-    ------
-    ValueError
-        If it is none of ours, or has another one at its end: its length is damaged, and it took in what followed.
+    Values that a later version may have added at its end are left out. Raise ValueError if it is none of ours, or has
+    another one at its end: its length is damaged, and it took in what followed.
     """
     match raw:
         case ["exchange", int(tick), list(measurements), list(states)]:  # msgspec would copy each value in it

@@ -39,7 +39,6 @@ class MessageOnWire:
     """A message as it was sent, or as it was heard."""
 
     sender: str
-    """Name of its sender."""
     receiver: str
     """Name of who heard it; empty for a message as it was sent."""
     kind: str
@@ -59,13 +58,10 @@ class MessageOnWire:
     message: AnyMessage | None = None
     """The message; None if the record does not have it, or no receiver of this version would take it."""
     payload: bytes = b""
-    """Its bytes; empty if the record does not have them."""
 
 
 @dataclass
 class _Part:
-    """What is in one part of the file."""
-
     states: dict[tuple[str, int], list[State]] = field(default_factory=lambda: defaultdict(list))
     measurements: dict[tuple[str, int], list[Measurement]] = field(default_factory=lambda: defaultdict(list))
     entries: list[tuple[Journal, Entry]] = field(default_factory=list)
@@ -73,13 +69,7 @@ class _Part:
 
 
 class MessageIndex:
-    """Find messages and entries in the file of a record.
-
-    Parameters
-    ----------
-    file : RecordFile
-        The file.
-    """
+    """Find messages and entries in the file of a record."""
 
     def __init__(self, file: RecordFile) -> None:
         self.file, self.info = file, file.info
@@ -93,7 +83,6 @@ class MessageIndex:
         """How much further than its own time a message is looked for (s of run time): a journal comes up to a second of
         wall time after what it is about, and so does that of the sender."""
         self._ends: list[float] = []
-        """Last run time (s) of each part."""
         self._note_parts()
         self.part = lru_cache(maxsize=40)(self._read_part)  # more than `near` yields for a message: 20 in real time
 
@@ -105,7 +94,6 @@ class MessageIndex:
 
     @property
     def parts(self) -> int:
-        """Number of parts."""
         return len(self._ends)
 
     def _note_parts(self) -> None:
@@ -113,7 +101,6 @@ class MessageIndex:
             self._ends.append(max(until, self._ends[-1]) if self._ends else until)
 
     def note_damage(self, text: str) -> None:
-        """Note that something could not be read."""
         if text not in self.damage:
             self.damage.append(text)
 
@@ -149,11 +136,9 @@ class MessageIndex:
             self.note_damage(f"the journal of {journal.sender} at t = {journal.t:.2f} s cannot be read: {error}")
 
     def journals_in(self, part: int) -> Iterator[Journal]:
-        """Yield the parts of journals, of all nodes, in one part of the file."""
         return self.of_type("journal", Journal, (part,))
 
     def entries(self, node: str, since: float = 0.0, until: float = inf) -> Iterator[Entry]:
-        """Yield the entries of the journal of a node."""
         for index in self.near(since, until):
             yield from (entry for journal, entry in self.part(index).entries if journal.sender == node)
 

@@ -53,13 +53,10 @@ class RecordMessage(NamedTuple):
     """A message of the file."""
 
     topic: Topic
-    """Topic of its channel."""
     t: int
     """Run time at which its sender published it (ns)."""
     number: int
-    """Its number."""
     data: bytes
-    """Its bytes."""
 
 
 class _ChunkPlace(NamedTuple):
@@ -72,15 +69,7 @@ class _ChunkPlace(NamedTuple):
 class RecordFile:
     """The file of one record, opened.
 
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Raises
-    ------
-    RecordFileError
-        If it is missing, no record of ours, or from a later version.
+    Raise RecordFileError if it is missing, no record of ours, or from a later version.
     """
 
     def __init__(self, path: Path) -> None:
@@ -91,7 +80,6 @@ class RecordFile:
         self.holes: list[tuple[float, float]] = []
         """Run times (s) of the first and the last message of each chunk that turned out to be damaged."""
         self._end = ""
-        """How the file ends, in a sentence, if that is not its proper end."""
         self._offset = 0
         """Where the first record begins that could not be read yet."""
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
@@ -106,7 +94,6 @@ class RecordFile:
         if self._info is None:
             raise RecordFileError(f"{path}: it ends before it says what was recorded: {self._size} bytes")
         self.info: RecordInfo = self._info
-        """The run."""
         self._recent: dict[int, tuple[RecordMessage, ...]] = {}
         """Messages of the chunks that were read last, by their places, the latest last."""
 
@@ -118,10 +105,7 @@ class RecordFile:
     def refresh(self) -> bool:
         """Note what was written since, of a run that is still recorded; return whether that is anything.
 
-        Raises
-        ------
-        RecordFileError
-            If the file cannot be read any more.
+        Raise RecordFileError if the file cannot be read any more.
         """
         if self.complete:
             return False
@@ -136,7 +120,6 @@ class RecordFile:
 
     @property
     def t_end(self) -> float:
-        """Latest run time in the record (s)."""
         return max((place.until for place in self._chunks), default=0) / 1e9
 
     def messages(self, topics: Collection[Topic] | None = None) -> Iterator[RecordMessage]:
@@ -151,7 +134,6 @@ class RecordFile:
     # ---------------------------------------------------------------- inside
 
     def _read_on(self) -> None:
-        """Read the file from where it ended before."""
         try:
             with self.path.open("rb") as file:
                 self._size = file.seek(0, 2)
@@ -161,7 +143,6 @@ class RecordFile:
             raise RecordFileError(f"{self.path}: cannot be read: {error.strerror}") from None
 
     def _scan(self, file: BinaryIO) -> None:
-        """Note where the chunks are, and what the file says about its run."""
         if not self._offset:
             if file.read(len(_MAGIC)) != _MAGIC:
                 raise RecordFileError(
@@ -259,7 +240,6 @@ class RecordFile:
         return messages
 
     def _load_chunk(self, index: int) -> tuple[RecordMessage, ...]:
-        """Read a chunk."""
         place = self._chunks[index]
         try:
             with self.path.open("rb") as file:
@@ -296,19 +276,10 @@ class RecordFile:
 
 
 def record_path(path: str | Path, case: str = "") -> Path:
-    """Return the file of a record, which may not be there.
+    """Return the file of a record, of the folder of a case or of a run; it may not be there.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file, the folder of a case, or the folder of a run.
-    case : str, optional
-        Case of the run; needed if it has several.
-
-    Raises
-    ------
-    RecordFileError
-        If the folder has no record, none of that case, or those of several cases and none is chosen; one sentence.
+    Raise RecordFileError if the folder has no record, none of that case, or those of several cases and none is chosen;
+    one sentence.
     """
     if not isinstance(path, str | Path):
         raise RecordFileError(f'{path!r:.60}: needs the path of a record, as "runs/islanding/latest/IV"')

@@ -13,7 +13,6 @@ from gridpeers.wire.journal import ENTRIES, RecordLevel
 from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, LinkRequest, Measurement, State, Telemetry
 
 FILE = "run.mcap"
-"""Name of a record in the folder of its case."""
 
 FORMAT = 2
 """Version of the format. A reader refuses a record of a later one; a new kind of entry or message does not raise it.
@@ -34,25 +33,18 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
     """The run of a record, as it was configured."""
 
     format: int = FORMAT
-    """Version of the format."""
     level: RecordLevel
-    """What the record has."""
     scenario: str
-    """Name of the scenario."""
     case: str
     """Name of the case; empty in a live run without a scenario."""
     toml: str
     """The scenario as run, as TOML; empty in a live run without a scenario."""
     seed: int
-    """Seed of everything drawn at random."""
     driver: Literal["inprocess", "processes", "live"]
-    """What carried the messages."""
     versions: dict[str, str]
-    """Versions of gridpeers and of everything that has a part in the numbers."""
     inverters: tuple[str, ...]
     """Names of all inverters, in the order of their table."""
     plant: PlantConfig
-    """Configuration of the plant: run, kind of time, T_c, end."""
     agents: tuple[AgentConfig, ...]
     """Configuration of each agent, also of those that join later: nameplate, graph, law, emulated links."""
     fields: dict[str, tuple[str, ...]] = msgspec.field(
@@ -65,31 +57,25 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def run(self) -> str:
-        """Name of the run, part of every key."""
         return self.plant.run
 
     @property
     def clock(self) -> Literal["simulated", "wall"]:
-        """Kind of time."""
         return self.plant.clock
 
     @property
     def simulated(self) -> bool:
-        """Whether the run kept simulated time."""
         return self.clock == "simulated"
 
     @property
     def agent_names(self) -> tuple[str, ...]:
-        """Names of all configured agents."""
         return tuple(config.name for config in self.agents)
 
     @property
     def T_c(self) -> float:
-        """Control period (s)."""
         return self.plant.T_c
 
     def agent(self, name: str) -> AgentConfig | None:
-        """Return the configuration of an agent; None if no agent of this name was configured."""
         return next((config for config in self.agents if config.name == name), None)
 
     def to_metadata(self) -> dict[str, str]:
@@ -107,20 +93,14 @@ class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 Topic = Literal["telemetry", "journal", "link_reports", "link_requests", "physics", "events"]
-"""Topics of a record."""
 
 
 class RecordChannel(NamedTuple):
-    """One channel of a record."""
-
     topic: Topic
-    """Its name."""
     encoding: Literal["msgpack", "json"]
     """Encoding of its messages: those of the wire are msgpack with their CRC-32, those for viewers JSON."""
     schema_name: str
-    """Name of its schema."""
     schema: bytes
-    """JSON schema of its messages."""
 
 
 TOPICS: dict[type[Telemetry] | type[Journal] | type[LinkReport] | type[LinkRequest], Topic] = {
@@ -152,15 +132,7 @@ _EVENTS = {
 
 @lru_cache(maxsize=4)
 def channels(inverters: tuple[str, ...], quantities: tuple[str, ...]) -> tuple[RecordChannel, ...]:
-    """Return the channels of a record.
-
-    Parameters
-    ----------
-    inverters : tuple[str, ...]
-        Names of the inverters, the columns of the physics.
-    quantities : tuple[str, ...]
-        Quantities of each, with their units.
-    """
+    """Return the channels of a record."""
     numbers = {"type": "object", "properties": {name: {"type": ["number", "null"]} for name in quantities}}
     physics = {
         "type": "object",

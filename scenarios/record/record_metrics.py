@@ -39,12 +39,8 @@ class _Measured:
 def report_of(record: RunRecord) -> RunReport:
     """Return the report on a record: its measures in the windows of the events up to its end; no claim is judged.
 
-    The scenario's own metrics are left out: their code may be elsewhere by now.
-
-    Raises
-    ------
-    RecordFileError
-        If it has no scenario, no rows, or its feeder is not there any more.
+    The scenario's own metrics are left out: their code may be elsewhere by now. Raise RecordFileError if it has no
+    scenario, no rows, or its feeder is not there any more.
     """
     scenario, feeder = _scenario_of(record)
     case, of = record.info.case, (_live if record.info.clock == "wall" else _simulated)(record, scenario, feeder)

@@ -76,19 +76,10 @@ class RunRecord:
 
     @classmethod
     def open(cls, path: str | Path, case: str = "") -> RunRecord:
-        """Open a record.
+        """Open a record: the file run.mcap, the folder of a case, or that of a run with one case or the case named.
 
-        Parameters
-        ----------
-        path : str or Path
-            The file run.mcap, the folder of a case, or the folder of a run.
-        case : str, optional
-            Case of the run, if it has several.
-
-        Raises
-        ------
-        RecordFileError
-            If there is none, or none of the case, it is no record of gridpeers, or from a later version; one sentence.
+        Raise RecordFileError if there is none, or none of the case, it is no record of gridpeers, or from a later
+        version; one sentence.
         """
         return cls(RecordFile(record_path(path, case)))
 
@@ -137,10 +128,7 @@ class RunRecord:
     def physics(self) -> History:
         """Return the rows of the plant: f, P, Q, V, P_set, V_set of every inverter, as in history.csv, to the last bit.
 
-        Raises
-        ------
-        RecordFileError
-            If the record has no rows.
+        Raise RecordFileError if the record has no rows.
         """
         rows: list[tuple[float, ...]] = []
         inverters = self.info.inverters
@@ -160,17 +148,7 @@ class RunRecord:
     def messages(
         self, sender: str | None = None, *, since: float = 0.0, until: float = inf, kind: str | None = None
     ) -> Iterator[MessageOnWire]:
-        """Yield messages as they were sent, each once, in the order of the record.
-
-        Parameters
-        ----------
-        sender : str, optional
-            Name of an agent, or "plant"; by default all.
-        since, until : float, optional
-            Run times (s) of the messages, the limits included.
-        kind : str, optional
-            Type of the messages, such as "State" or "Measurement"; by default all.
-        """
+        """Yield messages as they were sent, each once, in the order of the record; run times (s) include the limits."""
         _check_times(since=since, until=until)
         if sender is not None:
             _check_name("sender", sender)
@@ -182,12 +160,8 @@ class RunRecord:
         """Yield messages as an agent, or the plant, heard them, in the order of their arrival.
 
         In simulated time without emulated links these are, for each decision, the states of the tick before; with
-        emulated links those that had arrived by then, at the tick that first used them.
-
-        Raises
-        ------
-        RecordFileError
-            If there was no such agent.
+        emulated links those that had arrived by then, at the tick that first used them. Raise RecordFileError if there
+        was no such agent.
         """
         self._require(agent)
         _check_times(since=since, until=until)
@@ -229,10 +203,7 @@ class RunRecord:
     def decisions(self, agent: str, *, since: float = 0.0, until: float = inf) -> Iterator[RecordedDecision]:
         """Yield the decisions of an agent between two run times (s), the limits included, in the order of time.
 
-        Raises
-        ------
-        RecordFileError
-            If there was no such agent, or the record has the physics only.
+        Raise RecordFileError if there was no such agent, or the record has the physics only.
         """
         self._require(agent)
         _check_times(since=since, until=until)
@@ -251,11 +222,8 @@ class RunRecord:
     def decision(self, agent: str, t: float) -> RecordedDecision:
         """Return the decision of an agent that was in force at a run time (s): its last one up to then.
 
-        Raises
-        ------
-        RecordFileError
-            If there was no such agent, the time is outside of the record, the agent had not decided by then, or the
-            record lacks what it decided.
+        Raise RecordFileError if there was no such agent, the time is outside of the record, the agent had not decided
+        by then, or the record lacks what it decided.
         """
         _check_times(t=t)
         if not 0.0 <= t <= self.t_end + self.info.T_c:

@@ -40,23 +40,14 @@ BEHIND = 64_000_000
 
 
 class _Item(NamedTuple):
-    """A message to be written."""
-
     topic: Topic
     t: int
-    """Run time (ns)."""
     number: int
     data: bytes
 
 
 class _WholeWrites:
-    """A file to which all that was written since the last flush goes at once; on a failure none of it stays.
-
-    Parameters
-    ----------
-    path : Path
-        The file, which must not exist.
-    """
+    """A file to which all that was written since the last flush goes at once; on a failure none of it stays."""
 
     def __init__(self, path: Path) -> None:
         self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0), 0o666)
@@ -64,13 +55,11 @@ class _WholeWrites:
         self._position = self._written = 0
 
     def write(self, data: bytes) -> int:
-        """Keep bytes for the next flush."""
         self._pending.append(data)
         self._position += len(data)
         return len(data)
 
     def tell(self) -> int:
-        """Return the position behind all bytes."""
         return self._position
 
     def flush(self) -> None:
@@ -98,39 +87,28 @@ class _WholeWrites:
         return os.dup(self._file)
 
     def close(self) -> None:
-        """Close the file."""
         os.close(self._file)
 
 
 class _FileIndex:
-    """The index of all chunks, in a file without a name: of an hour it is 10 MB, in memory as objects 17 MB.
-
-    Parameters
-    ----------
-    folder : Path
-        On whose disk it is.
-    """
+    """The index of all chunks, in a file without a name: of an hour it is 10 MB, in memory as objects 17 MB."""
 
     def __init__(self, folder: Path) -> None:
         self._file = TemporaryFile(dir=folder)  # noqa: SIM115  # it is open as long as the record
 
     def append(self, index: ChunkIndex) -> None:
-        """Add the index of a chunk."""
         builder = RecordBuilder()
         index.write(builder)
         self._file.write(builder.end())  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
     def __iter__(self) -> Iterator[_FileIndex]:
-        """Yield what writes all of them at the end of the record."""
         yield self
 
     def write(self, builder: RecordBuilder) -> None:
-        """Write all of them."""
         self._file.seek(0)
         builder.write(self._file.read())
 
     def close(self) -> None:
-        """Give the file up."""
         with contextlib.suppress(OSError):  # of a full disk: what it could not take is not wanted any more
             self._file.close()
 
@@ -138,19 +116,7 @@ class _FileIndex:
 class RecordWriter:
     """Write one record: `add` its messages, then `close` it.
 
-    Parameters
-    ----------
-    path : Path
-        The file; its folder exists, and it does not.
-    info : RecordInfo
-        The run.
-    channels : tuple[RecordChannel, ...]
-        Channels of the record.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be made. Later errors end the record: `failure` has the reason.
+    Raise OSError if the file cannot be made. Later errors end the record: `failure` has the reason.
     """
 
     def __init__(self, path: Path, info: RecordInfo, channels: tuple[RecordChannel, ...]) -> None:
@@ -158,7 +124,6 @@ class RecordWriter:
         self.failure = ""
         """Why the record ended early; empty while it goes on, and after a whole one."""
         self.ended = 0
-        """Run time (ns) of the last message that was taken."""
         self.spare = 0.0
         """Room (bytes) on the disk that the run's other files still need: the record ends before it takes that."""
         self._index = _FileIndex(path.parent)  # should the system give no file for it, there is no empty record
@@ -209,7 +174,6 @@ class RecordWriter:
             self._wake.set()
 
     def close(self) -> None:
-        """Write what is left and the index, and close the file."""
         if self._closing:
             return
         self._closing = True
@@ -265,7 +229,6 @@ class RecordWriter:
         os.close(descriptor)
 
     def _write_waiting(self) -> None:
-        """Write the messages that wait as one chunk."""
         with self._lock:
             items, self._waiting = self._waiting, []
             self._bytes = 0
@@ -279,7 +242,6 @@ class RecordWriter:
         self._writer.flush()  # type: ignore[no-untyped-call,unused-ignore]  # as mcap declares it
 
     def _fail(self, why: str) -> None:
-        """End the record."""
         self.failure = self.failure or why
         with self._lock:
             self._waiting.clear()

@@ -30,9 +30,7 @@ class NeighbourInput:
     """An in-neighbour of an agent at a decision."""
 
     nameplate: Nameplate
-    """Its nameplate."""
     state: State | None
-    """Its last state as the agent had heard it; None if there was none, or the record does not have it."""
     number: int | None
     """Number of that state, also if the record does not have it; None if there was none."""
     age: float | None
@@ -46,7 +44,6 @@ class NeighbourInput:
 
     @property
     def name(self) -> str:
-        """Name of its inverter."""
         return self.nameplate.sender
 
 
@@ -55,7 +52,6 @@ class RecordedDecision:
     """One decision of an agent. SI units; `own` and `neighbours_used` have them per unit, as the law saw them."""
 
     config: AgentConfig
-    """Configuration of the agent."""
     tick: int
     """Number of the own state: in simulated time the tick k, at t = k T_c."""
     at: float | None
@@ -69,15 +65,12 @@ class RecordedDecision:
     not_met: tuple[str, ...]
     """Agents of the run that the graph makes in-neighbours, but that were not there: not started, gone, or not met."""
     before: tuple[float, float]
-    """Set-points (W, V) before the decision."""
     restarted: bool
     """Whether the agent started, or started again after a pause, from the set-points of its measurement."""
     saturated: tuple[int, int]
     """Saturated sides of P and V: 1, -1 or 0; see `gridpeers.agents.laws.law.Own`."""
     action: Action
-    """What the agent did."""
     state: State
-    """What came out: set-points (W, V), and what it shared."""
 
     @property
     def is_whole(self) -> bool:
@@ -86,7 +79,6 @@ class RecordedDecision:
 
     @property
     def agent(self) -> str:
-        """Name of the agent."""
         return self.config.name
 
     @property

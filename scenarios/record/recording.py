@@ -32,13 +32,6 @@ def nanoseconds(t: float) -> int:
 class PhysicsTemplate:
     r"""Rows of telemetry as JSON objects.
 
-    Parameters
-    ----------
-    inverters : Sequence[str]
-        Names, the order of the columns.
-    quantities : Sequence[str]
-        Quantities of each inverter, with their units.
-
     Examples
     --------
     >>> PhysicsTemplate(["inv1"], ["f_Hz", "P_W"]).of(b"0.02,60.0,nan\n", (0.02, 60.0, float("nan")))
@@ -84,19 +77,7 @@ of a run without an end."""
 class Recording:
     """Record one case: give it all that the plant publishes for recorders, then close it.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the case.
-    info : RecordInfo
-        The run.
-    quantities : Sequence[str]
-        Names of the values of each inverter in a row, with their units.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be made.
+    Raise OSError if the file cannot be made.
     """
 
     def __init__(self, folder: Path, info: RecordInfo, quantities: Sequence[str]) -> None:
@@ -114,7 +95,6 @@ class Recording:
 
     @property
     def failure(self) -> str:
-        """One sentence on why the record ended early; empty if it did not."""
         writer = self._writer
         if not writer.failure:
             return ""
@@ -140,10 +120,8 @@ class Recording:
             writer.add("events", nanoseconds(event.t), 0, event_json(event))
 
     def message(self, message: Journal | LinkReport | LinkRequest) -> None:
-        """Record another message of the plant for recorders; reports on links have no time of their own."""
         at = nanoseconds(self._t if isinstance(message, LinkReport) else message.t)
         self._writer.add(TOPICS[type(message)], at, message.seq, payload_of(message))
 
     def close(self) -> None:
-        """Write what is left, and close the file."""
         self._writer.close()

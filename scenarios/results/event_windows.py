@@ -56,13 +56,6 @@ def as_they_came(scenario: ScenarioModel, recorded: Iterable[PlantEvent]) -> lis
     In wall-clock time a process takes its time to start, so inverters join later than the scenario says. A window
     begins with the event itself: "within 1 s of returning" does not count the start of a process. In simulated time
     the two times are the same.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        As run.
-    recorded : Iterable[PlantEvent]
-        The plant's events.
     """
     moved = [(event.t, event.subject) for event in recorded if event.kind == "inverter"]
     ends = [*(event.t_s for event in scenario.events), scenario.time.end_s][1:]
@@ -89,17 +82,6 @@ def messages_saved(
     quiet: Iterable[tuple[float, int]], windows: Sequence[Window], agents: int, T_c: float
 ) -> dict[str, float]:
     """Return the share of states that the laws did not send, by window; nothing if they sent all.
-
-    Parameters
-    ----------
-    quiet : Iterable[tuple[float, int]]
-        Run time (s) and number of states that were not sent at that tick.
-    windows : Sequence[Window]
-        Windows of measurement.
-    agents : int
-        Agents of the run, each of which decides once a period.
-    T_c : float
-        Control period (s).
 
     Examples
     --------

@@ -73,7 +73,6 @@ def _started(drawing: Drawing, folder: Path, number: int) -> list[ForkedProcess]
 
 
 def _end(started: Sequence[ForkedProcess]) -> None:
-    """End the processes, whatever they are doing."""
     for process in started:
         process.send_signal(signal.SIGKILL)
         process.wait()
@@ -82,5 +81,4 @@ def _end(started: Sequence[ForkedProcess]) -> None:
 
 
 def _cores() -> int:
-    """Return the number of cores for drawing."""
     return min(usable_cores(), MOST)

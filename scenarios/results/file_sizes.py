@@ -46,11 +46,8 @@ class FileSizes(NamedTuple):
     """Files of a run (bytes)."""
 
     history: int
-    """All history.csv."""
     links: int
-    """All links.csv."""
     record: int
-    """All run.mcap."""
     room: int
     """The most that the run takes on the disk at one time."""
 
@@ -103,10 +100,7 @@ def file_sizes(
 def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None:
     """Refuse a folder whose disk has not the room for a run.
 
-    Raises
-    ------
-    FolderError
-        With the room that is needed and that there is; `option` names the other folder to be given.
+    Raise FolderError with the room that is needed and that there is; `option` names the other folder to be given.
     """
     there = next((each for each in (folder, *folder.absolute().parents) if each.exists()), Path())
     try:
@@ -121,7 +115,6 @@ def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None
 
 
 def _impaired_links(scenario: ScenarioModel, feeder: Feeder, case: str) -> int:
-    """Return the number of links that carry messages in a case and on which a fault may act."""
     setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=False)
     netem = setup.netem
     if not (netem.links or netem.partitions):
@@ -133,7 +126,6 @@ def _impaired_links(scenario: ScenarioModel, feeder: Feeder, case: str) -> int:
 
 
 def _links_of_agents(scenario: ScenarioModel, feeder: Feeder, case: str) -> list[Link]:
-    """Return the links between agents that carry messages in a case."""
     members = {row.name: row for row in with_agent(scenario, feeder, case)}
     _, agents = configs(scenario, feeder, case)
     used: list[Link] = []

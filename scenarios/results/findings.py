@@ -18,7 +18,6 @@ from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent
 
 SteadyValues = Mapping[str, Mapping[str, Steady]]
-"""Steady values by case and event."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +31,6 @@ class Findings:
     P_set0: float = float("nan")
     """First P_set of every inverter (pu)."""
     GFL: tuple[str, ...] = ()
-    """Names of the grid-following inverters."""
     settled: Mapping[str, Mapping[str, Settling]] = field(default_factory=dict)
     """Settling after each event, by case and event."""
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]] = field(default_factory=dict)
@@ -86,7 +84,6 @@ class Findings:
         return reasons
 
     def has(self, cell: Published) -> bool:
-        """Return whether there is such a number."""
         events = self.results.get(cell.case, {})
         return cell.event in events and (
             not cell.island or cell.island in self.islands.get(cell.case, {}).get(cell.event, {})
@@ -97,13 +94,6 @@ def find(scenario: ScenarioModel, feeder: Feeder, cases: Mapping[str, CaseRecord
     """Measure all cases of a run, live or not, with the metrics of every run and with the scenario's own.
 
     A history may go on after the scenario's end; windows up to there see nothing of that.
-
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run.
-    cases : Mapping[str, CaseRecord]
-        Recorded cases with their windows and events.
     """
     results: dict[str, dict[str, Steady]] = {}
     settled: dict[str, dict[str, Settling]] = {}

@@ -25,7 +25,6 @@ class Nameplates:
     """Nameplates of N inverters as arrays, in the order of the history's columns."""
 
     names: tuple[str, ...]
-    """Names."""
     GFM: NDArray[np.bool_]
     """Which are grid-forming."""
     s: Floats
@@ -103,11 +102,9 @@ class History:
         return on
 
     def until(self, t: float) -> History:
-        """Return its rows up to a time (s), that one included."""
         return self.rows(self.t <= t + 1e-9)
 
     def rows(self, which: Flags) -> History:
-        """Return some of its rows."""
         columns = {of.name: getattr(self, of.name)[which] for of in fields(self) if of.name != "inverters"}
         return replace(self, **columns)
 
@@ -134,10 +131,7 @@ class History:
     def of(cls, inverters: tuple[str, ...], rows: Sequence[Row] | Floats) -> History:
         """Return the arrays of recorded rows, see `gridpeers.wire.messages.Telemetry.rows`.
 
-        Raises
-        ------
-        ValueError
-            If a row has not as many numbers as the inverters need.
+        Raise ValueError if a row has not as many numbers as the inverters need.
         """
         table, shape = np.asarray(rows, np.float64), (len(rows), 1 + len(QUANTITIES) * len(inverters))
         if table.shape != shape:
@@ -156,13 +150,7 @@ def read_only(of: T) -> T:
 
 
 def read_history(path: Path) -> History:
-    """Read history.csv back, to the last bit.
-
-    Raises
-    ------
-    ValueError
-        If its header is not that of a history.
-    """
+    """Read history.csv back, to the last bit. Raise ValueError if its header is not that of a history."""
     with path.open(encoding="ascii") as file:
         first = file.readline().rstrip("\n")
         names = tuple(column.removesuffix("_f_Hz") for column in first.split(",") if column.endswith("_f_Hz"))

@@ -42,16 +42,8 @@ def closed_switches(
 ) -> frozenset[str]:
     """Return the names of the switches that are closed after some events.
 
-    A switch that waits for synchronism has no event of kind "switch" until it closes.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        Its tables.
-    events : Iterable[PlantEvent]
-        `switch_events` up to some time, in the order of time.
-    before : Collection[str], optional
-        Names of the switches that are closed before; when left out, those that are closed at the start of a run.
+    A switch that waits for synchronism has no event of kind "switch" until it closes. `before` are those that are
+    closed before the events; by default at the start of a run.
     """
     names = switch_names(feeder)
     closed = {switch.name for switch in feeder.switches if switch.closed} if before is None else set(before)
@@ -104,15 +96,6 @@ def island_intervals(
 
     Checks, metrics and figures all take the islands from here. Switches alone decide, as they were recorded: one that
     waits for synchronism has not closed yet. See `switch_events` for a plant that records no switch.
-
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run.
-    inverters : Sequence[str]
-        Inverters of the history's columns.
-    recorded : Iterable[PlantEvent]
-        Events of the plant, in the order of time.
 
     Examples
     --------

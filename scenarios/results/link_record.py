@@ -28,13 +28,9 @@ _SIZE = 4
 
 
 class LinkRecord:
-    """Record the link reports of one case; `gridpeers.scenarios.results.record.Recorder` has one, and writes its files.
+    """Record the link reports of one case.
 
-    Parameters
-    ----------
-    folder : Path, optional
-        The case's folder, for verdicts until the case has ended: they are as many as messages. Without one they are
-        kept in memory.
+    Verdicts are as many as messages: with a folder they are in a file there until the case has ended, not in memory.
     """
 
     def __init__(self, folder: Path | None = None) -> None:
@@ -49,7 +45,6 @@ class LinkRecord:
         self._sha256: dict[str, str] = {}
 
     def __call__(self, report: LinkReport) -> None:
-        """Take one report of a receiver."""
         try:
             data = data_of(report)
         except msgspec.DecodeError:
@@ -72,7 +67,6 @@ class LinkRecord:
 
     @property
     def sent(self) -> int:
-        """Messages sent over all links."""
         return sum(counts.sent for counts in self.counts.values())
 
     @property
@@ -95,7 +89,6 @@ class LinkRecord:
         yield from (trace for _, trace in self._in_file())
 
     def _in_file(self) -> Iterator[tuple[int, LinkTrace]]:
-        """Yield the parts in the file, each with its place."""
         if self._file is not None and self._file.exists():
             with self._file.open("rb") as file:
                 while size := file.read(_SIZE):
@@ -116,7 +109,6 @@ class LinkRecord:
                     yield _decode(file.read(int.from_bytes(file.read(_SIZE), "little")))
 
     def by_link(self) -> dict[tuple[str, str], LinkTrace]:
-        """Return all verdicts of each link (src, dst) in one."""
         parts: dict[tuple[str, str], list[LinkTrace]] = {}
         for part in self.traces():
             parts.setdefault((part.src, part.dst), []).append(part)
@@ -154,14 +146,12 @@ class LinkRecord:
         yield text.getvalue()
 
     def _json(self) -> str:
-        """Return the text of links.json: the hash of all verdicts, the counts of every link."""
         counts = [{"src": src, "dst": dst, **msgspec.to_builtins(of)} for (src, dst), of in sorted(self.counts.items())]
         whole: dict[str, object] = {"trace_sha256": self.sha256, "accounts": counts}
         whole |= {"failures": sorted(self.failures)} if self.failures else {}
         return json.dumps(whole, indent=1, default=str) + "\n"
 
     def _lines(self) -> Iterator[str]:
-        """Yield the lines for the report."""
         dropped: Counter[str] = Counter()
         lies: Counter[str] = Counter()
         for (src, _), counts in sorted(self.counts.items()):

@@ -112,19 +112,7 @@ def V_error(history: History, nameplates: Nameplates) -> Floats:
 
 
 def measure(history: History, nameplates: Nameplates, window: Window, f_nom: float) -> Steady:
-    """Measure one event of one case.
-
-    Parameters
-    ----------
-    history : History
-        The rows of its window (`Window.cut`).
-    nameplates : Nameplates
-        Nameplates in the order of its columns.
-    window : Window
-        The event's window.
-    f_nom : float
-        Nominal frequency (Hz).
-    """
+    """Measure one event of one case."""
     assert nameplates.names == history.inverters
     assert window.rows(history.t).all()
     f_error = mean_over(np.abs(history.f[:, nameplates.GFM] - f_nom), history.present[:, nameplates.GFM])
@@ -150,7 +138,6 @@ def measure(history: History, nameplates: Nameplates, window: Window, f_nom: flo
 def _reasons(
     history: History, nameplates: Nameplates, ends: Ends, sharing: Floats, voltage: Floats, vars_: Floats
 ) -> dict[str, str]:
-    """Return why measures are no steady values, by name."""
     present, forming = history.present, nameplates.GFM
     sharing_now = present & nameplates.shares
     dead = "de-energised: no inverter is on the network"
@@ -184,7 +171,6 @@ def _idle(x: Floats, nameplates: Nameplates, ends: Ends, present: Flags) -> str:
 
 
 def _mean(x: Floats) -> float:
-    """Mean; not a number where there is nothing."""
     return float(x.mean()) if x.size else float("nan")
 
 

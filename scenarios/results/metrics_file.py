@@ -32,11 +32,9 @@ class RunMetrics:
     scenario: ScenarioModel
     """Checked; with the seed and the cases asked for."""
     feeder: Feeder
-    """Its feeder."""
     driver: str
     """Driver of the run: "processes", "inprocess", or "live"."""
     folder: Path
-    """Its run folder."""
     clock: Clock = "simulated"
     speed: float = 1.0
     """Wall-clock: run time per wall time (s/s)."""
@@ -55,19 +53,7 @@ def metrics_json(
     facts: Mapping[str, Mapping[str, Any]],
     live: Mapping[str, Any] = MappingProxyType({}),
 ) -> str:
-    """Return the text of metrics.json; a measure that is no number or not steady is null.
-
-    Parameters
-    ----------
-    run : RunMetrics
-        The run.
-    findings : Findings
-        Its measures.
-    facts : Mapping[str, Mapping[str, Any]]
-        By case: other entries; see `case_facts`.
-    live : Mapping[str, Any], optional
-        The table on a live run; see docs/results.md.
-    """
+    """Return the text of metrics.json; a measure that is no number or not steady is null."""
     from gridpeers.scenarios.results.metrics import SHARING_OF_ISLANDS  # numpy, which a run starts without
 
     cases: dict[str, dict[str, Any]] = {}

@@ -39,8 +39,6 @@ Row = tuple[float, ...]
 
 
 class Recorded(msgspec.Struct, frozen=True, kw_only=True):
-    """One case as recorded."""
-
     inverters: tuple[str, ...]
     """Order of the columns."""
     rows: Sequence[Row] = ()
@@ -48,15 +46,12 @@ class Recorded(msgspec.Struct, frozen=True, kw_only=True):
     file: Path | None = None
     """The history.csv with the rows; None where they are in memory."""
     ended: float
-    """Time of the last row (s)."""
     missing: tuple[tuple[float, float], ...] = ()
     """Times (s) of the last row before and of the first row after each interval of which no rows came."""
     events: tuple[PlantEvent, ...]
-    """Events, in the order of time."""
     quiet: tuple[tuple[float, int], ...] = ()
     """Run time (s), and number of states of that tick that were not sent to the neighbours."""
     links: LinkRecord = msgspec.field(default_factory=LinkRecord)
-    """Verdicts and counts of the emulated links."""
     link_lines: tuple[str, ...] = ()
     """Lines for the report on the emulated links; none without a folder."""
     sha256: str
@@ -99,16 +94,8 @@ class Recorder:
     With a folder it writes history.csv, events.csv, links.csv and links.json and keeps no rows; without one it keeps
     the rows in memory and writes nothing. The hash of the bytes of history.csv is the same either way. Floats are
     written as the shortest text that reads back to the same number, and lines end in a line feed on every system, so
-    equal runs give equal bytes.
-
-    Parameters
-    ----------
-    folder : Path, optional
-        Folder of the case; the recorder makes it.
-    gaps : bool, optional
-        Whether rows may be missing, as in a run whose recorder was out of reach for too long; else that is an error.
-    record : RecordInfo, optional
-        The run, for its record run.mcap in the same folder; None writes none.
+    equal runs give equal bytes. Rows may be missing (`gaps`) in a run whose recorder was out of reach; else that is an
+    error. `record` is the run of a run.mcap beside.
     """
 
     def __init__(
@@ -141,11 +128,9 @@ class Recorder:
         self._first: list[float] = []
         """Times of the first two rows (s)."""
         self.rows: list[Row] = []
-        """Rows in memory; empty with a folder."""
         self.count = 0
         """Number of rows so far."""
         self.ended = 0.0
-        """Time of the last row (s)."""
         self.missing: list[tuple[float, float]] = []
         """See `Recorded.missing`."""
         self._events: list[PlantEvent] = []
@@ -154,7 +139,6 @@ class Recorder:
         self.reproducible = True
         """False once something unscripted, such as the death of an agent, has entered the run."""
         self.links = LinkRecord(folder)
-        """Verdicts and counts of the emulated links so far."""
 
     def __enter__(self) -> Recorder:
         return self
@@ -176,7 +160,6 @@ class Recorder:
 
     @property
     def events(self) -> tuple[PlantEvent, ...]:
-        """Events so far, in the order in which they came."""
         return tuple(self._events)
 
     @property
@@ -208,17 +191,7 @@ class Recorder:
     def finish(self, end: float, record_step: float) -> Recorded:
         """Check that the whole run is there, and give the files their names; if rows are missing, they keep PARTIAL.
 
-        Parameters
-        ----------
-        end : float
-            Duration of the run (s).
-        record_step : float
-            Distance of the rows (s).
-
-        Raises
-        ------
-        RecordError
-            If rows are missing.
+        Raise RecordError if rows are missing.
         """
         if self._recording is not None:
             self._recording.close()

@@ -28,11 +28,8 @@ class LawFailure(NamedTuple):
     """
 
     t: float
-    """When (s of run time)."""
     agent: str
-    """Its agent."""
     why: str
-    """Which law, and why."""
     line: str
     """File and line, as "mine.py:12"; empty of a program or an FMU."""
 
@@ -97,11 +94,6 @@ def tripped_inverters(events: Iterable[PlantEvent]) -> dict[str, PlantEvent]:
 
     An inverter whose agent has it leave, or join, is no longer one of them. One that joins a dead island, and waits
     there for those that have tripped, has not tripped itself.
-
-    Parameters
-    ----------
-    events : Iterable[PlantEvent]
-        Events of the plant up to some time, in the order of time.
     """
     off: dict[str, PlantEvent] = {}
     for event in events:

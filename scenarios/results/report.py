@@ -84,26 +84,20 @@ class RunReport:
     """The content of the report at the end of a run."""
 
     scenario: str
-    """Name."""
     titles: Mapping[str, str]
-    """A few words on each case that was run."""
     findings: Findings
-    """The measures."""
     verdicts: Sequence[Verdict]
     """Claims judged; empty for a scenario without a benchmark."""
     benchmark: Benchmark = NO_BENCHMARK
     """The publication of the experiment; its numbers stand beside ours."""
     checks: Mapping[str, tuple[CheckVerdict, ...]] = field(default_factory=dict)
-    """Verdicts of the checks, by case."""
     failures: Mapping[str, tuple[LawFailure, ...]] = field(default_factory=dict)
-    """Laws that failed, by case."""
     notes: Sequence[str]
     """Other facts that a reader must know, e.g. that an agent died."""
     folder: str
     """Folder of the results; "" for one that goes with them."""
 
     def fails(self, check: str = "") -> bool:
-        """Return whether a check fails in any case; by default any check."""
         verdicts = (verdict for of in self.checks.values() for verdict in of)
         return any(verdict.status == "failed" and check in ("", verdict.check) for verdict in verdicts)
 
@@ -124,7 +118,6 @@ def grids(report: RunReport) -> tuple[Grid, ...]:
 
 
 def plain(report: RunReport) -> str:
-    """Return the text of a report for files, pipes and logs."""
     return text_of(lambda console: _print(report, console))
 
 
@@ -137,7 +130,6 @@ def show(report: RunReport, console: Console) -> None:
 
 
 def _print(report: RunReport, console: Console) -> None:
-    """Print the blocks of a report, with a blank line between them."""
     failed: list[RenderableType] = [
         Text(f"FAILED  case {case}: {first_of(of)}", "bold red") for case, of in report.failures.items() if of
     ]
@@ -164,7 +156,6 @@ def _print(report: RunReport, console: Console) -> None:
 
 
 def _verdict_of(case: str, verdicts: tuple[CheckVerdict, ...]) -> Text:
-    """Return the verdict of the checks on a case, one line."""
     failed = any(verdict.status == "failed" for verdict in verdicts)
     return Text.assemble(("CHECKS", "yellow" if failed else "green"), f"  case {case}: {summary(verdicts)}")
 
@@ -226,7 +217,6 @@ def _grid(report: RunReport, title: str, quantities: tuple[Quantity, ...]) -> Gr
 
 
 def _own_grid(report: RunReport) -> Grid:
-    """Return the scenario's own metrics; "-" where there is no value, with the reason below."""
     own = report.findings.own
     places = dict.fromkeys((event, name) for of in own.values() for event in of for name in of[event].values)
     rows, reasons = [], []

@@ -34,21 +34,9 @@ class FolderError(ValueError):
 
 
 def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
-    """Choose and make the run folder.
+    """Make the run folder: `out`, or `runs/<scenario>/<time>` with a link `runs/<scenario>/latest`.
 
-    Parameters
-    ----------
-    out : Path or None
-        The user's choice; None makes `runs/<scenario>/<time>`, and `runs/<scenario>/latest` point to it.
-    scenario : str
-        Name of the scenario.
-    now : datetime
-        For the name.
-
-    Raises
-    ------
-    FolderError
-        If the folder has something in it, is a file, or cannot be made. Nothing is written then.
+    Raise FolderError if the folder has something in it, is a file, or cannot be made. Nothing is written then.
     """
     if out is not None:
         return empty_folder(out, "--out", "running")
@@ -60,17 +48,7 @@ def new_folder(out: Path | None, scenario: str, now: datetime) -> Path:
 def require_folder(out: Path | None, scenario: str) -> None:
     """Refuse what `new_folder` would, before a run, and make nothing.
 
-    Parameters
-    ----------
-    out : Path or None
-        The user's choice.
-    scenario : str
-        Name of the scenario.
-
-    Raises
-    ------
-    FolderError
-        If the folder has something in it, is a file, or cannot be made.
+    Raise FolderError if the folder has something in it, is a file, or cannot be made.
     """
     if out is not None:
         _require_empty(out, f"--out {out}")
@@ -84,11 +62,8 @@ def require_folder(out: Path | None, scenario: str) -> None:
 def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
     """Make a folder for results with a status, and return it; the option that names it is part of the errors.
 
-    Raises
-    ------
-    FolderError
-        If there is something in it, it is a file, or it cannot be made or written. Of two commands that take a folder
-        at the same time for their status, one gets it.
+    Raise FolderError if there is something in it, it is a file, or it cannot be made or written. Of two commands that
+    take a folder at the same time for their status, one gets it.
     """
     where = f"{option} {folder}".strip()
     try:
@@ -106,7 +81,6 @@ def empty_folder(folder: Path, option: str = "", status: str = "") -> Path:
 
 
 def _require_empty(folder: Path, where: str) -> None:
-    """Raise FolderError if there is something in a folder, or it is a file."""
     if folder.exists() and not folder.is_dir():
         raise FolderError(f"{where}: this is a file; give a new or an empty folder")
     if folder.is_dir() and any(folder.iterdir()):
@@ -151,7 +125,6 @@ def set_broken(folder: Path, why: str) -> None:
 
 
 def no_room(error: BaseException) -> bool:
-    """Return whether the system takes no more bytes, as of a full disk."""
     return isinstance(error, OSError) and error.errno in _NO_ROOM
 
 
@@ -226,22 +199,7 @@ LOCK = ".lock"
 def locked(folder: Path, option: str, command: str) -> int:
     """Lock a folder for this process; the system opens the lock however the process ends.
 
-    Parameters
-    ----------
-    folder : Path
-        The folder.
-    option, command : str
-        The option that names it, and the command, for the error.
-
-    Returns
-    -------
-    int
-        Descriptor whose closing opens the lock.
-
-    Raises
-    ------
-    FolderError
-        If another process has locked it.
+    Raise FolderError if another process has locked it.
     """
     handle = os.open(folder / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
     try:

@@ -15,44 +15,28 @@ from gridpeers.scenarios.results.run_files import FolderError, shown
 from gridpeers.wire.codec import decode_foreign
 
 JOURNAL = "runs.jsonl"
-"""Name of its file."""
 
 
 class JournalRow(Protocol):
     """The result of a run, as a struct of msgspec."""
 
     @property
-    def number(self) -> int:
-        """Number of the run, from 0."""
-        ...
+    def number(self) -> int: ...
 
 
 Row = TypeVar("Row", bound=JournalRow)
 
 
 def journal_line(row: JournalRow) -> bytes:
-    """Return the line of a run."""
     return msgspec.json.encode(row) + b"\n"
 
 
 def rows_in(folder: Path, kind: type[Row], problem: Callable[[Row], str]) -> dict[int, Row]:
     """Return the runs in the journal of a folder, by their numbers; of two lines of one run the later one counts.
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the study.
-    kind : type[Row]
-        Type of its rows.
-    problem : Callable[[Row], str]
-        Returns why the study has no such run, and what to do: people edit journals. "" of a run that it has.
+    `problem` says why the study has no such run, and what to do, as people edit journals; "" of a run that it has.
 
-    Raises
-    ------
-    OSError
-        If the journal cannot be read.
-    FolderError
-        If a line is damaged, or the study has no such run.
+    Raise OSError if the journal cannot be read. Raise FolderError if a line is damaged, or the study has no such run.
     """
     rows, decoder = dict[int, Row](), msgspec.json.Decoder(kind)
     for place, line in enumerate((folder / JOURNAL).read_bytes().split(b"\n")[:-1], start=1):

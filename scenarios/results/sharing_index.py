@@ -13,20 +13,9 @@ NO_LOAD = 0.001
 
 
 def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:
-    r"""Return the equal-sharing value of each row, (9).
+    r"""Return the equal-sharing value of each row, (9): of powers x (W or var), ratings s (W) and droops m (pu per pu).
 
     .. math:: \eta = \frac{\sum_i x_i}{\sum_i s_i / m_i}
-
-    Parameters
-    ----------
-    x : Floats
-        Powers (W or var), shape (T, N).
-    s : Floats
-        Ratings (W), shape (N,).
-    m : Floats
-        Droops (pu per pu), shape (N,).
-    present : Flags, optional
-        Which inverters take part in each row, shape (T, N); all if left out.
 
     Examples
     --------

@@ -40,7 +40,6 @@ class Ends(NamedTuple):
     apart: float
     """Time (s) between the middles of the last two parts."""
     last: Flags
-    """Rows of the last part."""
     before: Flags
     """Rows of the part before it."""
     steady: Flags
@@ -59,19 +58,8 @@ def ends_of(t: Floats, start: float, end: float) -> Ends:
 def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[str, ...] = ()) -> str:
     """Return why a measure has no steady value; "" where it has.
 
-    Parameters
-    ----------
-    measure : Measure
-        The measure; frequency and power are looked at inverter by inverter.
-    x : Floats
-        Its rows, shape (T,), or (T, M) for M inverters; not a number in rows where it has no value. An inverter that
-        is off the network for all of `ends.steady` is no column of it.
-    ends : Ends
-        Rows at the end of the window.
-    missing : str
-        Why a row has no value, e.g. "de-energised: no inverter is on the network".
-    names : tuple[str, ...], optional
-        Names of the columns, to say which of them moves.
+    Its rows x, shape (T,), or (T, M) for the inverters of these names, are not numbers where it has no value: `missing`
+    says why, as "de-energised: no inverter is on the network".
     """
     if not ends.steady.any():
         return f"no samples: no row was recorded between {ends.start:g} s and {ends.end:g} s"
@@ -102,5 +90,4 @@ def reason(measure: Measure, x: Floats, ends: Ends, missing: str, names: tuple[s
 
 
 def _rows(count: int, length: float) -> str:
-    """So many rows of a window of a length (s), as the subject of a sentence."""
     return f"1 row ({length:.3g} s) is" if count == 1 else f"{count} rows ({length:.3g} s) are"

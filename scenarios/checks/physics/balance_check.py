@@ -50,7 +50,6 @@ class NetworkState(NamedTuple):
     """Switches and loads of a feeder at a time of a run."""
 
     closed: frozenset[str]
-    """Names of the closed switches."""
     powers: frozenset[tuple[str, complex]] = frozenset()
     """Loads that have another power at nominal voltage (VA) than in the tables, by name."""
 
@@ -59,7 +58,6 @@ class IslandBalance(NamedTuple):
     """Generation of one island in one row, beside what its loads and losses take."""
 
     inverters: tuple[int, ...]
-    """Positions of its inverters."""
     generated: complex
     """Power that its inverters delivered (VA)."""
     taken: complex
@@ -67,17 +65,7 @@ class IslandBalance(NamedTuple):
 
 
 class IslandPowerFlow:
-    """Power flows of one feeder; each state of switches and inverters is factored once.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        As run.
-    names : tuple[str, ...]
-        Inverters, in the order of the rows' columns.
-    settings : PlantSettings
-        Parameters of the inverters.
-    """
+    """Power flows of one feeder; each state of switches and inverters is factored once."""
 
     def __init__(self, feeder: Feeder, names: tuple[str, ...], settings: PlantSettings) -> None:
         spares = [row.name for row in feeder.spares if row.name in names]
@@ -90,17 +78,7 @@ class IslandPowerFlow:
     def balances(self, state: NetworkState, P: Floats, Q: Floats, V: Floats, present: Flags) -> list[IslandBalance]:
         """Return the balance of each island without the substation that has a three-phase grid-forming inverter.
 
-        Parameters
-        ----------
-        state
-            Closed switches, and loads with another power than that of the tables.
-        P, Q, V, present
-            The row: powers (W, var), terminal voltages (V), and which inverters are on the network.
-
-        Raises
-        ------
-        RuntimeError
-            If no state of the network has these powers (`gridpeers.plant.dynamics.PlantError`).
+        Raise RuntimeError if no state of the network has these powers (`gridpeers.plant.dynamics.PlantError`).
         """
         P, Q, V, online = P[self._at], Q[self._at], V[self._at], present[self._at]
         flow, units = self._flow(state, online)
@@ -159,7 +137,6 @@ class IslandPowerFlow:
 
 
 def _make_room(kept: dict[Key, Value]) -> None:
-    """Drop the oldest entry if there are too many."""
     if len(kept) == KEPT:
         del kept[next(iter(kept))]
 
@@ -180,7 +157,6 @@ class PowerBalance(Check):
     """Largest difference, of real or of reactive power (% of the island's apparent power)."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the worst row of each island."""
         flows, history, judged = _flows_of(case), case.history, 0
         worst: dict[tuple[str, str], Violation] = {}
         for row in _rows(case):

@@ -34,7 +34,6 @@ class Frequency(Check):
     """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the worst row of each inverter in each window; an island without a grid-forming one is dark."""
         for part in _parts(case, self.within_s, self.since_s):
             rows, history, plates = case.rows_from(part, self.within_s, self.since_s), part.history, part.nameplates
             error = np.abs(history.f - case.f_nom)
@@ -65,7 +64,6 @@ class Voltage(Check):
     """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the worst row of each inverter in each window."""
         for part in _parts(case, self.within_s, self.since_s):
             rows, history = case.rows_from(part, self.within_s, self.since_s), part.history
             V = history.V / part.nameplates.V_nom
@@ -116,7 +114,6 @@ class Rating(Check):
     """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the longest overload of each inverter that is too long."""
         history, s = case.history, case.nameplates.s
         require_time(history, self.since_s)
         require_longer(float(history.t[-1] - max(history.t[0], self.since_s)), "longest_s", self.longest_s)

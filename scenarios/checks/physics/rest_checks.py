@@ -32,7 +32,6 @@ class SteadyEnd(Check):
     """Run time (s) from which on it is judged: the end of the last fault of links or agents, say."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the fastest inverter of each quantity and window."""
         if not case.windows:
             raise NotJudgedError("the run has no event")
         judged = False
@@ -79,10 +78,7 @@ MOST = 16
 
 
 class Mode(NamedTuple):
-    """One oscillation of a signal."""
-
     f: float
-    """Frequency (Hz)."""
     damping: float
     """Damping ratio: 0 lasts for ever, 1 does not swing, negative grows."""
     swing: float
@@ -90,16 +86,9 @@ class Mode(NamedTuple):
 
 
 def modes(x: Floats, dt: float) -> list[Mode]:
-    r"""Return the oscillations in a signal, the largest at its end first.
+    r"""Return the oscillations in a signal sampled every dt (s), the largest at its end first.
 
     .. math:: x_k = \sum_m r_m z_m^k, \qquad s_m = \ln(z_m) / \Delta t, \qquad \zeta_m = -\Re(s_m) / |s_m|
-
-    Parameters
-    ----------
-    x : Floats
-        Samples, shape (N,), at least 8.
-    dt : float
-        Their distance (s).
 
     Examples
     --------
@@ -141,8 +130,6 @@ _SWING = Plausible("a swing", 1e-6, 10.0, above_zero=True)
 
 
 class _Signal(NamedTuple):
-    """One quantity of one inverter over the tail."""
-
     name: str
     agent: str
     unit: str
@@ -171,7 +158,6 @@ class Oscillation(Check):
     """Longest tail of the run that is looked at (s); at most the second half of the time since the last event."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield, of each quantity, the inverter whose dominant mode lasts."""
         t = case.history.t
         since = max((case.disturbed_at(window) for window in case.windows), default=float(t[0]))
         tail = t >= max(float(t[-1]) - self.tail_s, 0.5 * (since + float(t[-1]))) - 1e-9

@@ -31,7 +31,6 @@ class PowerSharing(Check):
     """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the islands that share unequally; those at the limit of their available power are left out."""
         yield from _unequal(case, self, "MPSI", lambda history: history.P, lambda of: of.m_p)
 
 
@@ -48,7 +47,6 @@ class VarSharing(Check):
     """Whether inverters count whose agents the scenario has killed: they stay at their last set-points."""
 
     def __call__(self, case: CheckedCase) -> Iterator[Violation]:
-        """Yield the islands that share unequally."""
         yield from _unequal(case, self, "MQSI", lambda history: history.Q, lambda of: of.m_q)
 
 

@@ -45,9 +45,7 @@ class Published:
     source: str
     """Place in the publication, e.g. "Table I"."""
     case: str
-    """Case of our scenario."""
     event: str
-    """Event of our scenario after which it is measured."""
     island: str = ""
     """First inverter of the island that it is about; "" for the whole microgrid."""
     quantity: Quantity
@@ -93,7 +91,6 @@ class Benchmark:
     numbers: tuple[Published, ...] = ()
     """Numbers that it prints; they stand beside ours."""
     claims: tuple[Claim, ...] = ()
-    """Its sentences."""
     summary: Callable[[Findings], Sequence[str]] = _nothing
     """Return our distance from it, in a few lines below the claims."""
 
@@ -135,10 +132,7 @@ BENCHMARKS: Registry[Benchmark] = Registry(
 def benchmark_of(key: str | Mapping[str, Any]) -> Benchmark:
     """Return the benchmark that a scenario names in its key `paper`; an empty one for "".
 
-    Raises
-    ------
-    PluginError
-        If there is none of this name.
+    Raise PluginError if there is none of this name.
     """
     plugin = plugin_of(key)
     return BENCHMARKS.resolve(plugin.use, plugin.folder) if plugin.use else NO_BENCHMARK
@@ -158,7 +152,6 @@ class Claim:
     name: str
     """Short name, for tests and files."""
     text: str
-    """The claim."""
     source: str
     """Place in the publication."""
     judge: Judge
@@ -201,7 +194,6 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
 
 
 def _there(error: BaseException, findings: Findings) -> str:
-    """Return the known names, for a claim that asked for another."""
     if not isinstance(error, KeyError):
         return ""
     known = {
@@ -238,10 +230,7 @@ def _verdict(claim: Claim, findings: Findings) -> Verdict:
 def claim_of(plugin: Plugin) -> Claim:
     """Return a claim; a function's sentence is the first line of its docstring.
 
-    Raises
-    ------
-    PluginError
-        If there is none, or it cannot be made with these parameters.
+    Raise PluginError if there is none, or it cannot be made with these parameters.
     """
     claim = made(CLAIMS, plugin)
     if isinstance(claim, Claim):
@@ -260,7 +249,6 @@ def claim_of(plugin: Plugin) -> Claim:
 
 
 def _truth(value: Any) -> bool:
-    """Return whether a claim holds: a text, or a forgotten `return`, says nothing of it."""
     import numpy as np  # which a scenario is read without
 
     if not isinstance(value, bool | np.bool_):

@@ -84,7 +84,6 @@ METRICS: Registry[Any] = Registry(
     lambda it: callable_objection(it, "window", (*KEYS, "name")),
     own={name: f"gridpeers.scenarios.results.evaluation.window_metrics:{name}" for name in _OURS},
 )
-"""Metrics by name; those of gridpeers come first."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,20 +108,11 @@ def name_of(plugin: Plugin, label: str = "") -> str:
 
 
 def good_name(name: str) -> bool:
-    """Return whether a metric can stand in tables under a name."""
     return bool(_NAME.fullmatch(name))
 
 
 def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: WindowData) -> Measured:
-    """Return the values of some metrics, each of which may fail without harm to the others.
-
-    Parameters
-    ----------
-    metrics : Sequence[tuple[str, Callable]]
-        Name and function of each.
-    data : WindowData
-        The window.
-    """
+    """Return the values of some metrics, each of which may fail without harm to the others."""
     values: dict[str, float | None] = {}
     reasons: dict[str, str] = {}
     for name, metric in metrics:
@@ -143,13 +133,7 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
 
 
 def make_metrics(plugins: Sequence[tuple[str, Plugin]]) -> list[tuple[str, Callable[[WindowData], Any]]]:
-    """Return the functions of some metrics; one that cannot be made fails in every window.
-
-    Parameters
-    ----------
-    plugins : Sequence[tuple[str, Plugin]]
-        Name in tables, and metric.
-    """
+    """Return the functions of some metrics; one that cannot be made fails in every window."""
     return [(name, _made(plugin)) for name, plugin in plugins]
 
 
@@ -181,7 +165,6 @@ def _shown(error: BaseException) -> str:
 
 
 def _columns(error: BaseException, data: WindowData) -> str:
-    """Return the columns of a table, for a metric that asked for others."""
     if not isinstance(error, (KeyError, AttributeError, IndexError)):
         return ""
     few = ", ".join(data.inverters[:12]) + (", ..." if len(data.inverters) > 12 else "")

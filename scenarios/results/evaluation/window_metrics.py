@@ -31,7 +31,6 @@ class WindowData(History):
     """Rows between an event and the next, as read-only arrays (rows, inverters), and the inverters that they are of."""
 
     case: str
-    """Name of the case."""
     window: Window
     """Label of the event, its time and the end of its window (s)."""
     whole: History
@@ -49,7 +48,6 @@ class WindowData(History):
 
     @classmethod
     def cut(cls, whole: History, window: Window, **about: Any) -> WindowData:
-        """Return the rows of a window; `about` has the other fields."""
         inside = window.cut(whole)
         columns = {field.name: getattr(inside, field.name) for field in fields(History)}
         return read_only(cls(whole=whole, window=window, **columns, **about))
@@ -162,17 +160,7 @@ def own_measures(
     cases: Mapping[str, CaseRecord],
     islands: Mapping[str, Mapping[str, Mapping[str, Steady]]],
 ) -> dict[str, dict[str, Measured]]:
-    """Return the values of the scenario's own metrics, by case and window; empty if it has none.
-
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run.
-    cases : Mapping[str, CaseRecord]
-        Recorded cases with their windows.
-    islands : Mapping[str, Mapping[str, Mapping[str, Steady]]]
-        Steady values by case, window and island, where there are several.
-    """
+    """Return the values of the scenario's own metrics, by case and window; empty if it has none."""
     metrics = make_metrics(metrics_of(scenario))
     if not metrics:
         return {}

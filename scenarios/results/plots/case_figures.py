@@ -80,7 +80,6 @@ terminals that are too high and too low cancel."""
 
 
 def overview(drawing: Drawing) -> Figure:
-    """Draw the four measures that judge runs, of all cases, on one page."""
     figure = Figure(figsize=(7.4, 4.6), layout="constrained")
     grid = figure.subplots(2, 2, sharex=True)
     for panel, name in zip(grid.flat, ("frequency", "MPSI", "V_error", "MQSI"), strict=True):
@@ -91,7 +90,6 @@ def overview(drawing: Drawing) -> Figure:
 
 
 def single(drawing: Drawing, name: str) -> Figure:
-    """Draw one measure of all cases on a page of its own."""
     figure = Figure(figsize=(6.4, 3.2), layout="constrained")
     grid = figure.subplots(squeeze=False)
     draw_measure(grid[0, 0], drawing, name)
@@ -146,13 +144,7 @@ _STYLES: tuple[Style, Style] = (("#0072b2", "-", 2.2), ("#d55e00", (0, (4, 2)), 
 
 
 def comparison(pairs: Sequence[tuple[str, Mapping[str, Drawing]]]) -> Figure:
-    """Draw two rows of panels for each pair of cases.
-
-    Parameters
-    ----------
-    pairs : sequence of (str, Mapping[str, Drawing])
-        Words on each pair, and for each of the two its name and a drawing with one history.
-    """
+    """Draw two rows of panels for each pair of cases."""
     with mpl.rc_context(PAGE):
         figure = Figure(figsize=(WIDTH, 0.4 + 2 * HEIGHT * len(pairs)), layout="constrained")
         grid = figure.subplots(2 * len(pairs), COLUMNS, squeeze=False)

@@ -23,7 +23,6 @@ class Mark(NamedTuple):
     label: str
     """Name of its window; "" for none."""
     t: float
-    """Time of the event (s)."""
     what: str = ""
     """The event in a few words: "13-152 opens"."""
 
@@ -35,13 +34,9 @@ class Drawing:
     histories: Mapping[str, History]
     """Recorded cases by name."""
     titles: Mapping[str, str]
-    """A few words on each case."""
     nameplates: Nameplates
-    """Nameplates, in the order of the histories' columns."""
     events: Sequence[Mark]
-    """Events, marked at their times."""
     f_nom: float
-    """Nominal frequency (Hz)."""
     without_agent: Mapping[str, frozenset[str]] = field(default_factory=dict)
     """Inverters that have no agent, by case: the sharing indices leave them out."""
     moves: bool = False
@@ -51,10 +46,8 @@ class Drawing:
     island_intervals: Mapping[str, Sequence[IslandInterval]] = field(default_factory=dict)
     """Times with several islands, by case; only of cases that have any. Measures are those of the worst island then."""
     microgrid_of: Mapping[str, str] = field(default_factory=dict)
-    """Microgrid of each inverter."""
 
     def nameplates_in(self, case: str) -> Nameplates:
-        """Return the nameplates as they count in a case."""
         return self.nameplates.without(self.without_agent.get(case, frozenset()))
 
     def most_islands(self, case: str) -> Islands:
@@ -76,19 +69,7 @@ def drawing_of(
     recorded: Mapping[str, Iterable[PlantEvent]],
     events: Sequence[tuple[str, float]],
 ) -> Drawing:
-    """Return the data for the figures of a run: those of all experiments, and those of the events in this one.
-
-    Parameters
-    ----------
-    scenario, feeder : ScenarioModel, Feeder
-        As run.
-    histories : Mapping[str, History]
-        Recorded rows by case.
-    recorded : Mapping[str, Iterable[PlantEvent]]
-        Recorded events by case, in the order of time.
-    events : Sequence[tuple[str, float]]
-        Label and time (s) of each event that is marked.
-    """
+    """Return the data for the figures of a run: those of all experiments, and those of the events in this one."""
     what = {event.label: happening(event, scenario) for event in scenario.events}
     limited = dict.fromkeys(limit.inverter for case in scenario.cases for limit in limits_of(scenario, case))
     islands = {

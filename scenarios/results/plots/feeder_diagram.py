@@ -42,16 +42,7 @@ MOST_LABELS = 15
 
 
 def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figure:
-    """Draw a feeder on its coordinates, or as a tree where it has none.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        Its tables.
-    V : Mapping[str, float], optional
-        Voltage (pu) of each bus, by which branches are coloured; else branches and inverters have their microgrid's
-        colour.
-    """
+    """Draw a feeder on its coordinates, or as a tree where it has none."""
     picture = Figure(figsize=(10.5, 7.2), layout="constrained")
     at, on_coordinates = places(feeder), has_coordinates(feeder)
     axes = picture.add_subplot(aspect="equal" if on_coordinates else "auto")
@@ -101,7 +92,6 @@ def _zones(feeder: Feeder) -> dict[str, str]:
 
 
 def _colours(feeder: Feeder, zones: Mapping[str, str]) -> dict[str, str]:
-    """Return the colour of each zone."""
     beside = {"", zones[feeder.source.bus] if feeder.source is not None else ""}
     first = [row.microgrid for row in feeder.inverters]
     named = [zone for zone in dict.fromkeys((*first, *zones.values())) if zone not in beside]
@@ -132,11 +122,8 @@ def _draw_switch(switch: Switch, at: Places, axes: Axes) -> None:
 
 
 class _Marked(NamedTuple):
-    """A label of the diagram."""
-
     text: str
     size: float
-    """Of its type (pt)."""
     place: tuple[float, float]
     """Of its mark (drawing units)."""
     gap: float
@@ -225,7 +212,6 @@ def _zone_handles(feeder: Feeder, zones: Mapping[str, str], colours: Mapping[str
 
 
 def _mark_handles(feeder: Feeder, *, coloured: bool, loads: bool) -> list[Line2D]:
-    """Return the lines of the legend that say what the marks are, of those that the diagram has."""
     kinds, states = {row.kind for row in feeder.inverters}, {switch.closed for switch in feeder.switches}
     of = ", in its microgrid's colour" if coloured else ""
     marks = (

@@ -15,7 +15,6 @@ from gridpeers.scenarios.results.plots.drawing import Drawing, Mark
 from gridpeers.scenarios.results.plots.style import time_axis
 
 Panels = NDArray[Any]
-"""Panels of a figure, rows by columns."""
 
 TextSide = Literal["left", "center", "right"]
 """Which part of a text stands at the line."""
@@ -43,8 +42,6 @@ FRAME = 0.78
 
 
 class EventText(NamedTuple):
-    """A text above the frame."""
-
     text: str
     mark: Mark
     side: TextSide
@@ -56,15 +53,6 @@ def mark_events(
     """Draw a fine line at each event; if labelled, say above the frame what happens, as far as there is room.
 
     Of so many events that lines would hide the curves, only those have one for whose words there is room.
-
-    Parameters
-    ----------
-    axes, drawing : Axes, Drawing
-        Where, and what.
-    labelled : bool
-        Whether there are words.
-    colours : Mapping[Mark, str], optional
-        Colours of marks that are not black.
     """
     width = _width(axes)
     end = max(float(history.t[-1]) for history in drawing.histories.values())
@@ -150,7 +138,6 @@ class _Option(NamedTuple):
 
 
 def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
-    """Return what can be written at a mark, where, and how much it costs."""
     found = []
     for price, text, side in _choices(mark):
         if not text:

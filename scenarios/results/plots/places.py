@@ -73,7 +73,6 @@ def _tree(feeder: Feeder) -> dict[str, tuple[float, float]]:
 
 
 def _depth_first(root: str, children: Mapping[str, list[str]]) -> list[str]:
-    """Return the buses of a tree, each before all that are behind it, one branch after the other."""
     order, waiting = [], [root]
     while waiting:
         bus = waiting.pop()
@@ -98,8 +97,6 @@ WORD, MARK = 20.0, 6.0
 
 
 class Label(NamedTuple):
-    """A label of a mark."""
-
     text: str
     size: float
     """Of its type (pt)."""
@@ -114,16 +111,8 @@ class Label(NamedTuple):
 def label_sides(labels: Sequence[Label], lines: Points, marks: Points) -> list[tuple[int, int] | None]:
     """Return the side of its mark on which each label stands, one of `SIDES`; those that come first choose first.
 
-    None stands for an optional label that has no room.
-
-    Parameters
-    ----------
-    labels : sequence of Label
-        The labels.
-    lines : float64[n, 4]
-        Lines of the drawing: x and y of both ends (pt).
-    marks : float64[m, 3]
-        Marks, also those of the labels: x, y and half of the width (pt).
+    None stands for an optional label that has no room. `lines` has x and y of both ends, shape (n, 4); `marks`, also
+    those of the labels, x, y and half of the width, shape (m, 3); all in pt.
     """
     words = np.empty((0, 4))
     boxes = np.column_stack([marks[:, :2] - marks[:, 2:], marks[:, :2] + marks[:, 2:]])
@@ -153,7 +142,6 @@ def _box(label: Label, side: tuple[int, int]) -> Points:
 
 
 def _common(box: Points, others: Points) -> float:
-    """Return the area that a box has in common with others."""
     sides = np.minimum(box[2:], others[:, 2:]) - np.maximum(box[:2], others[:, :2])
     return float(np.prod(np.maximum(sides, 0.0), axis=1).sum())
 

@@ -17,7 +17,6 @@ from gridpeers.wire.wording import suggestion
 
 
 def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
-    """Return the functions that draw the figures of a run, by the figure's name."""
     figures: dict[str, Callable[[], Figure]] = {name: partial(single, drawing, name) for name in MEASURES}
     figures |= {
         "power_GFM": lambda: powers(drawing, GFM=True),
@@ -33,13 +32,7 @@ def figures_of(drawing: Drawing) -> dict[str, Callable[[], Figure]]:
 
 
 def draw(drawing: Drawing, name: str) -> Figure:
-    """Draw one figure of a run in the style of all.
-
-    Raises
-    ------
-    ValueError
-        If the run has no figure of this name.
-    """
+    """Draw one figure of a run in the style of all. Raise ValueError if the run has no figure of this name."""
     figures = figures_of(drawing)
     if name not in figures:
         raise ValueError(f'there is no figure "{name}" of this run; {suggestion(name, figures, "figures")}')
@@ -48,24 +41,12 @@ def draw(drawing: Drawing, name: str) -> Figure:
 
 
 def draw_all(drawing: Drawing, folder: Path) -> tuple[Path, ...]:
-    """Draw every figure of a run into a folder.
-
-    Returns
-    -------
-    tuple of Path
-        The files.
-    """
+    """Draw every figure of a run into a folder."""
     return draw_share(drawing, folder, 0, 1)
 
 
 def draw_share(drawing: Drawing, folder: Path, number: int, of: int) -> tuple[Path, ...]:
-    """Draw share `number`, counted from 0, of so many shares of a run's figures into a folder.
-
-    Returns
-    -------
-    tuple of Path
-        The files.
-    """
+    """Draw share `number`, counted from 0, of so many shares of a run's figures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     figures = figures_of(drawing)
     with mpl.rc_context(PAGE):
@@ -90,4 +71,3 @@ def shares(figures: Iterable[str], number: int) -> list[list[str]]:
 
 
 _TIME = {"overview": 2.5}
-"""Time that a figure takes, in proportion to the others."""

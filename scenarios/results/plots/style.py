@@ -21,7 +21,6 @@ from gridpeers.scenarios.results.history import Floats
 from gridpeers.scenarios.results.plots.drawing import Drawing
 
 LineStyle = tuple[str, Any]
-"""Colour and dash pattern."""
 
 Style = tuple[str, Any, float]
 """Colour, dash pattern and line width (pt)."""
@@ -84,7 +83,6 @@ PAGE: Any = {
     "figure.dpi": 180,
     "savefig.dpi": 180,
 }
-"""Layout of every figure."""
 
 
 def case_style(case: str, number: int) -> LineStyle:
@@ -135,7 +133,6 @@ class Bounds(NamedTuple):
     shown: float = 0.995
     """Part of all values that it has."""
     most: float = inf
-    """There or below."""
 
 
 SHARING = Bounds(most=5.0)
@@ -173,13 +170,11 @@ def from_zero(axes: Axes, curves: Iterable[Floats], bounds: Bounds) -> None:
 
 
 def time_axis(axes: Axes, drawing: Drawing) -> None:
-    """Name the axis of time, from 0 to the end of the run."""
     axes.set_xlabel("time (s)")
     axes.set_xlim(0.0, max(float(history.t[-1]) for history in drawing.histories.values()))
 
 
 def name_panel(axes: Axes, title: str, label: str) -> None:
-    """Write the title above a panel and the label of its vertical axis."""
     axes.set_title(title, loc="left")
     axes.set_ylabel(label)
 
@@ -191,13 +186,11 @@ def nominal_line(axes: Axes, value: float) -> None:
 
 
 def words(drawing: Drawing, case: str) -> str:
-    """Return the name of a case and what it is, for legends and titles."""
     title = drawing.titles.get(case, "")
     return f"{case}: {title}" if title else case
 
 
 def case_title(drawing: Drawing, case: str) -> str:
-    """Return the title of a case's panel, in lines that fit above half a page."""
     return "\n".join(wrap(f"Case {words(drawing, case)}", TITLE_LENGTH))
 
 
@@ -210,7 +203,6 @@ def columns(labels: Sequence[str], width: float) -> int:
 
 
 def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
-    """Put the legend of a panel's curves below all panels, in columns that fit."""
     handles, labels = axes.get_legend_handles_labels()
     ncols = max(len(labels), 1) if one_row else columns(labels, figure.get_figwidth())
     figure.legend(handles, labels, loc="outside lower center", ncols=ncols)
@@ -234,26 +226,7 @@ _UNDATED: Mapping[Format, Mapping[str, Any]] = {
 def save(
     figure: Figure, folder: Path, name: str, formats: Sequence[Format] = ("png",), dpi: float | None = None
 ) -> tuple[Path, ...]:
-    """Write a figure into a folder, which is made where there is none.
-
-    Parameters
-    ----------
-    figure : Figure
-        What to write.
-    folder : Path
-        Where to.
-    name : str
-        Name of the file, without its ending.
-    formats : Sequence of {"png", "pdf", "svg"}
-        One file each.
-    dpi : float, optional
-        Resolution of a PNG (1/inch); that of all figures if left out.
-
-    Returns
-    -------
-    tuple of Path
-        The files.
-    """
+    """Write a figure into a folder, which is made where there is none."""
     folder.mkdir(parents=True, exist_ok=True)
     files = []
     for kind in formats:
