@@ -3,7 +3,7 @@
 The file is a sequence of MCAP records, each with its length before it. A process that is killed leaves the last one
 half written, and no index at the end. So no chunk is found by the index: the reader goes from record to record, which
 takes one look at each chunk of about a second, and stops where the file ends or makes no sense. There it can go on
-later, if the run is still recorded. The index tells of a chunk that is not met so: what begins it is damaged.
+later, if the run is still recorded.
 """
 
 from __future__ import annotations
@@ -85,10 +85,6 @@ class RecordFile:
         self._topics: dict[int, Topic] = dict(enumerate(get_args(Topic), 1))
         """Topic of each channel: those of our writer, as the first chunk, which names them, may be damaged."""
         self._chunks: list[_ChunkPlace] = []
-        self._indexed: list[_ChunkPlace] = []
-        """The same chunks as the index at the end has them."""
-        self._refused: set[int] = set()
-        """Where chunks begin that are none of ours."""
         self._info: RecordInfo | None = None
         self._read_on()
         if self._info is None:
@@ -161,19 +157,14 @@ class RecordFile:
                 return
             if opcode == Opcode.FOOTER and length == _FOOTER:
                 self.complete = True
-                self._note_missing()
                 return
             if opcode == Opcode.CHUNK and length > _TIMES.size:
                 since, until, size = _TIMES.unpack(file.read(_TIMES.size))
                 if size > MOST_CHUNK or since > until:
                     self._damage.append(f"a chunk of {size} bytes at byte {start} is none of ours")
                     self.holes.append((self.t_end, self.t_end))
-                    self._refused.add(start)
                 else:
                     self._chunks.append(_ChunkPlace(start, length, since, until))
-            elif opcode == Opcode.CHUNK_INDEX and length > _TIMES.size:
-                since, until, offset = _TIMES.unpack(file.read(_TIMES.size))
-                self._indexed.append(_ChunkPlace(offset + _FRAME.size, 0, since, until))
             elif opcode == Opcode.HEADER:
                 self._check_header(file.read(length))
             elif opcode == Opcode.METADATA:
@@ -182,18 +173,6 @@ class RecordFile:
             file.seek(self._offset)
         if not self._damage:
             self._cut("between two chunks")
-
-    def _note_missing(self) -> None:
-        """Note the chunks that only the index has: their first byte is damaged, so they look like something else."""
-        found = {place.offset for place in self._chunks} | self._refused
-        if len(self._indexed) <= len(found):  # every chunk is there, and an offset in the index may be damaged
-            return
-        for place in self._indexed:
-            if place.offset not in found and place.since <= place.until:
-                hole = place.since / 1e9, place.until / 1e9
-                self.holes.append(hole)
-                self._damage.append(f"a chunk cannot be found, from t = {hole[0]:.2f} s to {hole[1]:.2f} s")
-        self._indexed.clear()
 
     def _cut(self, where: str) -> None:
         at = f" after t = {self.t_end:.2f} s" if self._chunks else ""

@@ -11,7 +11,6 @@ import contextlib
 import os
 import threading
 from collections.abc import Iterator
-from math import inf
 from pathlib import Path
 from tempfile import TemporaryFile
 from time import monotonic
@@ -75,13 +74,6 @@ class _WholeWrites:
             raise
         self._written = self._position
 
-    def room(self) -> float:
-        """Return the room (bytes) that its disk has left; infinite where the system does not tell."""
-        if not hasattr(os, "fstatvfs"):
-            return inf
-        disk = os.fstatvfs(self._file)
-        return disk.f_bavail * disk.f_frsize if disk.f_blocks else inf
-
     def descriptor(self) -> int:
         """Return another descriptor of the file, for its taker to close."""
         return os.dup(self._file)
@@ -124,8 +116,6 @@ class RecordWriter:
         self.failure = ""
         """Why the record ended early; empty while it goes on, and after a whole one."""
         self.ended = 0
-        self.spare = 0.0
-        """Room (bytes) on the disk that the run's other files still need: the record ends before it takes that."""
         self._index = _FileIndex(path.parent)  # should the system give no file for it, there is no empty record
         self._file = _WholeWrites(path)
         # LZ4 takes a third of the time and half as much room again: beside a run in one process that time counts.
@@ -207,9 +197,6 @@ class RecordWriter:
     def _write(self) -> None:
         """Write what waits as a chunk, and have the disk keep it now and then."""
         try:
-            if (room := self._file.room()) < self.spare:
-                self._fail(f"its disk has {room / 1e6:.1f} MB left, which the run's other files need")
-                return
             self._write_waiting()
             self._written_at = monotonic()
             if not self._syncs and self._written_at - self._began > SYNC:  # a shorter run has no need of it

@@ -152,11 +152,10 @@ class Recorder:
         """Take one message; with a folder its rows and verdicts are in a file when this returns."""
         if isinstance(message, Telemetry):
             self._take(message)
-            return
-        if isinstance(message, LinkReport):
+        elif isinstance(message, LinkReport):
             self.links(message)
         if self._recording is not None:
-            self._recording.message(message)
+            self._recording(message)
 
     @property
     def events(self) -> tuple[PlantEvent, ...]:
@@ -171,17 +170,13 @@ class Recorder:
         if not self._inverters:
             self._inverters = telemetry.inverters
             self._write((",".join(header(telemetry.inverters)) + "\n").encode("ascii"))
-        lines = []
         for row in telemetry.rows:
             if self.count and row[0] <= self.ended:
                 raise RecordError(f"telemetry: a row of {row[0]:g} s came after that of {self.ended:g} s")
             self._note_time(row[0])
             if self._file is None:
                 self.rows.append(row)
-            lines.append(csv_line(row))
-            self._write(lines[-1])
-        if self._recording is not None:
-            self._recording.telemetry(telemetry, lines)
+            self._write(csv_line(row))
         self._events.extend(telemetry.events)
         self.quiet.extend(telemetry.quiet)
         self.reproducible = self.reproducible and telemetry.reproducible

@@ -130,23 +130,3 @@ def test_the_index_of_a_long_run_takes_no_memory(tmp_path: Path, monkeypatch: py
         assert summary is not None
         assert len(summary.chunk_indexes) == 500
         assert len(list(make_reader(file).iter_messages())) == 500
-
-
-def test_a_record_leaves_room_to_the_other_files_of_its_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a disk that is nearly full it ends before it takes what the history needs; the reason has the room left."""
-    one = writer(tmp_path)
-    one.spare = 3e6
-    one.add("telemetry", 10**9, 0, b"first")
-    one.close()
-    (tmp_path / "two").mkdir()
-    room = os.statvfs(tmp_path)
-    two = writer(tmp_path / "two")
-    two.spare = 3e6
-    nearly_full = os.statvfs_result((room.f_bsize, 4096, room.f_blocks, 500, 500, *room[5:]))
-    monkeypatch.setattr(record_writer.os, "fstatvfs", lambda descriptor: nearly_full)
-    two.add("telemetry", 10**9, 0, b"first")
-    two.close()
-
-    assert one.failure == ""
-    assert two.failure == "its disk has 2.0 MB left, which the run's other files need"
-    assert list(RecordFile(tmp_path / "two" / "run.mcap").messages()) == []
