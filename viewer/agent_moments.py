@@ -7,7 +7,7 @@ from collections import Counter, defaultdict
 from functools import lru_cache
 from typing import NamedTuple
 
-from gridpeers.scenarios.record.journal_coverage import inside
+from gridpeers.scenarios.record.decision_entries import inside
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import PLANT, Measurement, State

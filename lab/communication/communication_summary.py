@@ -21,7 +21,7 @@ from gridpeers.lab.communication.neighbour_use import DecidedStates, DecidedTick
 from gridpeers.lab.communication.record_pass import DroppedStates, Link, RecordSink, end_of, opened, read_into
 from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.record.journal_coverage import Hole
+from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision
 from gridpeers.wire.messages import PLANT

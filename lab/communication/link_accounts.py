@@ -10,7 +10,7 @@ from gridpeers.lab.communication.neighbour_use import Uses
 from gridpeers.lab.communication.record_pass import Link
 from gridpeers.lab.communication.sent_states import SentState, SentStates
 from gridpeers.netem.ledger import LinkTrace
-from gridpeers.scenarios.record.journal_coverage import Hole, inside
+from gridpeers.scenarios.record.decision_entries import Hole, inside
 from gridpeers.wire.messages import PLANT
 
 WAIT = 1000

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from gridpeers.lab.communication.record_pass import Link
 from gridpeers.lab.communication.sent_states import SentState, StateWindow
-from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, inside
+from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, inside
 from gridpeers.wire.journal import Decision
 
 MOST = 20_000

@@ -15,7 +15,7 @@ from gridpeers.lab.communication.record_pass import DroppedStates, Link, RecordS
 from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
-from gridpeers.scenarios.record.journal_coverage import Hole
+from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision
 

@@ -18,8 +18,7 @@ from gridpeers.lab.communication.sent_states import SentState
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
 from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.record.decision_entries import is_periodic
-from gridpeers.scenarios.record.journal_coverage import INSTANT, Hole, JournalCoverage
+from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, JournalCoverage, is_periodic
 from gridpeers.scenarios.record.journal_reader import entries_of, values_of
 from gridpeers.scenarios.record.record_file import RecordFile
 from gridpeers.wire.bounds import MOST_COUNT

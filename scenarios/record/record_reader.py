@@ -15,10 +15,9 @@ from pathlib import Path
 from typing import TypeVar, get_args
 
 from gridpeers.netem.ledger import LinkCounts, LinkTrace
-from gridpeers.scenarios.emulation.link_data import data_of
-from gridpeers.scenarios.record.decision_entries import DecisionEntries
+from gridpeers.scenarios.emulation.link_data import LinkReportData, data_of
+from gridpeers.scenarios.record.decision_entries import DecisionEntries, Hole
 from gridpeers.scenarios.record.decision_reader import DecisionReader
-from gridpeers.scenarios.record.journal_coverage import Hole
 from gridpeers.scenarios.record.message_index import MessageIndex, MessageOnWire
 from gridpeers.scenarios.record.record_file import RecordFile, RecordFileError, record_path
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
@@ -150,8 +149,6 @@ class RunRecord:
     ) -> Iterator[MessageOnWire]:
         """Yield messages as they were sent, each once, in the order of the record; run times (s) include the limits."""
         _check_times(since=since, until=until)
-        if sender is not None:
-            _check_name("sender", sender)
         if kind is not None and kind not in KINDS:
             raise RecordFileError(f"kind: no message is a {kind!r:.60}; {suggestion(str(kind), KINDS, 'types')}")
         return self._index.messages(sender, since, until, kind)
@@ -172,27 +169,24 @@ class RunRecord:
 
         An entry has no run time of its own: `since` and `until` (s) choose the parts of the journal, of 0.2 s or so.
         """
-        _check_name("node", node)
         _check_times(since=since, until=until)
         return self._index.entries(node, since, until)
 
     def links(self) -> Iterator[LinkTrace]:
         """Yield the verdicts of the emulated links, as in links.csv: in parts of one link, as they were reported."""
-        for report in self._index.of_type("link_reports", LinkReport):
-            try:
-                yield from data_of(report).traces
-            except ValueError:  # the report of a later version, or a damaged one
-                self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
+        for _, data in self._link_reports():
+            yield from data.traces
 
     def link_counts(self) -> dict[tuple[str, str], LinkCounts]:
         """Return the counts of the messages of each emulated link, by sender and receiver, at their last report."""
-        counts: dict[tuple[str, str], LinkCounts] = {}
+        return {(src, receiver): of for receiver, data in self._link_reports() for src, of in data.counts.items()}
+
+    def _link_reports(self) -> Iterator[tuple[str, LinkReportData]]:
         for report in self._index.of_type("link_reports", LinkReport):
             try:
-                counts |= {(src, report.sender): of for src, of in data_of(report).counts.items()}
-            except ValueError:
+                yield report.sender, data_of(report)
+            except ValueError:  # the report of a later version, or a damaged one
                 self._index.note_damage(f"a report on the links into {report.sender} cannot be read")
-        return counts
 
     def link_requests(self) -> Iterator[LinkRequest]:
         """Yield the commands to emulated links, in their order."""
@@ -235,37 +229,17 @@ class RunRecord:
             found = _last(self.decisions(agent, since=max(0.0, t - back), until=t + 1e-9))
             back *= 4.0
         if self._decisions.entries.lost_at(agent, t, None if found is None else found.t):
-            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {self._lost()}")
+            why = self.damage[0] if self.damage else "parts of journals never came into it"
+            raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {why}")
         if found is None:
-            raise RecordFileError(f"{self.path}: {self._undecided(agent, t)}")
+            first = next(self.decisions(agent), None)
+            later = "nor later" if first is None else f"its first decision is of t = {first.t:.2f} s"
+            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s; {later}")
         return found
-
-    def _lost(self) -> str:
-        return self.damage[0] if self.damage else "parts of journals never came into it"
-
-    def _undecided(self, agent: str, t: float) -> str:
-        """Return in a sentence why an agent has no decision up to a run time (s)."""
-        not_yet = f"{agent} had not decided anything by t = {t:g} s"
-        first = next(self.decisions(agent), None)
-        if first is not None:
-            return f"{not_yet}; its first decision is of t = {first.t:.2f} s"
-        if self.damage:
-            return f"{not_yet}, as far as the record has it: {self.damage[0]}"
-        if any(event.kind == "roster" and event.subject == agent for event in self.events()):
-            return f"{not_yet}, nor later"
-        decided = [name for name in self.agents if next(self.decisions(name), None) is not None]
-        advice = f"; ask about an agent that decided: {short(decided)}" if decided else ", nor did any other agent"
-        return f"no agent of {agent} joined in the {self.t_end:.2f} s of this record, so nothing decided for it{advice}"
 
     def _require(self, agent: object) -> None:
         if agent != "plant" and agent not in self.agents:
             raise RecordFileError(f"{self.path}: there was no agent {agent!s:.64}; agents are {short(self.agents)}")
-
-
-def _check_name(argument: str, name: object) -> None:
-    """Refuse what is no name of a node."""
-    if not isinstance(name, str):
-        raise RecordFileError(f'{argument}: needs the name of an agent, or "plant", got {name!r:.60}')
 
 
 def _check_times(**times: object) -> None:

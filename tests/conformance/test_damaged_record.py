@@ -12,7 +12,7 @@ from mcap.reader import make_reader
 
 from gridpeers.lab.communication.record_content import read_content
 from gridpeers.lab.replay.replay import replay
-from gridpeers.scenarios.record.journal_coverage import JournalCoverage, inside
+from gridpeers.scenarios.record.decision_entries import JournalCoverage, inside
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.viewer.record_view import RecordView
 from gridpeers.wire.messages import Journal
