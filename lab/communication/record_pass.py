@@ -162,10 +162,9 @@ class _Pass:
                 self._report(message)
             else:
                 self._unreadable += 1
-        numbered, damaged = self._file.info.driver != "inprocess", self._file.holes
         return PassEnd(
             unreadable=self._unreadable + len(self._file.damage),
-            lost={name: each.holes(damaged, numbered=numbered) for name, each in self._coverage.items()},
+            lost={name: each.holes(self._file.holes) for name, each in self._coverage.items()},
             known_until={name: each.known_until for name, each in self._coverage.items()},
         )
 

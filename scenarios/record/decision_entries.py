@@ -72,13 +72,8 @@ class JournalCoverage:
             self._gaps.append((self._since, known[0] - INSTANT))
             self._since = None
 
-    def holes(self, damaged: Sequence[Hole], *, numbered: bool = True) -> list[Hole]:
-        """Return where parts are lost, by their numbers or by the run times (s) of damaged chunks of the file.
-
-        Not numbered are records of one process of earlier versions, which counted the parts of all agents together.
-        """
-        if not damaged and not numbered:
-            return []
+    def holes(self, damaged: Sequence[Hole]) -> list[Hole]:
+        """Return where parts are lost, by their numbers or by the run times (s) of damaged chunks of the file."""
         since = self._since
         behind = [begin for begin, end in damaged if end >= self._t]
         if since is None and behind:  # no part came after it, which would tell by its number what is lost
@@ -135,8 +130,7 @@ class DecisionEntries:
             return ()
         self._go_through()
         if node not in self._holes:
-            numbered = self._info.driver != "inprocess"
-            found = self._covered(node).holes(self._index.file.holes, numbered=numbered)
+            found = self._covered(node).holes(self._index.file.holes)
             if node != PLANT:
                 later = self._info.T_c if self._simulated else 0.0
                 found = sorted({*found, *((since, until + later) for since, until in self.holes(PLANT))})
