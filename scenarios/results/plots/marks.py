@@ -88,75 +88,48 @@ def place_texts(marks: Sequence[Mark], inches_per_s: float) -> list[EventText]:
     >>> [(text, side) for text, _, side in found]
     [('event1\n13-152 opens', 'right'), ('leave', 'left')]
     """
-    ordered = sorted(marks, key=lambda mark: mark.t)
-    options = [_options(mark, inches_per_s) for mark in ordered]
+    options = [_options(mark, inches_per_s) for mark in sorted(marks, key=lambda mark: mark.t)]
     first = [*accumulate((min(one.start for one in each) for each in reversed(options)), min)][::-1]
-    best: list[_PartialPlacement] = [_PartialPlacement(-inf, 0.0, None)]
-    """Partial placements that no other beats in both right edge and cost: sorted by edge, the cost falls."""
+    best: dict[float, tuple[float, tuple[EventText, ...]]] = {-inf: (0.0, ())}
+    """Cost and texts by the right edge (inches): those that no other beats in both edge and cost, sorted by edge."""
     for each, leftmost in zip(options, first, strict=True):
-        found: dict[float, _PartialPlacement] = {}
-        for partial in best:
-            edge = max(partial.edge, leftmost - GAP)  # nothing stands further left any more, so these are alike
+        found: dict[float, tuple[float, tuple[EventText, ...]]] = {}
+        for right, (cost, texts) in best.items():
+            edge = max(right, leftmost - GAP)  # nothing stands further left any more, so these are alike
             for option in each:
-                if option.text is not None and option.start < edge + GAP - ROUNDING:
-                    continue
-                end, cost = max(edge, option.end), partial.cost + option.price
-                if end not in found or cost < found[end].cost:
-                    texts = partial.texts if option.text is None else (partial.texts, option.text)
-                    found[end] = _PartialPlacement(end, cost, texts)
-        best, least = [], inf
-        for _, partial in sorted(found.items()):
-            if partial.cost < least:
-                best.append(partial)
-                least = partial.cost
-    chosen, texts = list[EventText](), best[-1].texts
-    while texts is not None:
-        texts, last = texts
-        chosen.append(last)
-    return chosen[::-1]
-
-
-class _PartialPlacement(NamedTuple):
-    """A placement of the texts at the first marks."""
-
-    edge: float
-    """Right edge of the last of them (inches)."""
-    cost: float
-    texts: tuple[Any, EventText] | None
-    """Those before the last, in the same form, and the last; None if there is none."""
+                if option.start >= edge + GAP - ROUNDING:
+                    end, total = max(edge, option.end), cost + option.price
+                    if end not in found or total < found[end][0]:
+                        found[end] = total, (*texts, *option.texts)
+        best, least = {}, inf
+        for end, (cost, texts) in sorted(found.items()):
+            if cost < least:
+                best[end], least = (cost, texts), cost
+    return list([*best.values()][-1][1])
 
 
 class _Option(NamedTuple):
-    """One way to write at a mark, or to leave it out."""
+    """One way to write at a mark, or to leave it out; its edges (inches) are infinite then."""
 
     price: float
-    text: EventText | None
-    start: float
-    """Left edge (inches); infinite if nothing is written."""
-    end: float
-    """Right edge (inches); -infinite if nothing is written."""
+    texts: tuple[EventText, ...] = ()
+    start: float = inf
+    end: float = -inf
 
 
 def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
-    found = []
-    for price, text, side in _choices(mark):
-        if not text:
-            found.append(_Option(price, None, inf, -inf))
-            continue
-        width = LETTER * max(map(len, text.split("\n")))
-        start = mark.t * inches_per_s - {"left": 0.0, "center": 0.5, "right": 1.0}[side] * width
-        found.append(_Option(price, EventText(text, mark, side), start, start + width))
-    return found
-
-
-def _choices(mark: Mark) -> list[tuple[float, str, TextSide]]:
-    """Return what can be written at a mark, and how much it costs."""
     what = " ".join(map(_abridged, mark.what.split(" ")))
     both = "\n".join(text for text in (mark.label, what) if text)
     narrow = "\n".join(text for text in (mark.label, what.replace(" ", "\n", 1)) if text)
-    texts = {mark.label: 10.0, "": 30.0} | {narrow: 5.0} | {both: 0.0}  # of equal texts the last, cheapest price counts
-    sides: tuple[tuple[TextSide, float], ...] = (("center", 0.0), ("left", 1.0), ("right", 1.0))
-    return [(price + more, text, side) for text, price in texts.items() for side, more in sides]
+    prices = {mark.label: 10.0, narrow: 5.0} | {both: 0.0}  # of equal texts the last, cheapest price counts
+    found = [_Option(30.0 if both else 0.0)]
+    for text, price in prices.items():
+        width = LETTER * max(map(len, text.split("\n")))
+        for side, before, more in (("center", 0.5, 0.0), ("left", 0.0, 1.0), ("right", 1.0, 1.0)):
+            start = mark.t * inches_per_s - before * width
+            if text:
+                found.append(_Option(price + more, (EventText(text, mark, side),), start, start + width))
+    return found
 
 
 def _abridged(word: str) -> str:
