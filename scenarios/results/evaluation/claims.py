@@ -117,16 +117,8 @@ def _benchmark_objection(it: Any) -> str:
     return "" if isinstance(it, Benchmark) else "it is no gridpeers.benchmarks.Benchmark"
 
 
-BENCHMARKS: Registry[Benchmark] = Registry(
-    "benchmark",
-    "benchmarks",
-    _benchmark_objection,
-    own={
-        name: f"gridpeers.papers.singhal2022.paper_benchmarks:{name.replace('-', '_').upper()}"
-        for name in ("islanding", "intermittency", "communication", "switching", "plug-n-play", "wind-up")
-    },
-)
-"""Benchmarks by name; those that come with gridpeers are references, which are imported when a run is judged."""
+BENCHMARKS: Registry[Benchmark] = Registry("benchmark", "benchmarks", _benchmark_objection)
+"""Benchmarks by name. Those that come with gridpeers are entry points, imported when a run is judged."""
 
 
 def benchmark_of(key: str | Mapping[str, Any]) -> Benchmark:
@@ -185,11 +177,10 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     for claim in claims:
         try:
             with foreign_code():
-                verdicts.append(_verdict(claim, findings))
+                status, found = _judgement(claim, findings)
         except ANYTHING as error:  # a claim is a user's code
-            verdicts.append(
-                Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, findings)}")
-            )
+            status, found = "FAIL", f"cannot be judged: {named(error)}{_there(error, findings)}"
+        verdicts.append(Verdict(claim=claim, status=status, found=found))
     return tuple(verdicts)
 
 
@@ -197,34 +188,28 @@ def _there(error: BaseException, findings: Findings) -> str:
     if not isinstance(error, KeyError):
         return ""
     known = {
-        "cases": dict.fromkeys(findings.results),
-        "events": dict.fromkeys(event for of in findings.results.values() for event in of),
-        "scenario's own metrics": dict.fromkeys(
-            n for of in findings.own.values() for one in of.values() for n in one.values
-        ),
+        "cases": findings.results,
+        "events": {event for of in findings.results.values() for event in of},
+        "scenario's own metrics": {n for of in findings.own.values() for one in of.values() for n in one.values},
     }
-    return "".join(f"; the {kind} are {', '.join(names)}" for kind, names in known.items() if names)
+    return "".join(f"; the {kind} are {', '.join(sorted(names))}" for kind, names in known.items() if names)
 
 
-def _verdict(claim: Claim, findings: Findings) -> Verdict:
+def _judgement(claim: Claim, findings: Findings) -> tuple[Status, str]:
     results = findings.results
-    missing = [case for case in claim.cases if case not in results]
-    if missing:
-        return Verdict(claim=claim, status="NOT RUN", found=f"needs case {', '.join(missing)}")
-    absent = [event for event in claim.events if any(event not in results[case] for case in claim.cases)]
-    if absent:
-        return Verdict(claim=claim, status="NOT RUN", found=f"needs {' and '.join(absent)}")
+    if missing := [case for case in claim.cases if case not in results]:
+        return "NOT RUN", f"needs case {', '.join(missing)}"
+    if absent := [event for event in claim.events if any(event not in results[case] for case in claim.cases)]:
+        return "NOT RUN", f"needs {' and '.join(absent)}"
     if lacking := claim.lacking(findings):
-        return Verdict(claim=claim, status="FAIL", found=lacking)
+        return "FAIL", lacking
     holds, value = claim.judge(findings)
-    text = str(value)
-    if not holds and claim.known_miss:
-        return Verdict(claim=claim, status="MISS", found=text)
-    unsteady = findings.unsteady(claim.cases, claim.events, claim.measures)
-    if holds and unsteady:
+    if not holds:
+        return "MISS" if claim.known_miss else "FAIL", str(value)
+    if unsteady := findings.unsteady(claim.cases, claim.events, claim.measures):
         more = f", and {len(unsteady) - 1} more" if len(unsteady) > 1 else ""
-        return Verdict(claim=claim, status="FAIL", found=f"{text}, but {unsteady[0]}{more}")
-    return Verdict(claim=claim, status="PASS" if holds else "FAIL", found=text)
+        return "FAIL", f"{value}, but {unsteady[0]}{more}"
+    return "PASS", str(value)
 
 
 def claim_of(plugin: Plugin) -> Claim:
@@ -240,20 +225,15 @@ def claim_of(plugin: Plugin) -> Claim:
     text = (inspect.getdoc(kind) or "").partition("\n")[0].rstrip(".") or name
 
     def holds(findings: Findings) -> tuple[bool, str]:
+        import numpy as np  # which a scenario is read without
+
         result = claim(findings)
-        if isinstance(result, tuple) and len(result) == 2:
-            return _truth(result[0]), printable(str(result[1]), 200)
-        return _truth(result), ""
+        truth, value = result if isinstance(result, tuple) and len(result) == 2 else (result, "")
+        if not isinstance(truth, bool | np.bool_):  # a text, or a forgotten `return`, says nothing
+            raise TypeError(f"returned {truth!r:.60}; return True or False, or that and our value: (True, '0.3 s')")
+        return bool(truth), printable(str(value), 200)
 
     return Claim(name=name, text=text, source=plugin.use, judge=holds, measures=())
-
-
-def _truth(value: Any) -> bool:
-    import numpy as np  # which a scenario is read without
-
-    if not isinstance(value, bool | np.bool_):
-        raise TypeError(f"returned {value!r:.60}; return True or False, or that and our value: (True, '0.3 s')")
-    return bool(value)
 
 
 def judged(findings: Findings, plugins: Sequence[Plugin]) -> tuple[Verdict, ...]:

@@ -15,7 +15,7 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, made
@@ -61,14 +61,8 @@ def heading(quantity: Quantity, f_nom: float = 60.0) -> str:
     return f"{label(quantity, f_nom)}{UNITS[quantity]}"
 
 
-HEADINGS: dict[Quantity, str] = {
-    "f_error_Hz": heading("f_error_Hz"),
-    "MPSI": heading("MPSI"),
-    "V_error": heading("V_error"),
-    "MQSI": heading("MQSI"),
-}
+HEADINGS: dict[Quantity, str] = {quantity: heading(quantity) for quantity in get_args(Quantity)}
 """Headings of the columns at the paper's nominal frequency, 60 Hz."""
-
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,40}")
 
