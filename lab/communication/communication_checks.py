@@ -31,8 +31,7 @@ from gridpeers.wire.schema.plausible import Plausible, Unit
 
 _NO_ARRIVALS = 'in real time a record = "decisions" does not have what arrived'
 
-_SAID = re.compile(r"\S+ (leaves|left|dies)\b")
-"""Events of an agent that ends as the scenario, or a person, wants it."""
+_SAID = re.compile(r"\S+ (leaves|left|dies)\b")  # Events of an agent that ends as the scenario, or a person, wants it
 
 
 class MessageAccount(Check):

@@ -18,11 +18,8 @@ from gridpeers.netem.schema.pattern import Link as LinkEnds
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
 
-CUTS = ("cut", "partition")
-"""Faults with an end, and reasons of dropped messages, that part two agents."""
-
-LOSSES = (*CUTS, "loss", "flap")
-"""Faults during which a link that was cut does not count as whole again."""
+CUTS = ("cut", "partition")  # Faults with an end, and reasons of dropped messages, that part two agents
+LOSSES = (*CUTS, "loss", "flap")  # Faults during which a link that was cut does not count as whole again
 
 STANDSTILL, PERIODS = 0.5, 5.0
 """Real time: an agent that decides nothing for so long (s of run time), and for so many control periods, stood

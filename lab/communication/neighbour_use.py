@@ -12,8 +12,7 @@ from gridpeers.lab.communication.sent_states import SentState, StateWindow
 from gridpeers.scenarios.record.decision_entries import INSTANT, Hole, inside
 from gridpeers.wire.journal import Decision
 
-MOST = 20_000
-"""States of an agent that wait for its journal at most: it may be lost, and the agent go on."""
+MOST = 20_000  # States of an agent that wait for its journal at most: it may be lost, and the agent go on
 
 
 class NeighbourUse(NamedTuple):

@@ -19,8 +19,7 @@ from gridpeers.scenarios.record.decision_entries import Hole
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.wire.journal import Decision
 
-MOST_BYTES = 64_000_000
-"""Largest record that is taken into memory: some ten minutes of nine agents."""
+MOST_BYTES = 64_000_000  # Largest record that is taken into memory: some ten minutes of nine agents
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

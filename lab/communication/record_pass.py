@@ -38,8 +38,7 @@ from gridpeers.wire.journal import (
 from gridpeers.wire.messages import PLANT, Journal, LinkReport, State
 from gridpeers.wire.timing import time_of
 
-Link = tuple[str, str]
-"""Sender and receiver."""
+Link = tuple[str, str]  # Sender and receiver
 
 ON_WAY = 1.0
 """Longest time (s of wall time) that a state is on its way, as the check of the account has it by default."""
@@ -47,14 +46,12 @@ ON_WAY = 1.0
 AHEAD = 5.0
 """How far (s of wall time) an entry may be ahead of its journal: far more than clocks of two processes differ by."""
 
-_VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")
-"""Values of a state that checks need."""
+_VALUES = ("sender", "seq", "t", "epoch", "idle", "quiet")  # Values of a state that checks need
 
 _STATE_KEYS = ("state", "set_points")
 """First parts of the keys of states; one that is not for the neighbours has a key of its own."""
 
-_NOT_SOUND = ("corrupt", "garbled")
-"""Kinds of rejected messages whose numbers are not those that were sent."""
+_NOT_SOUND = ("corrupt", "garbled")  # Kinds of rejected messages whose numbers are not those that were sent
 
 _OF_SENDER = ("excess", "stale")
 """Kinds of rejection that a sender's own sound states may have, and of which a journal may have the number alone."""

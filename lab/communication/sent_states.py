@@ -6,8 +6,7 @@ from array import array
 from math import inf
 from typing import NamedTuple
 
-KEPT = 8192
-"""Number of states that a window holds: 2.7 minutes at a control period of 20 ms."""
+KEPT = 8192  # Number of states that a window holds: 2.7 minutes at a control period of 20 ms
 
 WINDOWS = 3
 """Number of processes of which states are kept: decisions are looked at some seconds later, when others may speak."""
@@ -82,8 +81,7 @@ class StateWindow:
         return number
 
 
-_NONE = StateWindow()
-"""Of an agent that has sent nothing."""
+_NONE = StateWindow()  # Of an agent that has sent nothing
 
 
 class SentStates:

@@ -25,11 +25,8 @@ from typing import Any
 from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, plugin_of, table_of
 from gridpeers.wire.plugins.registry import Registry
 
-CHOICE_KEYS = (*KEYS, "name", "off")
-"""Keys of an entry of `checks` that are no limits of the check."""
-
-RETURNS = "returns"
-"""Judges a run whose scenario asks for it: many end before an inverter that trips may return."""
+CHOICE_KEYS = (*KEYS, "name", "off")  # Keys of an entry of `checks` that are no limits of the check
+RETURNS = "returns"  # Judges a run whose scenario asks for it: many end before an inverter that trips may return
 
 LAW_FAILED = "law_failed"
 """Fails a run also without `--require-checks`: the numbers are not those of the law that the scenario names."""

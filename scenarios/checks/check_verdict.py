@@ -19,8 +19,7 @@ CheckStatus = Literal["passed", "failed", "not judged", "off"]
 """Not judged: the record has no data for the check, or the run never was in a state that it is about. Off: the scenario
 takes the check out of the verdict."""
 
-SHOWN_VIOLATIONS = 20
-"""Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`."""
+SHOWN_VIOLATIONS = 20  # Most violations that a verdict keeps; it counts up to `MOST_VIOLATIONS`
 
 MOST_VIOLATIONS = 1_000_000
 """Violations after which a check is asked for no more: some seconds, and a check that never ends yields ever more."""
@@ -122,11 +121,8 @@ def summary(verdicts: tuple[CheckVerdict, ...]) -> str:
     return "; ".join([line, *late, *(verdict.sentence for verdict in failed)])
 
 
-FILE = "checks.json"
-"""Name of the file in the run folder."""
-
-Verdicts = Mapping[str, tuple[CheckVerdict, ...]]
-"""Verdicts of a run by case, in the order of the checks."""
+FILE = "checks.json"  # Name of the file in the run folder
+Verdicts = Mapping[str, tuple[CheckVerdict, ...]]  # Verdicts of a run by case, in the order of the checks
 
 _decoder = msgspec.json.Decoder(dict[str, tuple[CheckVerdict, ...]])
 

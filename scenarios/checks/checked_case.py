@@ -21,8 +21,7 @@ from gridpeers.scenarios.schema.participants import netem_of, without_agent
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.wire.messages import PlantEvent
 
-NEAR = 0.02
-"""Part of its available power within which an inverter counts as at that limit."""
+NEAR = 0.02  # Part of its available power within which an inverter counts as at that limit
 
 _RESTARTS = ("switch", "inverter", "load")
 """Kinds of events from which on a window settles anew: a switch that waited for synchronism, an inverter that was

@@ -22,8 +22,7 @@ from gridpeers.wire.timing import time_of
 Hole = tuple[float, float]
 """Run times (s) between which something is lost: the first one excluded, the last one included."""
 
-INSTANT = 1e-6
-"""Run time (s) far below any control period."""
+INSTANT = 1e-6  # Run time (s) far below any control period
 
 
 class JournalCoverage:

@@ -14,8 +14,7 @@ from gridpeers.wire.codec import CRC, sound
 from gridpeers.wire.journal import ENTRIES, AnyEntry, Entry, Exchange
 from gridpeers.wire.messages import AnyMessage, Measurement, State
 
-_HEAD = b"\xdd"
-"""Begins an array of msgpack, before the number of its values in four bytes."""
+_HEAD = b"\xdd"  # Begins an array of msgpack, before the number of its values in four bytes
 
 _LENGTHS = {kind.__struct_config__.tag: 1 + len(kind.__struct_fields__) for kind in ENTRIES}
 """Number of values of an entry of each kind, with the kind itself."""

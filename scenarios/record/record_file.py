@@ -30,14 +30,9 @@ from gridpeers.wire.wording import suggestion
 _MAGIC = bytes((137, 77, 67, 65, 80, 48, 13, 10))
 _FRAME = struct.Struct("<BQ")
 _TIMES = struct.Struct("<QQQ")
-_FOOTER = 20
-"""Bytes of the record that ends a file."""
-
-RECENT = 8
-"""Chunks whose messages stay in memory."""
-
-MOST_CHUNK = 256_000_000
-"""Most bytes of a chunk: far more than a writer of ours makes of a second."""
+_FOOTER = 20  # Bytes of the record that ends a file
+RECENT = 8  # Chunks whose messages stay in memory
+MOST_CHUNK = 256_000_000  # Most bytes of a chunk: far more than a writer of ours makes of a second
 
 _BROKEN = (
     McapError, struct.error, ValueError, KeyError, OverflowError, MemoryError, zstandard.ZstdError, RuntimeError,

@@ -18,15 +18,11 @@ FORMAT = 2
 """Version of the format. A reader refuses a record of a later one; a new kind of entry or message does not raise it.
 Since 2 events have what became of switches and loads as numbers, not in words alone."""
 
-PROFILE = "gridpeers"
-"""Profile in the header of the file, by which a record of ours is known."""
-
-METADATA = "gridpeers"
-"""Name of the metadata record with the `RecordInfo`."""
+PROFILE = "gridpeers"  # Profile in the header of the file, by which a record of ours is known
+METADATA = "gridpeers"  # Name of the metadata record with the `RecordInfo`
 
 
-LIVE: Literal["live"] = "live"
-"""The driver of a live run, as files name it."""
+LIVE: Literal["live"] = "live"  # The driver of a live run, as files name it
 
 
 class RecordInfo(msgspec.Struct, frozen=True, kw_only=True):

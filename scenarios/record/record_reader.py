@@ -31,8 +31,7 @@ __all__ = ["RecordFileError", "RunRecord"]
 
 T = TypeVar("T")
 
-KINDS = tuple(kind.__name__ for kind in get_args(AnyMessage))
-"""Types of the messages that a record may have."""
+KINDS = tuple(kind.__name__ for kind in get_args(AnyMessage))  # Types of the messages that a record may have
 
 
 class RunRecord:

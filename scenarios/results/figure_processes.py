@@ -22,8 +22,7 @@ if TYPE_CHECKING:
 
 MODULE = "gridpeers.scenarios.results.plots.drawing_process"
 
-MOST = 4
-"""Processes, as far as there are cores: a run has eight figures or a few more."""
+MOST = 4  # Processes, as far as there are cores: a run has eight figures or a few more
 
 
 def prepare_figures() -> None:

@@ -17,8 +17,7 @@ from gridpeers.scenarios.schema.configs import configs
 from gridpeers.scenarios.schema.participants import inverters_of, netem_of, setup_of, with_agent
 from gridpeers.wire.messages import PLANT
 
-NUMBER = 18
-"""Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding."""
+NUMBER = 18  # Bytes of a number in history.csv with its comma: 17.5 measured over 600 s of islanding
 
 VERDICT, VERDICT_UNDER_WAY = 36, 26
 """Bytes of a message's row in links.csv, and in the file of the case that gives way to it."""
@@ -33,11 +32,8 @@ process) and 135 measured."""
 RECORDED_ARRIVAL, RECORDED_VERDICT = 9, 8
 """Bytes of a message that arrives in wall-clock time, and of a verdict of an emulated link: 7.7 and 3 to 9 found."""
 
-LONG = 20_000_000
-"""Bytes from which on a run's size is told before its start."""
-
-HOUR = 3600.0
-"""Run time (s) for which the size of a live run without an end is told."""
+LONG = 20_000_000  # Bytes from which on a run's size is told before its start
+HOUR = 3600.0  # Run time (s) for which the size of a live run without an end is told
 
 MB = 1e6
 

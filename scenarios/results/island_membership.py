@@ -71,8 +71,7 @@ class Island(NamedTuple):
     """Whether the substation is part of it."""
 
 
-Islands = Mapping[str, Island]
-"""Islands by name: that of the first inverter."""
+Islands = Mapping[str, Island]  # Islands by name: that of the first inverter
 
 
 class IslandInterval(NamedTuple):
@@ -85,8 +84,7 @@ class IslandInterval(NamedTuple):
     islands: Islands
 
 
-RowMeasure = Callable[[History, Nameplates], Floats]
-"""A measure of each row."""
+RowMeasure = Callable[[History, Nameplates], Floats]  # A measure of each row
 
 
 def island_intervals(

@@ -20,11 +20,8 @@ from gridpeers.wire.messages import LinkReport
 COLUMNS = ("src", "dst", "seq", "t_s", "delay_s", "fate")
 """Columns of links.csv: one row for each copy of a message, or for a message that was dropped."""
 
-PARTIAL = "links.partial"
-"""Name of the verdicts' file while the case runs; links.csv takes its place."""
-
-_SIZE = 4
-"""Bytes of the size before each part in that file."""
+PARTIAL = "links.partial"  # Name of the verdicts' file while the case runs; links.csv takes its place
+_SIZE = 4  # Bytes of the size before each part in that file
 
 
 class LinkRecord:

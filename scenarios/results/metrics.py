@@ -19,11 +19,8 @@ from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplat
 from gridpeers.scenarios.results.sharing_index import NO_LOAD, mean_over, sharing_index
 from gridpeers.scenarios.results.steadiness import Ends, ends_of, reason
 
-F_BAND, MPSI_BAND = 0.01, 0.01
-"""Frequency (Hz) and MPSI below which a microgrid counts as restored."""
-
-LOAD_BAND = 0.02
-"""Part of the steady total real power within which the load counts as taken over."""
+F_BAND, MPSI_BAND = 0.01, 0.01  # Frequency (Hz) and MPSI below which a microgrid counts as restored
+LOAD_BAND = 0.02  # Part of the steady total real power within which the load counts as taken over
 
 SWING = 2.0
 """Length of the end of a window over which a swing is measured (s), or half of the window if that is shorter. The

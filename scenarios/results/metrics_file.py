@@ -21,8 +21,7 @@ from gridpeers.wire.messages import Pacing
 if TYPE_CHECKING:
     from gridpeers.scenarios.results.findings import Findings
 
-Clock = Literal["simulated", "wall"]
-"""Lock-step of plant and agents, or real time."""
+Clock = Literal["simulated", "wall"]  # Lock-step of plant and agents, or real time
 
 
 @dataclass(frozen=True, kw_only=True)

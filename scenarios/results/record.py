@@ -30,12 +30,10 @@ if TYPE_CHECKING:
 QUANTITIES = ("f_Hz", "P_W", "Q_var", "V_V", "P_set_W", "V_set_V")
 """Columns of each inverter, in the order of `gridpeers.wire.messages.Telemetry.rows`, with their units."""
 
-PARTIAL = "history.partial.csv"
-"""Name of the history while it is incomplete."""
+PARTIAL = "history.partial.csv"  # Name of the history while it is incomplete
 
 
-Row = tuple[float, ...]
-"""As in `gridpeers.wire.messages.Telemetry.rows`."""
+Row = tuple[float, ...]  # As in `gridpeers.wire.messages.Telemetry.rows`
 
 
 class Recorded(msgspec.Struct, frozen=True, kw_only=True):

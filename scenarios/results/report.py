@@ -19,8 +19,7 @@ from gridpeers.scenarios.results.metrics import SHARING, Steady
 from gridpeers.scenarios.results.recorded_events import LawFailure, first_of
 from gridpeers.scenarios.results.steadiness import STEADY
 
-GAP = 2
-"""Spaces behind a column."""
+GAP = 2  # Spaces behind a column
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,8 +72,7 @@ def folded(grid: Grid, width: int) -> Iterator[Grid]:
         )
 
 
-_TABLE = 140
-"""Characters of a table in a file: with four events it would have 200 and more."""
+_TABLE = 140  # Characters of a table in a file: with four events it would have 200 and more
 
 _COLOURS = {"PASS": "green", "FAIL": "bold red", "MISS": "yellow", "NOT RUN": "dim"}
 

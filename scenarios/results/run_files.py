@@ -13,11 +13,8 @@ from pathlib import Path
 
 from gridpeers.wire.driver.ending import OutputLostError
 
-RUNS = Path("runs")
-"""Parent of the run folders that the user does not name, seen from the working directory."""
-
-STATUS = "status.txt"
-"""File that says how far a folder's run is."""
+RUNS = Path("runs")  # Parent of the run folders that the user does not name, seen from the working directory
+STATUS = "status.txt"  # File that says how far a folder's run is
 
 _NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a system that takes no more bytes, whatever is done to the file."""

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-NO_LOAD = 0.001
-"""Part of the ratings below which a total power is too small for its sharing to mean anything."""
+NO_LOAD = 0.001  # Part of the ratings below which a total power is too small for its sharing to mean anything
 
 
 def eta(x: Floats, s: Floats, m: Floats, present: Flags | None = None) -> Floats:

@@ -20,11 +20,8 @@ from gridpeers.scenarios.results.history import Flags, Floats
 STEADY = 0.2
 """Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""
 
-SWINGS = 5.0
-"""Factor by which a measure may swing more within `STEADY` than its mean may move."""
-
-FEWEST = 2
-"""Rows that each of the two means needs at least."""
+SWINGS = 5.0  # Factor by which a measure may swing more within `STEADY` than its mean may move
+FEWEST = 2  # Rows that each of the two means needs at least
 
 
 PARTS: Mapping[str, float] = {"MQSI": 0.05}

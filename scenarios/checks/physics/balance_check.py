@@ -30,8 +30,7 @@ from gridpeers.scenarios.results.island_membership import closed_switches
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.schema.plausible import Plausible, Unit
 
-MOST_NODES = 1500
-"""Nodes above which a feeder takes seconds."""
+MOST_NODES = 1500  # Nodes above which a feeder takes seconds
 
 NEAR, MOST_CORRECTIONS = 1e-6, 20
 """Difference (pu) of a terminal voltage from that of the row at which to end, and most corrections until then."""
@@ -39,8 +38,7 @@ NEAR, MOST_CORRECTIONS = 1e-6, 20
 FIRST = 0.1
 """Part of the difference by which the internal voltage is corrected at first; then the secant says how far."""
 
-KEPT = 32
-"""Number of factored networks to keep: loads of a long run may change hundreds of times."""
+KEPT = 32  # Number of factored networks to keep: loads of a long run may change hundreds of times
 
 Key = TypeVar("Key")
 Value = TypeVar("Value")

@@ -70,11 +70,8 @@ def _fastest(
         )
 
 
-RANK = 1e-3
-"""Part of the largest singular value below which a singular value is noise, or of no account."""
-
-MOST = 16
-"""Most exponentials: eight oscillations, or fewer with a mean and a drift."""
+RANK = 1e-3  # Part of the largest singular value below which a singular value is noise, or of no account
+MOST = 16  # Most exponentials: eight oscillations, or fewer with a mean and a drift
 
 
 class Mode(NamedTuple):
@@ -120,8 +117,7 @@ def modes(x: Floats, dt: float) -> list[Mode]:
     return sorted(found, key=lambda mode: -mode.swing)
 
 
-_FEWEST_ROWS = 30
-"""Rows without which nothing is said."""
+_FEWEST_ROWS = 30  # Rows without which nothing is said
 
 _SAMPLES = 150
 """Samples of a signal in which modes are sought: more rows are averaged, for slow modes, or cut off, for fast ones."""

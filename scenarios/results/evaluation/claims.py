@@ -109,8 +109,7 @@ class Benchmark:
         return next(same, None)
 
 
-NO_BENCHMARK = Benchmark()
-"""The benchmark of a scenario that nobody has published."""
+NO_BENCHMARK = Benchmark()  # The benchmark of a scenario that nobody has published
 
 
 def _benchmark_objection(it: Any) -> str:
@@ -133,8 +132,7 @@ def benchmark_of(key: str | Mapping[str, Any]) -> Benchmark:
 Status = Literal["PASS", "FAIL", "MISS", "NOT RUN"]
 """MISS: it does not hold, for a known reason that is shown; NOT RUN: a case that it is about was left out."""
 
-Judge = Callable[["Findings"], tuple[bool, str]]
-"""Return whether a claim holds, and our value with its unit."""
+Judge = Callable[["Findings"], tuple[bool, str]]  # Return whether a claim holds, and our value with its unit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,11 +26,8 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
 
 
-Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]
-"""A column of the tables, named as in metrics.json."""
-
-Measure = Quantity | Literal["p"]
-"""A steady value: a quantity of the tables, or the powers of the inverters."""
+Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]  # A column of the tables, named as in metrics.json
+Measure = Quantity | Literal["p"]  # A steady value: a quantity of the tables, or the powers of the inverters
 
 UNITS: dict[Measure, str] = {"f_error_Hz": " Hz", "MPSI": "", "V_error": " pu", "MQSI": "", "p": " pu"}
 """Unit as it follows a number."""

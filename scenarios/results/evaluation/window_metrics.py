@@ -22,8 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-LATE = 0.5
-"""Length (s) of the end of a window over which extremes are looked for."""
+LATE = 0.5  # Length (s) of the end of a window over which extremes are looked for
 
 
 @dataclass(frozen=True, kw_only=True)

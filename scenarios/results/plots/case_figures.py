@@ -130,11 +130,8 @@ def curves(axes: Axes, drawing: Drawing, values: Mapping[str, Floats]) -> None:
         axes.plot(history.t, values[case], color=colour, linestyle=dashes, linewidth=width, label=label)
 
 
-WIDTH, HEIGHT = 7.4, 2.3
-"""Size of a figure, and of each row of panels in it (inches)."""
-
-COLUMNS = 2
-"""Panels beside each other."""
+WIDTH, HEIGHT = 7.4, 2.3  # Size of a figure, and of each row of panels in it (inches)
+COLUMNS = 2  # Panels beside each other
 
 _PANELS = (("frequency", "f (Hz)"), ("MPSI", "MPSI"), ("V_error", "mean of abs(V - 1) (pu)"), ("MQSI", "MQSI"))
 """Measures, and the labels of their axes."""

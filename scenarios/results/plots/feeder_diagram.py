@@ -25,20 +25,11 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9")
 BESIDE = "#8a8a8a"
 """The zone of the substation, and buses of no zone."""
 
-WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}
-"""Width of a branch (pt) by its number of phases."""
-
-HALO: Any = [withStroke(linewidth=2.0, foreground="white")]
-"""Around labels, so that they can be read on branches."""
-
-MANY = 400
-"""Buses beyond which loads are not marked and branches are half as wide."""
-
-MOST_ZONES = 10
-"""Microgrids and other zones that the legend names."""
-
-MOST_LABELS = 15
-"""Inverters beyond which their names are left out, which would cover each other."""
+WIDTH = {1: 0.7, 2: 1.1, 3: 2.0}  # Width of a branch (pt) by its number of phases
+HALO: Any = [withStroke(linewidth=2.0, foreground="white")]  # Around labels, so that they can be read on branches
+MANY = 400  # Buses beyond which loads are not marked and branches are half as wide
+MOST_ZONES = 10  # Microgrids and other zones that the legend names
+MOST_LABELS = 15  # Inverters beyond which their names are left out, which would cover each other
 
 
 def feeder_diagram(feeder: Feeder, V: Mapping[str, float] | None = None) -> Figure:

@@ -26,8 +26,7 @@ from gridpeers.scenarios.results.plots.style import (
     widths,
 )
 
-ROUNDS = ("-", "--", ":", "-.")
-"""Lines of the first inverters, of those that have their colours again, and so on."""
+ROUNDS = ("-", "--", ":", "-.")  # Lines of the first inverters, of those that have their colours again, and so on
 
 
 def plug_and_play(drawing: Drawing) -> Figure:
@@ -95,8 +94,7 @@ def powers(drawing: Drawing, *, GFM: bool) -> Figure:
     return figure
 
 
-LOST = 0.3
-"""Distance from nominal (Hz) at which a frequency that does not come back leaves the frame."""
+LOST = 0.3  # Distance from nominal (Hz) at which a frequency that does not come back leaves the frame
 
 
 def available_power(drawing: Drawing) -> Figure:

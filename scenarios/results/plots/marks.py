@@ -16,29 +16,17 @@ from gridpeers.scenarios.results.plots.style import time_axis
 
 Panels = NDArray[Any]
 
-TextSide = Literal["left", "center", "right"]
-"""Which part of a text stands at the line."""
+TextSide = Literal["left", "center", "right"]  # Which part of a text stands at the line
 
 BLACK, GREY = "#000000", "#444444"
 """Colours of lines and words."""
 
-LETTER = 0.056
-"""Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt."""
-
-LONGEST = 20
-"""Letters of a word that is written whole."""
-
-GAP = 0.06
-"""Least distance between two texts (inches)."""
-
-ROUNDING = 1e-9
-"""By how much less (inches) is no less: an edge at GAP from a text may come out so by the last bit."""
-
-MOST = 12.0
-"""Lines in an inch of a frame that leave its curves to be seen."""
-
-FRAME = 0.78
-"""Part of a column of panels that is the frame of one; the rest are its axis and margins."""
+LETTER = 0.056  # Width of a letter of these texts (inches), a little more than the mean of DejaVu Sans at 7 pt
+LONGEST = 20  # Letters of a word that is written whole
+GAP = 0.06  # Least distance between two texts (inches)
+ROUNDING = 1e-9  # By how much less (inches) is no less: an edge at GAP from a text may come out so by the last bit
+MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
+FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
 
 
 class EventText(NamedTuple):

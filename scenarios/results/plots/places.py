@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from gridpeers.plant.equipment import Feeder
 
-Places = Mapping[str, tuple[float, float]]
-"""Place of each bus (drawing units)."""
+Places = Mapping[str, tuple[float, float]]  # Place of each bus (drawing units)
 
 
 def places(feeder: Feeder) -> dict[str, tuple[float, float]]:
@@ -83,14 +82,12 @@ def _depth_first(root: str, children: Mapping[str, list[str]]) -> list[str]:
 
 Points = NDArray[np.float64]
 
-WIDTH, HEIGHT = 0.62, 1.2
-"""Width of a letter and height of a line beside the size of the type, about."""
+WIDTH, HEIGHT = 0.62, 1.2  # Width of a letter and height of a line beside the size of the type, about
 
 SIDES = ((1, 1), (1, -1), (-1, 1), (-1, -1), (0, 1), (0, -1), (1, 0), (-1, 0))
 """Sides of a mark on which its label can stand, to the right and upwards, the preferred one first."""
 
-PREFERENCE = 0.05
-"""Length of line (pt) that a label rather covers than to stand on the next side."""
+PREFERENCE = 0.05  # Length of line (pt) that a label rather covers than to stand on the next side
 
 WORD, MARK = 20.0, 6.0
 """Length of line (pt) that a label rather covers than a square point of another label, or of a mark."""

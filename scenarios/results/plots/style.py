@@ -22,8 +22,7 @@ from gridpeers.scenarios.results.plots.drawing import Drawing
 
 LineStyle = tuple[str, Any]
 
-Style = tuple[str, Any, float]
-"""Colour, dash pattern and line width (pt)."""
+Style = tuple[str, Any, float]  # Colour, dash pattern and line width (pt)
 
 CASE_STYLES: dict[str, LineStyle] = {
     "I": ("#7a7a7a", "-"),
@@ -48,8 +47,7 @@ CASE_STYLES: dict[str, LineStyle] = {
 """Styles of the paper's cases. The full graph under full coordination is always blue. Less and less available power
 goes from dark to light, after the palette viridis."""
 
-TITLE_LENGTH = 48
-"""Characters of a panel's title that fit above half a page."""
+TITLE_LENGTH = 48  # Characters of a panel's title that fit above half a page
 
 OTHER_STYLES: tuple[LineStyle, ...] = (
     ("#0072b2", "-"),
@@ -208,8 +206,7 @@ def legend_below(figure: Figure, axes: Axes, *, one_row: bool = False) -> None:
     figure.legend(handles, labels, loc="outside lower center", ncols=ncols)
 
 
-Format = Literal["png", "pdf", "svg"]
-"""Kind of file, as its name ends."""
+Format = Literal["png", "pdf", "svg"]  # Kind of file, as its name ends
 
 _REPRODUCIBLE: Any = {"svg.hashsalt": "gridpeers", "svg.fonttype": "path", "pdf.fonttype": 42}
 """The salt stands in place of a random number from which an SVG's inner names are made. An SVG has letters as curves,
