@@ -32,10 +32,10 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.checks.check_registry import CHECKS
     from gridpeers.scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.results.evaluation.claims import CLAIMS, Claim
-    from gridpeers.scenarios.results.evaluation.metric import METRICS
-    from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
+    from gridpeers.scenarios.results.claims import CLAIMS, Claim
+    from gridpeers.scenarios.results.metric import METRICS
     from gridpeers.scenarios.results.run_files import FolderError
+    from gridpeers.scenarios.results.window_metrics import WindowData
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema.loading import catalogue
     from gridpeers.scenarios.schema.scenario_errors import ScenarioError
@@ -51,7 +51,7 @@ _HOME = {
     "Check": "gridpeers.scenarios.checks.check_verdict",
     "CheckVerdict": "gridpeers.scenarios.checks.check_verdict",
     "CheckedCase": "gridpeers.scenarios.checks.checked_case",
-    "Claim": "gridpeers.scenarios.results.evaluation.claims",
+    "Claim": "gridpeers.scenarios.results.claims",
     "Comparison": "gridpeers.studies.comparison",
     "Feeder": "gridpeers.feeder",
     "FolderError": "gridpeers.scenarios.results.run_files",
@@ -71,16 +71,16 @@ _HOME = {
     "Terms": "gridpeers.agents.laws.law",
     "Unit": "gridpeers.wire.schema.plausible",
     "Violation": "gridpeers.scenarios.checks.check_verdict",
-    "WindowData": "gridpeers.scenarios.results.evaluation.window_metrics",
+    "WindowData": "gridpeers.scenarios.results.window_metrics",
     "catalogue": "gridpeers.scenarios.schema.loading",
     "check": "gridpeers.scenarios.checks.check_registry:CHECKS.register",
-    "claim": "gridpeers.scenarios.results.evaluation.claims:CLAIMS.register",
+    "claim": "gridpeers.scenarios.results.claims:CLAIMS.register",
     "compare": "gridpeers.studies.comparison",
     "graph": "gridpeers.agents.graphs:GRAPHS.register",
     "law": "gridpeers.agents.carriers.law_registry:LAWS.register",
     "link_fault": "gridpeers.netem.models.own_fault:FAULTS.register",
     "load": "gridpeers.scenario",
-    "metric": "gridpeers.scenarios.results.evaluation.metric:METRICS.register",
+    "metric": "gridpeers.scenarios.results.metric:METRICS.register",
     "read": "gridpeers.runs.running",
     "sweep": "gridpeers.studies.sweeping",
 }

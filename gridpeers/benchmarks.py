@@ -5,7 +5,7 @@ A scenario names a benchmark in its key `paper`, by a registered name or as "mod
 
 from __future__ import annotations
 
-from gridpeers.scenarios.results.evaluation.claims import (
+from gridpeers.scenarios.results.claims import (
     BENCHMARKS,
     Benchmark,
     Claim,
@@ -15,8 +15,8 @@ from gridpeers.scenarios.results.evaluation.claims import (
     benchmark_of,
     judge,
 )
-from gridpeers.scenarios.results.evaluation.metric import DIGITS, HEADINGS, UNITS, Quantity, label
 from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metric import DIGITS, HEADINGS, UNITS, Quantity, label
 from gridpeers.scenarios.results.metrics import F_BAND, MPSI_BAND, Settling, Steady
 
 __all__ = [

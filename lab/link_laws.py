@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import special, stats
 
-from gridpeers import Check, NotJudgedError, Range, Violation
 from gridpeers.netem.draws import RESTART, Stream
 from gridpeers.netem.fault_schedule import GATES
 from gridpeers.netem.ledger import LinkTrace, Outcome, copies_of
@@ -28,10 +27,12 @@ from gridpeers.netem.models.own_fault import DROPPED_BY_OWN, judge_of
 from gridpeers.netem.schema.fault import Span
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.netem.schema.pattern import Link
+from gridpeers.scenarios.checks.check_verdict import Check, NotJudgedError, Violation
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.wire.plugins.plugin import Plugin
+from gridpeers.wire.schema.plausible import Range
 
 MASKS = ("rate", "slots")  # add to a delay, so that its law cannot be seen alone
 

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
+from gridpeers import metric
 from gridpeers.agents import graphs
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.carriers.law_registry import LAWS
@@ -22,14 +23,14 @@ from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.netem.schema.partition import Partition
+from gridpeers.papers.singhal2022.islanding_claims import claims
 from gridpeers.plant import simulators
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
 from gridpeers.scenarios.checks.check_registry import CHECKS
-from gridpeers.scenarios.results.evaluation import claims, metric
-from gridpeers.scenarios.results.evaluation.claims import CLAIMS
-from gridpeers.scenarios.results.evaluation.metric import METRICS
+from gridpeers.scenarios.results.claims import CLAIMS
+from gridpeers.scenarios.results.metric import METRICS
 from gridpeers.scenarios.schema.scenario_model import (
     Case,
     Event,

@@ -15,7 +15,7 @@ import msgspec
 
 from gridpeers.plant.realtime.pacer import sentence
 from gridpeers.plant.simulators import SIMULATORS
-from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
 from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
 from gridpeers.scenarios.results.record import Recorded
@@ -96,7 +96,7 @@ def _run(request: Request, progress: Progress, log: TextIO) -> RunReport:
     from gridpeers.scenarios.checks.check_verdict import FILE, verdicts_json
     from gridpeers.scenarios.checks.checked_case import CheckedCase
     from gridpeers.scenarios.checks.judging import JudgingStop, judge_case
-    from gridpeers.scenarios.results.evaluation.claims import judge, judged
+    from gridpeers.scenarios.results.claims import judge, judged
     from gridpeers.scenarios.results.findings import find
     from gridpeers.scenarios.results.recorded_events import law_failures
     from gridpeers.scenarios.results.report import RunReport, plain

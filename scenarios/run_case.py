@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from gridpeers.plant.plant_interface import PlantLike
 
 _AFTER_RUN = (
-    *("results.event_windows", "results.findings", "results.evaluation.claims", "results.report"),
+    *("results.event_windows", "results.findings", "results.claims", "results.report"),
     *("results.plots.drawing", "checks.judging"),
 )
 """Modules of `gridpeers.scenarios` that are used after a run, with numpy and scipy, and imported while it goes on, as

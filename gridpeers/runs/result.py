@@ -24,7 +24,7 @@ from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.live.departures import compare
 from gridpeers.scenarios.live.live_report import live_drawing
 from gridpeers.scenarios.record.record_info import LIVE
-from gridpeers.scenarios.results.evaluation.claims import Verdict, benchmark_of, judge, judged
+from gridpeers.scenarios.results.claims import Verdict, benchmark_of, judge, judged
 from gridpeers.scenarios.results.event_windows import CaseRecord, as_they_came, windows
 from gridpeers.scenarios.results.findings import Findings, find
 from gridpeers.scenarios.results.history import History, read_history

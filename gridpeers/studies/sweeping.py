@@ -12,8 +12,8 @@ import pandas as pd
 
 from gridpeers.runs.running import warn_of_laws
 from gridpeers.scenario import Scenario, as_scenario, plain
-from gridpeers.scenarios.results.evaluation.metric import METRICS
 from gridpeers.scenarios.results.history import History
+from gridpeers.scenarios.results.metric import METRICS
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.plugin_keys import check_portable, metrics_of
 from gridpeers.scenarios.schema.scenario_errors import Problems, ScenarioError

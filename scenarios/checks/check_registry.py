@@ -44,14 +44,14 @@ CHECKS: Registry[Any] = Registry(
     own={
         name: f"gridpeers.scenarios.checks.{place}"
         for name, place in {
-            "frequency": "physics.band_checks:Frequency",
-            "voltage": "physics.band_checks:Voltage",
-            "power_sharing": "physics.sharing_checks:PowerSharing",
-            "var_sharing": "physics.sharing_checks:VarSharing",
-            "rating": "physics.band_checks:Rating",
-            "oscillation": "physics.rest_checks:Oscillation",
-            "steady": "physics.rest_checks:SteadyEnd",
-            "power_balance": "physics.balance_check:PowerBalance",
+            "frequency": "band_checks:Frequency",
+            "voltage": "band_checks:Voltage",
+            "power_sharing": "sharing_checks:PowerSharing",
+            "var_sharing": "sharing_checks:VarSharing",
+            "rating": "band_checks:Rating",
+            "oscillation": "rest_checks:Oscillation",
+            "steady": "rest_checks:SteadyEnd",
+            "power_balance": "balance_check:PowerBalance",
             "returns": "event_checks:Returned",
             "law_failed": "event_checks:LawFailed",
         }.items()

@@ -16,7 +16,7 @@ from gridpeers.scenarios.console import terminal
 from gridpeers.scenarios.live.departures import Departures, compare, few
 from gridpeers.scenarios.live.live_files import ended_scenario, write_scenario
 from gridpeers.scenarios.live.live_processes import ProcessOutcome
-from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, benchmark_of
+from gridpeers.scenarios.results.claims import NO_BENCHMARK, benchmark_of
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window, as_they_came, late_moves
 from gridpeers.scenarios.results.findings import find
 from gridpeers.scenarios.results.history import History

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from gridpeers.plant.equipment import F_NOM, Feeder
-from gridpeers.scenarios.results.evaluation.claims import Published
-from gridpeers.scenarios.results.evaluation.metric import Measured, label
-from gridpeers.scenarios.results.evaluation.window_metrics import own_measures
+from gridpeers.scenarios.results.claims import Published
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.history import Nameplates
 from gridpeers.scenarios.results.island_membership import island_intervals, islands_at_end, part_of
+from gridpeers.scenarios.results.metric import Measured, label
 from gridpeers.scenarios.results.metrics import Settling, Steady, measure, settling
+from gridpeers.scenarios.results.window_metrics import own_measures
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.configs import limits_of
 from gridpeers.scenarios.schema.participants import without_agent

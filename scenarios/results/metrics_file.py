@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import msgspec
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.results.evaluation.metric import UNITS, Measure
+from gridpeers.scenarios.results.metric import UNITS, Measure
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.wire.messages import Pacing

@@ -12,9 +12,9 @@ from rich.text import Text
 
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict, summary
 from gridpeers.scenarios.console import text_of
-from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, Benchmark, Verdict
-from gridpeers.scenarios.results.evaluation.metric import DIGITS, UNITS, Quantity, heading, label
+from gridpeers.scenarios.results.claims import NO_BENCHMARK, Benchmark, Verdict
 from gridpeers.scenarios.results.findings import Findings
+from gridpeers.scenarios.results.metric import DIGITS, UNITS, Quantity, heading, label
 from gridpeers.scenarios.results.metrics import SHARING, Steady
 from gridpeers.scenarios.results.recorded_events import LawFailure, first_of
 from gridpeers.scenarios.results.steadiness import STEADY

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gridpeers.scenarios.results.evaluation.metric import DIGITS, UNITS, Measure
 from gridpeers.scenarios.results.history import Flags, Floats
+from gridpeers.scenarios.results.metric import DIGITS, UNITS, Measure
 
 STEADY = 0.2
 """Length of the end of a window over which steady values are means (s); 12 periods of 60 Hz, ten control periods."""

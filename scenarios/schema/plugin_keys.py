@@ -18,8 +18,8 @@ from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.scenarios.checks.check_registry import ALWAYS as ALWAYS_CHECKED
 from gridpeers.scenarios.checks.check_registry import CHECKS, LAW_FAILED, switched_off
-from gridpeers.scenarios.results.evaluation.claims import BENCHMARKS, CLAIMS
-from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, good_name, name_of
+from gridpeers.scenarios.results.claims import BENCHMARKS, CLAIMS
+from gridpeers.scenarios.results.metric import ALWAYS, METRICS, good_name, name_of
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel

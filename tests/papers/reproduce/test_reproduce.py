@@ -13,7 +13,7 @@ from gridpeers.papers.singhal2022.reproduce.report import Reproduction, lines, m
 from gridpeers.papers.singhal2022.reproduce.studies import graphs
 from gridpeers.papers.singhal2022.reproduce.work import PartResult
 from gridpeers.papers.singhal2022.tables import TABLES, Cell, tables_of
-from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.schema import load_scenario

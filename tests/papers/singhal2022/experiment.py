@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
-from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.event_windows import CaseRecord, windows
 from gridpeers.scenarios.results.findings import Findings, SteadyValues, find
 from gridpeers.scenarios.results.history import History, Nameplates

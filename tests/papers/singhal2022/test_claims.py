@@ -7,7 +7,7 @@ import pytest
 from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, headline, numbers
 from gridpeers.papers.singhal2022.tables import TABLE, tables_of
-from gridpeers.scenarios.results.evaluation.claims import Verdict, judge
+from gridpeers.scenarios.results.claims import Verdict, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Settling, Steady
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.catalogue_files import CATALOGUE
-from gridpeers.scenarios.results.evaluation.claims import (
+from gridpeers.scenarios.results.claims import (
     BENCHMARKS,
     NO_BENCHMARK,
     Benchmark,
@@ -24,9 +24,9 @@ from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 
 MODULE = """
-from gridpeers.scenarios.results.evaluation.claims import Benchmark
-from gridpeers.scenarios.results.evaluation.claims import Claim
-from gridpeers.scenarios.results.evaluation.claims import Published
+from gridpeers.scenarios.results.claims import Benchmark
+from gridpeers.scenarios.results.claims import Claim
+from gridpeers.scenarios.results.claims import Published
 
 PLACE = {"case": "IV", "event": "event1", "quantity": "MPSI"}
 MINE = Benchmark(

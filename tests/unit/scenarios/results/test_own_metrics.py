@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gridpeers.scenarios.results.evaluation.claims import CLAIMS, Claim, judged
-from gridpeers.scenarios.results.evaluation.metric import ALWAYS, METRICS, make_metrics, measured, name_of
-from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
+from gridpeers.scenarios.results.claims import CLAIMS, Claim, judged
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates, read_only
+from gridpeers.scenarios.results.metric import ALWAYS, METRICS, make_metrics, measured, name_of
 from gridpeers.scenarios.results.metrics import Steady
+from gridpeers.scenarios.results.window_metrics import WindowData
 from gridpeers.scenarios.sweep.sweep_table import unit_of
 from gridpeers.wire.plugins.plugin import Plugin, plugin_problems
 from gridpeers.wire.plugins.registry import PluginError

@@ -10,7 +10,7 @@ import pytest
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
 from gridpeers.papers.singhal2022.tables import tables_of
 from gridpeers.scenarios.console import terminal
-from gridpeers.scenarios.results.evaluation.claims import NO_BENCHMARK, judge
+from gridpeers.scenarios.results.claims import NO_BENCHMARK, judge
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.metrics import Steady
 from gridpeers.scenarios.results.metrics_file import RunMetrics, metrics_json

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS, ISLANDING
-from gridpeers.scenarios.results.evaluation.claims import judge
+from gridpeers.scenarios.results.claims import judge
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.findings import Findings
 from gridpeers.scenarios.results.history import History, Nameplates

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gridpeers.plant.equipment import Feeder
-from gridpeers.scenarios.results.evaluation.metric import Measured, make_metrics, measured
 from gridpeers.scenarios.results.event_windows import CaseRecord, Window
 from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates, read_only
+from gridpeers.scenarios.results.metric import Measured, make_metrics, measured
 from gridpeers.scenarios.results.metrics import SHARING, Settling, Steady, measure, settling
 from gridpeers.scenarios.schema import ScenarioModel
 from gridpeers.scenarios.schema.participants import without_agent

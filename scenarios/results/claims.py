@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from gridpeers.scenarios.results.evaluation.metric import Measure, Quantity
+from gridpeers.scenarios.results.metric import Measure, Quantity
 from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_of
 from gridpeers.wire.plugins.registry import PluginError, Registry

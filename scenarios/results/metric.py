@@ -23,7 +23,7 @@ from gridpeers.wire.plugins.registry import PluginError, Registry
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
-    from gridpeers.scenarios.results.evaluation.window_metrics import WindowData
+    from gridpeers.scenarios.results.window_metrics import WindowData
 
 
 Quantity = Literal["f_error_Hz", "MPSI", "V_error", "MQSI"]  # A column of the tables, named as in metrics.json
@@ -73,7 +73,7 @@ METRICS: Registry[Any] = Registry(
     "metric",
     "metrics",
     lambda it: callable_objection(it, "window", (*KEYS, "name")),
-    own={name: f"gridpeers.scenarios.results.evaluation.window_metrics:{name}" for name in _OURS},
+    own={name: f"gridpeers.scenarios.results.window_metrics:{name}" for name in _OURS},
 )
 
 

@@ -13,7 +13,7 @@ from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
-from gridpeers.scenarios.checks.physics.balance_check import IslandBalance, IslandPowerFlow, NetworkState
+from gridpeers.scenarios.checks.balance_check import IslandBalance, IslandPowerFlow, NetworkState
 from tests.unit.bridges.proposal.test_feeder_proposal import series
 
 V_NOM = 2400.0

@@ -1,1 +1,0 @@
-"""Checks of what the plant recorded: frequency, voltage, sharing, loading, oscillation, balance."""
