@@ -29,6 +29,7 @@ from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protectio
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest
 from gridpeers.scenarios.checks import check_registry
 from gridpeers.scenarios.checks.check_registry import CHECKS
+from gridpeers.scenarios.results import claims, metric
 from gridpeers.scenarios.results.claims import CLAIMS
 from gridpeers.scenarios.results.metric import METRICS
 from gridpeers.scenarios.schema.scenario_model import (

@@ -29,6 +29,10 @@ MOST = 12.0  # Lines in an inch of a frame that leave its curves to be seen
 FRAME = 0.78  # Part of a column of panels that is the frame of one; the rest are its axis and margins
 
 
+_SIDES: tuple[tuple[TextSide, float, float], ...] = (("center", 0.5, 0.0), ("left", 0.0, 1.0), ("right", 1.0, 1.0))
+"""Sides, with the part of a text that stands before its line, and their price."""
+
+
 class EventText(NamedTuple):
     text: str
     mark: Mark
@@ -113,7 +117,7 @@ def _options(mark: Mark, inches_per_s: float) -> list[_Option]:
     found = [_Option(30.0 if both else 0.0)]
     for text, price in prices.items():
         width = LETTER * max(map(len, text.split("\n")))
-        for side, before, more in (("center", 0.5, 0.0), ("left", 0.0, 1.0), ("right", 1.0, 1.0)):
+        for side, before, more in _SIDES:
             start = mark.t * inches_per_s - before * width
             if text:
                 found.append(_Option(price + more, (EventText(text, mark, side),), start, start + width))
