@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
-from array import array
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import nullcontext
 from io import StringIO
 from pathlib import Path
 
@@ -32,7 +32,8 @@ class LinkRecord:
 
     def __init__(self, folder: Path | None = None) -> None:
         self._file = None if folder is None else folder / PARTIAL
-        self._traces: list[LinkTrace] = []
+        self._parts: dict[tuple[str, str], list[LinkTrace | int]] = {}
+        """Verdicts of each link as they were reported, or their places in the file."""
         self.counts: dict[tuple[str, str], LinkCounts] = {}
         """Counts of the messages of each link (src, dst)."""
         self.garbled = 0
@@ -54,13 +55,13 @@ class LinkRecord:
             self._sha256[report.sender] = data.sha256
 
     def _keep(self, traces: tuple[LinkTrace, ...]) -> None:
-        if self._file is None:
-            self._traces += traces
-        elif traces:
-            with self._file.open("ab") as file:
-                for trace in traces:
-                    encoded = _encode(trace)
+        with nullcontext() if self._file is None or not traces else self._file.open("ab") as file:
+            for trace in traces:
+                part: LinkTrace | int = trace
+                if file is not None:
+                    encoded, part = _encode(trace), file.tell()
                     file.write(len(encoded).to_bytes(_SIZE, "little") + encoded)
+                self._parts.setdefault((trace.src, trace.dst), []).append(part)
 
     @property
     def sent(self) -> int:
@@ -81,43 +82,15 @@ class LinkRecord:
         )
 
     def traces(self) -> Iterator[LinkTrace]:
-        """Yield the verdicts in parts, as they were reported."""
-        yield from self._traces
-        yield from (trace for _, trace in self._in_file())
-
-    def _in_file(self) -> Iterator[tuple[int, LinkTrace]]:
-        if self._file is not None and self._file.exists():
-            with self._file.open("rb") as file:
-                while size := file.read(_SIZE):
-                    yield file.tell(), _decode(file.read(int.from_bytes(size, "little")))
-
-    def sorted_parts(self) -> Iterator[LinkTrace]:
         """Yield the verdicts in parts, link by link; of those in the file only one part at a time is in memory."""
-        places: dict[tuple[str, str], array[int]] = {}
-        for place, trace in self._in_file():
-            places.setdefault((trace.src, trace.dst), array("Q")).append(place)
-        yield from sorted(self._traces, key=lambda trace: (trace.src, trace.dst))
-        if self._file is None or not places:
-            return
-        with self._file.open("rb") as file:
-            for link in sorted(places):
-                for place in places[link]:
-                    file.seek(place - _SIZE)
-                    yield _decode(file.read(int.from_bytes(file.read(_SIZE), "little")))
-
-    def by_link(self) -> dict[tuple[str, str], LinkTrace]:
-        parts: dict[tuple[str, str], list[LinkTrace]] = {}
-        for part in self.traces():
-            parts.setdefault((part.src, part.dst), []).append(part)
-        return {
-            link: LinkTrace(
-                *link,
-                tuple(seq for part in of for seq in part.seq),
-                tuple(t for part in of for t in part.t),
-                tuple(outcome for part in of for outcome in part.outcome),
-            )
-            for link, of in sorted(parts.items())
-        }
+        with nullcontext() if self._file is None or not self._parts else self._file.open("rb") as file:
+            for link in sorted(self._parts):
+                for part in self._parts[link]:
+                    if isinstance(part, LinkTrace):
+                        yield part
+                    elif file is not None:
+                        file.seek(part)
+                        yield _decode(file.read(int.from_bytes(file.read(_SIZE), "little")))
 
     def write(self, folder: Path) -> list[str]:
         """Write links.csv and links.json, and return the lines for the report; nothing if no message was sent."""
@@ -135,7 +108,7 @@ class LinkRecord:
         text = StringIO()
         writer = csv.writer(text, lineterminator="\n")
         writer.writerow(COLUMNS)
-        for trace in self.sorted_parts():
+        for trace in self.traces():
             writer.writerows(_rows(trace))
             yield text.getvalue()
             text.seek(0)

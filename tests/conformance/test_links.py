@@ -14,6 +14,7 @@ from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.run_request import Outcome
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.schema.configs import configs
+from tests.toy.link_traces import by_link
 
 STORM = """
 seed = 7
@@ -149,8 +150,8 @@ def test_links_without_faults_change_nothing(folder: Path) -> None:
 def test_a_cut_elsewhere_changes_no_other_links_fate(folder: Path, storm: Ran) -> None:
     """Each link looks its numbers up by itself: the verdicts of all links but the cut one stay, message by message."""
     (folder / "more.toml").write_text(STORM + '[[link]]\non = "inv1 -> inv4"\nfrom_s = 0.2\nto_s = 0.4\ncut = true\n')
-    more = run(folder / "more.toml", processes=False).links.by_link()
-    before = storm.links.by_link()
+    more = by_link(run(folder / "more.toml", processes=False).links)
+    before = by_link(storm.links)
 
     assert {link for link in before if before[link].outcome != more[link].outcome} == {("inv1", "inv4")}
 

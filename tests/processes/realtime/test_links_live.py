@@ -22,6 +22,7 @@ from gridpeers.scenarios.emulation.link_data import EmulationConfig, LinkCommand
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.schema import load_scenario
 from tests.processes.terminals import Desk
+from tests.toy.link_traces import by_link
 from tests.toy.town import Town
 from tests.toy.toy_configs import toy_configs
 from tests.toy.toy_plant import ToyPlant
@@ -57,7 +58,7 @@ def simulated(told: EmulationConfig, end: float) -> dict[tuple[str, str], LinkTr
     agents = tuple(replace(agent, links=told.to_tree()) for agent in agents)
     outcome = run_inprocess(plant, agents, lambda telemetry: None, on_other=links, plant=ToyPlant(plant))  # type: ignore[arg-type]  # there are no journals
     assert outcome.broke == ""
-    return links.by_link()
+    return by_link(links)
 
 
 def give(town: Town, order: LinkCommand, *receivers: str) -> float:
@@ -110,7 +111,7 @@ def test_orders_act_at_the_next_tick_on_every_link_and_on_who_comes_later(tmp_pa
         wait(town, 2.5)  # a report comes every 2 s
         assert town.command("down").ok
         assert [town.until_ended(name) for name in (*FOUR, "plant")] == [0] * 5
-        traces = town.link_record.by_link()
+        traces = by_link(town.link_record)
         changes = [LinkCommand.of_tree(order.link_command).at(order.t) for order in town.orders]
 
     heard_at = [event.t for event in town.events if event.kind == "link"]
@@ -160,7 +161,7 @@ def test_a_scenarios_links_and_nodes_in_wall_clock_time(tmp_path: Path) -> None:
     assert (outcome.broke, outcome.notes) == ("", ())
     assert [event.subject for event in outcome.events if "died" in event.text] == ["inv4"]
     assert all(book.closes for book in links.counts.values())
-    found = {link: fates(trace) for link, trace in links.by_link().items()}
+    found = {link: fates(trace) for link, trace in by_link(links).items()}
     for link in (("inv1", "inv2"), ("inv1", "inv3"), ("plant", "inv2"), ("inv2", "plant")):
         expected = fates(calm[link])
         common = [n for n in sorted(found[link]) if n in expected and found[link][n][1] != "partition"]

@@ -23,6 +23,7 @@ from gridpeers.wire.driver.inbox import Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import AgentStatus, LinkReport, LinkRequest, Message, Telemetry
 from tests.hostile.cases import Truth, hostile
+from tests.toy.link_traces import by_link
 from tests.toy.toy_configs import agent_config
 
 KEYS = Keys("lab")
@@ -149,7 +150,7 @@ def test_a_book_of_links_that_cannot_be_is_counted_and_not_recorded(body: object
 
     assert record.garbled == 1
     assert record.counts == {}
-    assert dict(record.by_link()) == {}
+    assert dict(by_link(record)) == {}
 
 
 def test_a_sound_book_is_recorded() -> None:

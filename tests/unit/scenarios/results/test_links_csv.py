@@ -18,6 +18,7 @@ from gridpeers.scenarios.emulation.link_data import report_data
 from gridpeers.scenarios.results.link_record import COLUMNS, LinkRecord
 from gridpeers.scenarios.results.record import Recorder
 from gridpeers.wire.messages import LinkReport, Telemetry
+from tests.toy.link_traces import by_link
 
 
 def test_every_row_of_links_csv_has_the_header_s_columns_whatever_befell_the_message(tmp_path: Path) -> None:
@@ -126,7 +127,7 @@ def test_verdicts_on_disk_are_those_in_memory_and_take_no_memory(tmp_path: Path)
                 before, _ = tracemalloc.get_traced_memory()
     grown = tracemalloc.get_traced_memory()[0] - before
     tracemalloc.stop()
-    (mine,), (theirs,) = on_disk.by_link().values(), in_memory.by_link().values()
+    (mine,), (theirs,) = by_link(on_disk).values(), by_link(in_memory).values()
     tracemalloc.start()
     on_disk.write(tmp_path)
     peak = tracemalloc.get_traced_memory()[1]
