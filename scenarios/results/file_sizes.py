@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 from gridpeers.agents.graphs import GraphError, in_neighbours
 from gridpeers.netem.schema.pattern import Link
-from gridpeers.plant.equipment import Feeder
+from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.scenarios.results.metrics_file import Clock
 from gridpeers.scenarios.results.record import QUANTITIES
 from gridpeers.scenarios.results.run_files import FolderError, shown
@@ -75,22 +76,36 @@ def file_sizes(
     on the run, by a third or so.
     """
     time, end = scenario.time, scenario.time.end_s if seconds is None else seconds
-    rows, ticks = round(end / time.record_s) + 1, round(end / time.T_c_s)
-    history = links = record = most = 0
+    ticks = round(end / time.T_c_s)
+    numbers = (round(end / time.record_s) + 1) * (1 + len(QUANTITIES) * len(inverters_of(scenario, feeder)))
+    links = record = most = 0
     for case in scenario.cases:
-        numbers = rows * (1 + len(QUANTITIES) * len(inverters_of(scenario, feeder)))
-        history += numbers * NUMBER
-        messages = ticks * _impaired_links(scenario, feeder, case)
+        agents = {row.name: row for row in with_agent(scenario, feeder, case)}
+        setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=False)
+        arrivals, faults = clock == "wall" and scenario.record == "all", setup.netem.links or setup.netem.partitions
+        used = _links_used(scenario, feeder, case, agents) if arrivals or faults else []
+        messages = ticks * sum(bool(setup.netem.spans(link, setup.microgrids)) for link in used)
         links += messages * VERDICT
         most = max(most, messages * VERDICT_UNDER_WAY)
         record += numbers * RECORDED_NUMBER
         if scenario.record != "physics":
-            agents = len(with_agent(scenario, feeder, case))
-            record += ticks * agents * RECORDED_DECISION[clock] + messages * RECORDED_VERDICT
-            if clock == "wall" and scenario.record == "all":  # its measurement, and its state at the plant, too
-                links_used = len(_links_of_agents(scenario, feeder, case))
-                record += ticks * (links_used + 2 * agents) * RECORDED_ARRIVAL
+            record += ticks * len(agents) * RECORDED_DECISION[clock] + messages * RECORDED_VERDICT
+            record += ticks * len(used) * RECORDED_ARRIVAL if arrivals else 0
+    history = len(scenario.cases) * numbers * NUMBER
     return FileSizes(history, links, record, history + links + record + most)
+
+
+def _links_used(scenario: ScenarioModel, feeder: Feeder, case: str, members: Mapping[str, InverterRow]) -> list[Link]:
+    """Return the links that carry messages in a case; between agents all that are possible, by a graph that fails."""
+    used = [link for name in members for link in (Link(PLANT, name), Link(name, PLANT))]
+    for agent in configs(scenario, feeder, case)[1]:
+        if agent.name in members:
+            try:
+                heard = in_neighbours(agent.control, agent.name, members)
+            except GraphError:
+                heard = tuple(other for other in members if other != agent.name)
+            used += [Link(other, agent.name) for other in heard]
+    return used
 
 
 def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None:
@@ -108,29 +123,3 @@ def require_room(folder: Path, sizes: FileSizes, option: str = "folder") -> None
             f"{shown(folder)}: the run needs about {sizes.room / MB:.0f} MB, and its disk has {free / MB:.0f} MB left; "
             f"make room, give a folder on another disk by {option}, or write a larger record_s or fewer cases"
         )
-
-
-def _impaired_links(scenario: ScenarioModel, feeder: Feeder, case: str) -> int:
-    setup = setup_of(netem_of(scenario, case), scenario, feeder, real_nodes=False)
-    netem = setup.netem
-    if not (netem.links or netem.partitions):
-        return 0
-    members = [row.name for row in with_agent(scenario, feeder, case)]
-    used = [link for name in members for link in (Link(PLANT, name), Link(name, PLANT))]
-    used += _links_of_agents(scenario, feeder, case)
-    return sum(bool(netem.spans(link, setup.microgrids)) for link in used)
-
-
-def _links_of_agents(scenario: ScenarioModel, feeder: Feeder, case: str) -> list[Link]:
-    members = {row.name: row for row in with_agent(scenario, feeder, case)}
-    _, agents = configs(scenario, feeder, case)
-    used: list[Link] = []
-    for agent in agents:
-        if agent.name not in members:
-            continue
-        try:
-            heard = in_neighbours(agent.control, agent.name, members)
-        except GraphError:
-            heard = tuple(other for other in members if other != agent.name)
-        used += [Link(other, agent.name) for other in heard]
-    return used
