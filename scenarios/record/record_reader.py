@@ -231,9 +231,12 @@ class RunRecord:
             why = self.damage[0] if self.damage else "parts of journals never came into it"
             raise RecordFileError(f"{self.path}: it lacks how {agent} decided at t = {t:g} s: {why}")
         if found is None:
-            first = next(self.decisions(agent), None)
-            later = "nor later" if first is None else f"its first decision is of t = {first.t:.2f} s"
-            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s; {later}")
+            if (first := next(self.decisions(agent), None)) is not None:
+                more = f"; its first decision is of t = {first.t:.2f} s"
+            else:
+                decided = [name for name in self.agents if next(self.decisions(name), None) is not None]
+                more = f", nor later; agents that decided: {short(decided) if decided else 'none'}"
+            raise RecordFileError(f"{self.path}: {agent} had not decided anything by t = {t:g} s{more}")
         return found
 
     def _require(self, agent: object) -> None:

@@ -288,7 +288,7 @@ def test_all_wrong_checks_come_at_once() -> None:
 
 def test_gridpeers_own_checks_are_entries_like_any_other() -> None:
     """Each has a sentence, limits that its defaults keep, and its name in docs/checks.md."""
-    for name in CHECKS.own:
+    for name in {*CHECKS.own, *ALWAYS}:
         assert re.search(rf"`(checks = \[\")?{name}(\"\])?`", PAGE), name
         assert plugin_problems(CHECKS, Plugin(use=name)) == []
         assert CHECKS.resolve(name).__doc__
