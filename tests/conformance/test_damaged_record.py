@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
-from math import inf
 from pathlib import Path
 
 import pytest
@@ -12,10 +10,9 @@ from mcap.reader import make_reader
 
 from gridpeers.lab.communication.record_content import read_content
 from gridpeers.lab.replay.replay import replay
-from gridpeers.scenarios.record.decision_entries import JournalCoverage, inside
+from gridpeers.scenarios.record.decision_entries import inside
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.viewer.record_view import RecordView
-from gridpeers.wire.messages import Journal
 from tests.record.fake_clock import fake_clock_record
 from tests.record.recorded_runs import recorded_in_chunks
 
@@ -146,22 +143,3 @@ def test_in_real_time_each_decision_tells_all_and_the_lost_ones_are_missed(tmp_p
             assert row.note == "how it decided is not known: the record is damaged there"
 
     assert 3 < lacking < 40
-
-
-def test_a_record_without_damage_lacks_nothing_however_its_parts_are_numbered() -> None:
-    """Earlier versions counted the parts of all agents of one process together, so that each one's have gaps."""
-
-    def part(number: int, t: float) -> Journal:
-        return Journal(sender="inv1", epoch=1, seq=number, t=t, data=b"")
-
-    def span(t: float) -> tuple[float, float]:
-        return t, t
-
-    coverage = JournalCoverage(periodic=False)
-    for number, t in ((0, 0.0), (4, 0.5), (5, 1.5)):
-        coverage.take(part(number, t), partial(span, t))
-
-    assert coverage.holes((), numbered=False) == []
-    assert [(a, round(b, 3)) for a, b in coverage.holes(())] == [(0.0, 0.5)]
-    assert coverage.holes([(0.9, 1.2)], numbered=False) == coverage.holes(()), "a chunk between two parts that follow"
-    assert coverage.holes([(1.4, 2.0)])[-1][1] == inf, "no part came after it"

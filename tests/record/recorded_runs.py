@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 
 import pytest
@@ -61,4 +62,5 @@ def recorded_in_chunks(text: str, folder: Path, case: str = "case", *, chunk: in
     file.write_text(text, encoding="utf-8")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("gridpeers.scenarios.record.record_writer.CHUNK", chunk)
+        patch.setattr("gridpeers.scenarios.record.record_writer.PERIOD", inf)  # on a busy machine too
         return recorded_run(file, case, folder / case)

@@ -24,7 +24,7 @@ def test_in_wall_clock_time_a_time_of_flight_longer_than_the_run_is_not_judged(i
         unreadable=0,
         counts={},
         unjudged={},
-        agents=("inv1", "inv2"),
+        info=SimpleNamespace(agent_names=("inv1", "inv2")),
         simulated=False,
         has_arrivals=True,
         arrivals={("inv1", "inv2"): []},
