@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections import defaultdict, deque
 from dataclasses import dataclass, field
 from itertools import takewhile
 from math import inf, nextafter
-from operator import attrgetter
 
-from gridpeers.lab.communication.link_accounts import Missing
 from gridpeers.lab.communication.record_pass import DroppedStates, Link
 from gridpeers.lab.communication.sent_states import SentState
 
@@ -18,10 +15,6 @@ MOST_WAITING = 6000
 
 MOST_DROPPED = 1000
 """Numbers of dropped states of one link that are kept until every state that they may mean is known."""
-
-OVERLAPPING = 64
-"""Times in which processes of one agent were there, on either side of the place by its begin, among which that of a run
-time is sought: a process that was frozen wakes beside the next one, and they may be out of order."""
 
 
 @dataclass
@@ -40,10 +33,8 @@ class ArrivalAccount:
     ends: tuple[Presence, Presence]
     began: bool = False
     """Whether the link must be there: something came, or both ends have been there for long."""
-    early: Missing = field(default_factory=Missing)
-    """States that did not come, of which only the number is kept."""
-    late: dict[tuple[int, int], float] = field(default_factory=dict)
-    """Run time (s) of the last ones, by epoch and number."""
+    missing: dict[tuple[int, int], float] = field(default_factory=dict)
+    """Run time (s) of the states that did not come, by epoch and number."""
 
     @property
     def since(self) -> float:
@@ -53,9 +44,6 @@ class ArrivalAccount:
     def until(self) -> float:
         """Run time (s) at which the first of both ends fell silent: what it sent then may not have left it."""
         return min(end.until for end in self.ends)
-
-
-_since = attrgetter("since")
 
 
 class ArrivalAccounts:
@@ -108,7 +96,7 @@ class ArrivalAccounts:
     def heard(self, link: Link, epoch: int, number: int) -> None:
         self.listens(link)
         for account in self._open[link]:
-            if account.late and account.late.pop((epoch, number), None) is not None:
+            if account.missing and account.missing.pop((epoch, number), None) is not None:
                 return
         arrived = self._arrived[link]
         arrived[epoch, number] = None
@@ -130,9 +118,9 @@ class ArrivalAccounts:
         """Take as many states that are missing off the accounts as were dropped, the oldest first."""
         left = dropped.number
         for account in self._open[link]:
-            missing = [key for key, t in account.late.items() if dropped.since <= t <= dropped.until]
+            missing = [key for key, t in account.missing.items() if dropped.since <= t <= dropped.until]
             for key in missing[:left]:
-                del account.late[key]
+                del account.missing[key]
             left -= min(left, len(missing))
 
     def _close(self, until: float) -> None:
@@ -154,7 +142,7 @@ class ArrivalAccounts:
                     if came or state.t > account.since + self._linked_within:
                         account.began = True
                     if account.began and not came:
-                        _miss(account, key, state.t)
+                        account.missing[key] = state.t
 
     def _at(self, agent: str, t: float, epoch: int | None = None) -> Presence | None:
         """Return the time in which an agent, or one process of it, was there at a run time (s)."""
@@ -164,10 +152,8 @@ class ArrivalAccounts:
     def _place(self, agent: str, t: float, epoch: int | None = None) -> int | None:
         """Return the place of that time among those of the agent; a record may tell of a new session a state."""
         there = self._there[agent]
-        after = bisect_right(there, t, key=_since)
-        for i in range(min(len(there), after + OVERLAPPING) - 1, max(-1, after - 1 - OVERLAPPING), -1):
-            one = there[i]
-            if one.since <= t <= one.until and epoch in (None, one.epoch):
+        for i in reversed(range(len(there))):
+            if there[i].since <= t <= there[i].until and epoch in (None, there[i].epoch):
                 return i
         return None
 
@@ -179,10 +165,3 @@ class ArrivalAccounts:
         self.accounts[link].append(account)
         self._open[link].append(account)
         return account
-
-
-def _miss(account: ArrivalAccount, key: tuple[int, int], t: float) -> None:
-    account.late[key] = t
-    if len(account.late) > MOST_WAITING:
-        oldest = next(iter(account.late))
-        account.early.add(account.late.pop(oldest))

@@ -79,7 +79,7 @@ class MessageAccount(Check):
         missing = Missing()
         for account in found.arrivals[link]:
             until = min(account.until, found.t_end) - self.in_flight_s
-            for t in (*[account.early.first] * account.early.count, *account.late.values()):
+            for t in account.missing.values():
                 if t <= until:
                     missing.add(t)
         return missing

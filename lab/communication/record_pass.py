@@ -247,9 +247,7 @@ class _Pass:
 
     def _rejected(self, journal: Journal, src: str, message: ReceivedMessage) -> None:
         """Take a message that was rejected: it arrived, if it is a state of the sender that its key names."""
-        if message.rejected == "excess" and not message.payload:  # of records until 2026-11: it stands for any number
-            self._dropped(journal, src, MOST_COUNT)
-        elif message.rejected not in _NOT_SOUND:
+        if message.rejected not in _NOT_SOUND:
             match values_of(message.payload):
                 case {"sender": str(sender), "epoch": int(epoch), "seq": int(number)} if sender == src:
                     self._sink.heard((src, journal.sender), epoch, number, message.rejected)

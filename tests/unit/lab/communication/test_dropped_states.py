@@ -22,9 +22,7 @@ from gridpeers.scenarios.checks.check_verdict import NotJudgedError
 from gridpeers.scenarios.checks.checked_case import CheckedCase
 from gridpeers.scenarios.record.record_info import FILE
 from gridpeers.wire.journal import RecordLevel
-from tests.fuzz.journals import judged
 from tests.record.fake_clock import FakeClockRun, fake_clock_record
-from tests.unit.lab.communication.test_untrusted_journals import packed, sent
 
 LOST = range(50, 60)
 """Numbers of the messages from inv1 to inv2 that never arrive: those of 1.0 to 1.2 s."""
@@ -103,22 +101,6 @@ def test_a_record_without_arrivals_is_not_judged(tmp_path: Path) -> None:
         violations(tmp_path, lambda run: None, end=8.5, record="decisions")
 
 
-def test_one_dropped_message_of_an_older_record_stands_for_any_number() -> None:
-    """Until 2026-11 a journal had one without bytes, and a line of the log."""
-    states = packed(*[sent(number, 0.02 * number) for number in range(40)])
-    own = packed(*[["sent", None, "state/inv2", sent(number, 0.02 * number)[3].replace(b"inv1", b"inv2")]
-                   for number in range(40)])  # fmt: skip
-    heard = packed(["heard", 1000.0, "state/inv1", 1, 1])
-    dropped = packed(["received", 1000.5, "state/inv1", b"", "excess"])
-    missing = []
-    for journal in (heard, heard + dropped):
-        sums, unreadable = judged([("inv1", states), ("inv2", own + journal)], clock="wall")
-        (account,) = sums.finish(unreadable).arrivals["inv1", "inv2"]
-        missing.append(len(account.late))
-
-    assert missing == [38, 0]
-
-
 @pytest.mark.parametrize("late", [False, True])
 def test_each_dropped_state_is_counted_once_whenever_it_is_told(*, late: bool) -> None:
     """Two parts of a journal tell of 30 and 20, and 60 are missing; so ten are, though both may mean all of them."""
@@ -135,4 +117,4 @@ def test_each_dropped_state_is_counted_once_whenever_it_is_told(*, late: bool) -
     accounts.flush(1e9)
     (account,) = accounts.accounts[link]
 
-    assert list(account.late) == [(1, number) for number in range(51, 61)]
+    assert list(account.missing) == [(1, number) for number in range(51, 61)]

@@ -128,6 +128,6 @@ def test_a_new_session_in_a_journal_begins_new_accounts_of_links() -> None:
     }
 
     (whole,) = found[False][0].finish(0).arrivals["inv1", "inv2"]
-    assert sorted(number for _, number in whole.late) == [5, 6]
+    assert sorted(number for _, number in whole.missing) == [5, 6]
     before, after = found[True][0].finish(0).arrivals["inv1", "inv2"]
-    assert (before.until, [number for _, number in before.late], after.late) == (pytest.approx(0.5), [5], {})
+    assert (before.until, [number for _, number in before.missing], after.missing) == (pytest.approx(0.5), [5], {})
