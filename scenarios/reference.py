@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from gridpeers import metric
 from gridpeers.agents import graphs
 from gridpeers.agents.agent_config import DegradedCommunication, Gains
 from gridpeers.agents.carriers.law_registry import LAWS

@@ -20,6 +20,7 @@ from gridpeers.scenarios.results.figure_processes import drawn_on_all_cores
 from gridpeers.scenarios.results.metrics_file import Clock, case_facts, metrics_json
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.run_files import broken_if_ended, no_room, refusal, set_complete, shown, write_whole
+from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Progress, Request
 from gridpeers.scenarios.schema.plugin_keys import claims_of
 from gridpeers.scenarios.schema.scenario_writing import to_toml
@@ -28,7 +29,6 @@ from gridpeers.wire.driver.ending import OutputLostError
 from gridpeers.wire.driver.machine import too_few_files
 from gridpeers.wire.messages import Pacing
 from gridpeers.wire.packages import not_importable
-from tests.golden.catalogue.pins import run_case
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.departures import Departures

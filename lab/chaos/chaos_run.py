@@ -22,12 +22,12 @@ from gridpeers.scenarios.checks.judging import judge_case
 from gridpeers.scenarios.results.event_windows import CaseRecord
 from gridpeers.scenarios.results.record import Recorded
 from gridpeers.scenarios.results.recorded_events import tripped_by, tripped_inverters
+from gridpeers.scenarios.run_case import run_case
 from gridpeers.scenarios.run_request import BrokenRunError, Driver, LawStopError, Request
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.sweep.sweep_case import plant_at_start
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import utf8
-from tests.golden.catalogue.pins import run_case
 
 ASKED = ENDS, ERROR, LINKS, REPEATS, SAME_IN_PROCESSES = "ends", "no_error", "links", "repeats", "same_in_processes"
 """Questions about every run beside the checks: it reaches its end; no error of the program; accounts of links balance;
