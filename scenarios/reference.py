@@ -22,7 +22,6 @@ from gridpeers.netem.models.own_fault import FAULTS
 from gridpeers.netem.schema.fault import Fault
 from gridpeers.netem.schema.netem import NodeFault
 from gridpeers.netem.schema.partition import Partition
-from gridpeers.papers.singhal2022.islanding_claims import claims
 from gridpeers.plant import simulators
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protection, SyncCheck
 from gridpeers.plant.tables.feeder_columns import TABLES, LoadColumns, Manifest

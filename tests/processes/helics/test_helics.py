@@ -14,13 +14,12 @@ from typing import Any
 import pytest
 
 import gridpeers
+from gridpeers import Result, Scenario
 from gridpeers.bridges.helics import topics
 from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
 from gridpeers.bridges.helics.helics_plant import BridgedPlant
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings
 from gridpeers.plant.plant_config import PlantConfig, PlantSettings
-from gridpeers.runs.result import Result
-from gridpeers.scenario import Scenario
 from gridpeers.scenarios.drivers.free_endpoint import free_endpoint
 from gridpeers.scenarios.run_request import BrokenRunError
 from tests.command_line import invoke

@@ -11,12 +11,10 @@ from types import SimpleNamespace
 import pandas as pd
 import pytest
 
-from gridpeers import Feeder
+from gridpeers import BrokenRunError, Feeder, Scenario
 from gridpeers.bridges.proposal import feeder_proposal, proposed_project
 from gridpeers.plant.tables import read_feeder
-from gridpeers.scenario import Scenario
 from gridpeers.scenarios.checks.check_verdict import CheckVerdict
-from gridpeers.scenarios.run_request import BrokenRunError
 from tests.command_line import invoke
 from tests.unit.bridges.gridlabd.glm_models import HEAD, LOADS
 
