@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain, trail
 from gridpeers.lab.explanation.law_step import LawStep
-from gridpeers.lab.explanation.trail import trail
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
