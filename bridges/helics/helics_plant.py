@@ -33,18 +33,6 @@ class HelicsPlant:
     At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
     agents' set-points. So a plant that steps from t on with what it finds at the end of its step has them in force from
     t, as ours has.
-
-    Parameters
-    ----------
-    config
-        Names, times and the federation; the scenario's events are the outside plant's to carry out.
-    feeder
-        Ratings of the inverters.
-
-    Raises
-    ------
-    HelicsError
-        If the federation does not begin, or topics are missing.
     """
 
     def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
@@ -203,18 +191,6 @@ class BridgedPlant:
 
     At each record time t it publishes what it has at t. It asks for the first record time after a tick before it
     computes that tick: so set-points that are published between are in force from the tick on, as an agent's are.
-
-    Parameters
-    ----------
-    build
-        Builds the plant at t = 0.
-    config
-        Agents, times and the federation.
-
-    Raises
-    ------
-    HelicsError
-        If the federation does not begin.
     """
 
     def __init__(self, build: Callable[[], LivePlant], config: PlantConfig) -> None:

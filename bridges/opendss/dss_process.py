@@ -60,13 +60,7 @@ class DssProcess:
         self._process.send(request._asdict() | {"path": str(request.path)})
 
     def circuit(self, path: Path) -> DssCircuit:
-        """Return the circuit that was asked for.
-
-        Raises
-        ------
-        FeederError
-            With everything that the engine refuses; if it cannot be loaded, or crashes.
-        """
+        """Return the circuit that was asked for; FeederError if the engine refuses it, cannot be loaded, or crashes."""
         try:
             answer = self._process.answer(monotonic() + LONGEST)
         except ProcessEndedError as how:  # while it loads the engine, or somebody ended it
@@ -98,13 +92,7 @@ class DssProcess:
 
 @contextmanager
 def reading(request: ImportRequest) -> Iterator[DssProcess]:
-    """Let the engine read a script while the caller does other things; its process stays for the next one.
-
-    Raises
-    ------
-    FeederError
-        If the engine is not installed.
-    """
+    """Let the engine read a script while the caller does other things; its process stays for the next one."""
     if importlib.util.find_spec("dss") is None:
         raise FeederError("OpenDSS", (MISSING,))
     with _lock:
