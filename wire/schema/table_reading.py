@@ -225,13 +225,14 @@ class _Reader:
         inline = [field for field in fields_of(struct) if INLINE in field.marks]
         others = next((field for field in fields if field.mark(OtherKeys)), None)
         named = next((field for field in fields if field.mark(NamedTables)), None)
-        keys = [field.key for field in fields if field not in (others, named)]
-        keys += [key for field in inline for key in keys_of(field.type)]
+        inline_keys = [key for field in inline for key in keys_of(field.type)]
+        keys = [*(field.key for field in fields if field not in (others, named)), *inline_keys]
         values: dict[str, Any] = self._top if struct is self._root else {}
         tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
         is_table = isinstance(data, Mapping)
         if not is_table:
-            self._add(path, f"must be a table with the {self._noun}s {', '.join(keys)}, got {shown(data)}")
+            names = ", ".join([*_names(fields), *inline_keys])
+            self._add(path, f"must be a table with the {self._noun}s {names}, got {shown(data)}")
             data = {}
         for field in inline:
             values[field.name] = self.table(
@@ -251,7 +252,7 @@ class _Reader:
                 if key in tables and named:
                     values[named.name][key] = self.table(tables[key], data[key], _join(path, key))
                 else:
-                    self._add(_join(path, key), self._unknown(key, struct, [*keys, *tables]))
+                    self._add(_join(path, key), self._unknown(key, struct, [*_names(fields), *inline_keys]))
         for field in fields:
             if field in (others, named):
                 continue
@@ -363,6 +364,15 @@ def _tables(root: type) -> Iterator[tuple[str, type]]:
                 further.append((f"{key}.NAME", inner))
             elif (inner := inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
                 yield f"into [[{key}]]", inner
+
+
+def _names(fields: list[Field]) -> Iterator[str]:
+    """Yield the keys of fields, those of named tables among them."""
+    for field in fields:
+        if mark := field.mark(NamedTables):
+            yield from mark.known()
+        elif not field.mark(OtherKeys):
+            yield field.key
 
 
 def _fallback(field: Field) -> Any:
