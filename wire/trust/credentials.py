@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
-from gridpeers.wire.keys import ANY_TOKEN, KeySpec, Role, describe
+from gridpeers.wire.keys import ANY_TOKEN, KEY_SPECS, KeySpec, Role
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import printable
 
@@ -138,7 +138,7 @@ def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Ru
 
 
 def _rules(own: Member, other: Member, *, star: bool) -> Iterator[Rule]:
-    for spec in describe():
+    for spec in KEY_SPECS:
         ways: tuple[tuple[Flow, Member, Member], ...] = (("ingress", other, own), ("egress", own, other))
         for flow, sender, receiver in ways:
             if key := _key(spec, sender, receiver, star=star):
