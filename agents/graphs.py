@@ -19,9 +19,8 @@ from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, line_of, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, line_of, named
 from gridpeers.wire.wording import printable, suggestion
 
 
@@ -201,9 +200,8 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
     """Return each agent's in-neighbours as the rule has them."""
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
-        with foreign_code():
-            result = rule(ordered)
-            return {one: frozenset(result[one]) for one in result}
+        result = rule(ordered)
+        return {one: frozenset(result[one]) for one in result}
     except ANYTHING as error:  # a rule is foreign code
         members_of = ", ".join(ordered)
         raise GraphError(f"graph {name}{line_of(rule, error)} of {members_of} failed: {named(error)}") from error

@@ -18,7 +18,7 @@ from gridpeers.agents.carriers.fmu import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
 from gridpeers.agents.carriers.fmu import named as variables
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints
-from gridpeers.wire.plugins.foreign_code import ANYTHING, named
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 
 class LoadedFmu(Law):

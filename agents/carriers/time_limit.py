@@ -13,7 +13,7 @@ from typing import Any
 
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 _forks = threading.local()
 """Forks of this process by each of its threads: `number`."""
@@ -59,8 +59,7 @@ def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
 @contextmanager
 def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
-        with foreign_code():
-            yield
+        yield
         return
     over = False
     interrupted: BaseException | None = None
@@ -74,8 +73,7 @@ def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
-            with foreign_code():
-                yield
+            yield
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     except BaseException as error:

@@ -9,7 +9,7 @@ from typing import Any
 
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
 from gridpeers.wire.bounds import MOST_SHARED, SHARED_LIMIT
-from gridpeers.wire.plugins.foreign_code import ANYTHING, line_of, named
+from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.wording import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")

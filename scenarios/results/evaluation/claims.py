@@ -21,9 +21,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from gridpeers.scenarios.results.evaluation.metric import Measure, Quantity
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_of
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
@@ -100,8 +99,7 @@ class Benchmark:
     def lines(self, findings: Findings) -> list[str]:
         """Return the summary of a run; one that raises an exception is a line that says why."""
         try:
-            with foreign_code():
-                return [printable(str(line), 1000) for line in self.summary(findings)]
+            return [printable(str(line), 1000) for line in self.summary(findings)]
         except ANYTHING as error:  # a benchmark is a user's code
             return [f"The benchmark's summary failed: {named(error)}"]
 
@@ -191,8 +189,7 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     verdicts = []
     for claim in claims:
         try:
-            with foreign_code():
-                verdicts.append(_verdict(claim, findings))
+            verdicts.append(_verdict(claim, findings))
         except ANYTHING as error:  # a claim is a user's code
             verdicts.append(
                 Verdict(claim=claim, status="FAIL", found=f"cannot be judged: {named(error)}{_there(error, findings)}")
