@@ -15,8 +15,7 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import Links, arrived, is_usable
 from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
-from gridpeers.wire.node import Listen, Route
-from gridpeers.wire.plant_follower import PlantFollower
+from gridpeers.wire.node import Listen, PlantFollower, Route
 
 
 class NeighbourStates:

@@ -12,6 +12,7 @@ import re
 import traceback
 from collections import Counter
 from collections.abc import Callable
+from functools import lru_cache
 from math import isfinite
 from typing import Any, TypeVar
 from zlib import crc32
@@ -52,10 +53,6 @@ _latest: tuple[bytes | None, AnyMessage] = (None, None)  # type: ignore[assignme
 _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
 
 
-TRACED = 40
-"""Number of a traceback's last lines in the log."""
-
-
 class RejectedError(Exception):
     """A message that must be dropped."""
 
@@ -94,6 +91,20 @@ def decode(payload: bytes) -> AnyMessage:
         raise RejectedError("garbled", str(error)) from None
     _latest = payload, message
     return message
+
+
+_HEAD = 160
+"""Bytes in which type, name and epoch stand."""
+
+
+@lru_cache(maxsize=4096)
+def _mark(sender: str, epoch: int) -> bytes:
+    return b"\xa6sender" + _encoder.encode(sender) + b"\xa5epoch" + _encoder.encode(epoch)
+
+
+def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
+    """Whether a payload begins as a message of this sender in this epoch does."""
+    return _mark(sender, epoch) in payload[:_HEAD]
 
 
 def sound(payload: bytes) -> AnyMessage | None:
@@ -144,7 +155,7 @@ class RejectedMessages:
                 f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {printable(text, 200)}. "
                 "More of this kind are only counted. See docs/protocol.md"
             )
-            self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-TRACED:])]))
+            self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-40:])]))
         self.counts[kind] += count
 
     def failed(self, key: str, error: Exception) -> None:
@@ -152,13 +163,10 @@ class RejectedMessages:
         trace = "" if self.counts["failed"] else traceback.format_exc()
         self.add("failed", key, f"{type(error).__name__}: {error}", trace)
 
-    @property
-    def has_lines(self) -> bool:
-        """Whether there are log lines to take."""
-        return bool(self._lines)
-
     def take_lines(self) -> tuple[str, ...]:
         """Take out the log lines since the last call."""
+        if not self._lines:
+            return ()
         lines, self._lines = tuple(self._lines), []
         return lines
 
@@ -168,22 +176,10 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    """Return the value that bytes or a text encode.
+    """Return the value that bytes or a text encode; raise `msgspec.DecodeError` in one printable line if there is none.
 
-    Raises
-    ------
-    msgspec.DecodeError
-        If they encode no such value; in one printable line. msgspec itself has other errors for a text that is no UTF-8
-        and for brackets a thousand deep, and repeats the name of a field that it does not know as it came.
-
-    Examples
-    --------
-    >>> numbers = msgspec.json.Decoder(list[float])
-    >>> decode_foreign(numbers.decode, b"[1.5]")
-    [1.5]
-    >>> decode_foreign(msgspec.json.Decoder().decode, b"[" * 2000)
-    Traceback (most recent call last):
-    msgspec.DecodeError: maximum recursion depth exceeded while deserializing an object
+    msgspec itself has other errors for a text that is no UTF-8 and for brackets a thousand deep, and repeats the name
+    of a field that it does not know as it came.
     """
     try:
         return decode(data)

@@ -16,10 +16,9 @@ from gridpeers.agents import agent_process
 from gridpeers.agents.agent_process import _opened, run_agents, take_part
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.agents.session_health import SessionHealth
-from gridpeers.wire.backlog import Stamped
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.session import Session, SessionError
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Measurement, Stop

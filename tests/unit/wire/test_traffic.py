@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 
 from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.backlog import TOKENS, Loss
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
@@ -27,7 +26,7 @@ from gridpeers.wire.journal import (
 )
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Leave, Measurement, State
-from gridpeers.wire.node import Node
+from gridpeers.wire.node import TOKENS, Loss, Node
 from gridpeers.wire.traffic import (
     REJECTED,
     REJECTED_INTERVAL,
