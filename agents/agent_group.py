@@ -23,10 +23,7 @@ from gridpeers.wire.messages import Journal, Measurement, State
 class AgentGroup:
     """The agents of a run, in the order of the roster; all with the same rule, each with its law.
 
-    Raises
-    ------
-    ValueError
-        If a value of a nameplate is out of bounds.
+    Raise ValueError if a value of a nameplate is out of bounds.
     """
 
     def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law]) -> None:

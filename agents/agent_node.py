@@ -59,11 +59,9 @@ class NeighbourStates:
         return max(at - arrived_at, self.t - state.t)
 
     def forget(self, name: str) -> None:
-        """Forget an agent whose process is gone."""
         self._states.pop(name, None)
 
     def clear(self) -> None:
-        """Forget every state and the measurement."""
         self._states.clear()
         self.measurement = None
 
@@ -75,18 +73,8 @@ _KEPT = State, Measurement
 class AgentNode(PlantFollower):
     """One agent as a participant of a run.
 
-    Parameters
-    ----------
-    config : AgentConfig
-        The agent's nameplate and the run's rule.
-    instance : str
-        Id of this process, unique in the run; part of the agent's token.
-    links : Links or None
-        Emulated links to the agent; None for none.
-    law : Law or None
-        Law that decides the set-points; None is the paper's.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
+    `instance` is the id of this process, unique in the run, and part of the agent's token. Without `links` none are
+    emulated; without a law it is the paper's. `rate` is that of `gridpeers.wire.membership.Admission`.
     """
 
     def __init__(
@@ -113,7 +101,6 @@ class AgentNode(PlantFollower):
 
     @property
     def token(self) -> str:
-        """Key of the own liveliness token."""
         return self.keys.alive_agent(self._name, self._instance)
 
     @property
@@ -123,16 +110,13 @@ class AgentNode(PlantFollower):
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
         return tuple(self.routes)
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return bool(self.stopped or self.failed)
 
     def use_links(self, links: Links) -> None:
-        """Use other emulated links from now on."""
         self._links = links
 
     def note_siblings(self, names: frozenset[str]) -> None:
@@ -145,7 +129,6 @@ class AgentNode(PlantFollower):
     # ---------------------------------------------------------------- the others
 
     def appeared(self, key: str, now: float) -> None:
-        """Note that a token appeared."""
         self._note_token(key, now, appeared=True)
         match self.keys.parts(key):
             case ("alive", "plant", epoch) if self._plant_appeared(epoch):

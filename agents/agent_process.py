@@ -44,11 +44,8 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
 
     Agents of one process share a session; they are of one run, under one kind of time.
 
-    Raises
-    ------
-    ConfigurationError, SessionError
-        If the configuration cannot work. In wall-clock time also if the plant refuses an agent, or there is none
-        within the deadline.
+    Raise ConfigurationError, SessionError if the configuration cannot work. In wall-clock time also if the plant
+    refuses an agent, or there is none within the deadline.
     """
     configs = process if isinstance(process, tuple) else (process,)
     _check(configs)
@@ -84,23 +81,11 @@ def _check(configs: Sequence[AgentConfig]) -> None:
             check_name("name", config.name)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    first = configs[0]
-    for config in configs[1:]:
-        for key in ("run", "clock", "listen", "connect", "star"):
-            if getattr(config, key) != getattr(first, key):
-                raise ConfigurationError(
-                    f"{config.name}: {key} {getattr(config, key)!r} differs from that of {first.name}; "
-                    "agents of one process share it"
-                )
-    if len(configs) > 1 and first.credentials is not None:
+    if len(configs) > 1 and configs[0].credentials is not None:
         raise ConfigurationError(f"agents of one process have one certificate; start that of {configs[1].name} alone")
-    names = [config.name for config in configs]
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise ConfigurationError(f"agents {', '.join(twice)} stand twice in the configuration")
 
 
 def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
-    """Return the law of each agent, which ends with the stack."""
     made: list[Law] = []
     for config in configs:
         try:
@@ -247,7 +232,6 @@ def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Se
 
 
 def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
-    """Serve for `RUN_ENDS` more, or until the core has finished."""
     over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
     over.daemon = True
     over.start()

@@ -53,12 +53,10 @@ class StalenessWeights:
         """Ages (s) of each neighbour's last states, each at the first tick that could use it."""
 
     def arrived(self, name: str) -> None:
-        """Note that a newer state of a neighbour has arrived."""
         if self.ages_count:
             self._fresh.add(name)
 
     def forget(self, name: str) -> None:
-        """Forget a neighbour and its link."""
         self._fresh.discard(name)
         self._usual.pop(name, None)
 
@@ -96,7 +94,6 @@ class SaturationDetector:
         """Times (s) and outputs (pu) since it went to this side; of those older than T_sat only the last."""
 
     def begin(self) -> None:
-        """Forget the past outputs: their set-points were not the law's."""
         self._side = 0
         self._since.clear()
 
@@ -119,7 +116,6 @@ class SaturationDetector:
 
 
 def gains_in_force(gains: Gains, options: DegradedCommunication) -> Gains:
-    """Return the gains and limits of the law under these options."""
     if options.weights == "degree-normalised":
         gains = replace(
             gains,
@@ -247,11 +243,9 @@ class IslandDetector:
         return pair.back is not None
 
     def forget(self, name: str) -> None:
-        """Forget a neighbour that is gone."""
         self._pairs.pop(name, None)
 
     def restart(self) -> None:
-        """Forget all neighbours: while grid-connected all are in step."""
         self._pairs.clear()
 
     def _own_at(self, t: float) -> float | None:

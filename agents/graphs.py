@@ -32,9 +32,7 @@ class Member(Protocol):
         """Kind: "GFM" or "GFL"."""
 
     @property
-    def microgrid(self) -> str:
-        """Name of the microgrid."""
-
+    def microgrid(self) -> str: ...
     @property
     def P_rated(self) -> float:
         """Rated power (W)."""
@@ -123,7 +121,6 @@ class EdgeList:
         self.links = tuple(links)
 
     def __call__(self, members: Members) -> Mapping[str, Iterable[str]]:
-        """Return the in-neighbours of each agent."""
         both = [pair for a, b in self.links for pair in ((a, b), (b, a))]
         return {name: {b for a, b in both if a == name and b in members} for name in members}
 
@@ -150,10 +147,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     `name` is that of the rule in the scenario, for messages. With `strict` a name that is no member is a problem, as
     in the check of a scenario; else it is left out: in wall-clock time agents meet one after the other.
 
-    Raises
-    ------
-    GraphError
-        If the rule raises, or its result is no graph of these agents.
+    Raise GraphError if the rule raises, or its result is no graph of these agents.
     """
     heard_by = _evaluated(rule, members, name)
     for one, heard in heard_by.items() if strict else ():

@@ -29,7 +29,6 @@ class KnownAgents:
         """Number of changes of the members by then, and the names on the roster without a nameplate."""
 
     def add(self, nameplate: Nameplate) -> None:
-        """Note the nameplate of an agent that shares this."""
         self._own[nameplate.sender] = nameplate
 
     def introduce(self, name: str, instance: str, nameplate: Nameplate) -> None:
@@ -38,7 +37,6 @@ class KnownAgents:
         self.members.meet(instance, nameplate)
 
     def gone(self, name: str, instance: str) -> None:
-        """Note that a token is gone."""
         self.members.vanished(name, instance)
 
     def processes(self, message: Prepare) -> dict[str, str]:
@@ -65,7 +63,6 @@ class KnownAgents:
         return [name for name in names if name != own] if names else names
 
     def nameplate(self, name: str) -> Nameplate:
-        """Return the nameplate of an agent of the roster that has been met."""
         return self.members.nameplates.get(name) or self._own[name]
 
     def in_neighbours(self, own: str) -> tuple[str, ...]:

@@ -158,24 +158,20 @@ class RealtimeAgent(AgentNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         keys, name = self.keys, self._name
         own = keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement, keys.journal
         return tuple(key(name) for key in own)
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return super().finished or self.session_broken
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages to be woken for: messages wait for the tick."""
         return CLOCK_ALONE
 
     @property
     def deadline(self) -> float:
-        """When the next tick is due (s on the driver's clock)."""
         return self._timer.due
 
     def start(self, now: float) -> None:
@@ -195,7 +191,6 @@ class RealtimeAgent(AgentNode):
             self._forget_everybody()
 
     def expire(self, now: float) -> None:
-        """Tick, if it is time."""
         late = now - self._timer.due
         if late < 0.0 or self.finished:
             return
@@ -409,7 +404,6 @@ class RealtimeAgent(AgentNode):
         self._send(state)
 
     def _report_journal(self) -> None:
-        """Send the journal since the last report."""
         self._publish_journal(self.keys.journal(self._name), self._config.epoch, self.states.t)
 
     def _send(self, state: State) -> None:

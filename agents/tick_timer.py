@@ -33,7 +33,6 @@ class TickTimer:
 
     @property
     def due(self) -> float:
-        """Next due time (s)."""
         return self._timer.due
 
     def measured(self, at: float) -> None:

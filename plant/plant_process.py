@@ -21,7 +21,7 @@ from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, sche
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.packages import not_importable
+from gridpeers.wire.wording import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:

@@ -36,11 +36,8 @@ PERSISTENT = 50
 class Admission:
     """The valid epoch of each name, and the last numbers of its messages.
 
-    Parameters
-    ----------
-    rate : float, optional
-        Most messages of one sender per s of run time: a larger gap in the numbers is not counted as lost. In simulated
-        time numbers are ticks, and each is awaited.
+    `rate` is how many messages one sender sends at most per s of run time: a larger gap in the numbers is not counted
+    as lost. In simulated time numbers are ticks, and each is awaited.
     """
 
     def __init__(self, rate: float = inf) -> None:
@@ -91,10 +88,7 @@ class Admission:
     def take(self, message: AnyMessage) -> int:
         """Note the number of a message off the wire; return how many are missing between it and the last.
 
-        Raises
-        ------
-        RejectedError
-            If a later message has arrived before.
+        Raise RejectedError if a later message has arrived before.
         """
         name, seq, t = message.sender, message.seq, message.t
         missed = 0
@@ -207,10 +201,7 @@ class Membership:
     def meet(self, instance: str, nameplate: Nameplate) -> bool:
         """Take the answer of a process; return whether it is the first answer of a process that counts.
 
-        Raises
-        ------
-        RejectedError
-            If the process has no token, or its nameplate has changed.
+        Raise RejectedError if the process has no token, or its nameplate has changed.
         """
         name = nameplate.sender
         if instance not in self._instances.get(name, ()):

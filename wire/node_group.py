@@ -17,8 +17,6 @@ from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Loss, Publish,
 
 
 class GroupedNode(Core, Protocol):
-    """The part of an agent's node that its group uses."""
-
     session_broken: bool
 
     @property

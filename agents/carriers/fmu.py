@@ -126,7 +126,6 @@ class FmuLaw(ProgramLaw):
         self._ask({"type": "load"}, ProgramReady, 0.0)
 
     def close(self) -> None:
-        """End its process, and remove what was unpacked."""
         super().close()
         shutil.rmtree(self._unpacked, ignore_errors=True)
 

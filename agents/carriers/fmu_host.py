@@ -74,7 +74,6 @@ class LoadedFmu(Law):
         return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
 
     def close(self) -> None:
-        """Free the FMU."""
         if self._begun:
             self._fmu.terminate()
         self._fmu.freeInstance()
@@ -114,7 +113,6 @@ def _instance(description: Any, folder: Path) -> Any:
 
 
 def main(path: str, folder: str) -> None:
-    """Answer each line of standard input until it ends."""
     lines, answers = sys.stdin.buffer, os.dup(1)
     os.dup2(2, 1)
     law, failed = None, ""

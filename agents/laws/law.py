@@ -124,10 +124,7 @@ class Terms(NamedTuple):
 class Law:
     """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`; docs/laws.md).
 
-    Raises
-    ------
-    ValueError
-        If the value of a parameter is wrong, unknown or missing.
+    Raise ValueError if the value of a parameter is wrong, unknown or missing.
     """
 
     source: ClassVar[str] = ""

@@ -10,8 +10,7 @@ from time import monotonic
 from typing import Any
 
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
 """A message of the loader: file, line, text."""

@@ -14,8 +14,7 @@ from gridpeers.bridges.gridlabd.delta_mode_process import messages
 from gridpeers.bridges.gridlabd.glm_text import GlmText
 from gridpeers.plant.request_process import TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
 

@@ -11,7 +11,7 @@ from typing import Any
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings, endpoint
 from gridpeers.bridges.helics.topics import Topic, Value
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
-from gridpeers.wire.packages import damaged
+from gridpeers.wire.wording import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
 

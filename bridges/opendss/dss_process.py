@@ -17,8 +17,7 @@ from typing import Any
 from gridpeers.bridges.opendss.dss_circuit import DssCircuit, ImportRequest
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
 

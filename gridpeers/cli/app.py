@@ -27,7 +27,7 @@ def main() -> None:
         _tell("interrupted before anything had begun")
         sys.exit(INTERRUPTED)
     except ImportError as error:
-        from gridpeers.wire.packages import not_importable
+        from gridpeers.wire.wording import not_importable
 
         _tell(not_importable(error))
         sys.exit(2)  # as BAD_INPUT, whose module may be what cannot be imported

@@ -105,7 +105,7 @@ def require(modules: dict[str, str], install: str = "") -> None:
     """End with a clear line, and with advice, if a package that is needed is missing."""
     from importlib.util import find_spec
 
-    from gridpeers.wire.packages import DISTRIBUTIONS, requirement
+    from gridpeers.wire.wording import DISTRIBUTIONS, requirement
 
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
@@ -119,7 +119,7 @@ def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
     import subprocess
 
-    from gridpeers.wire.packages import damaged
+    from gridpeers.wire.wording import damaged
 
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)

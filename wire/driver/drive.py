@@ -82,10 +82,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
     """Serve a started core, whose queryables are declared, until it has finished.
 
-    Raises
-    ------
-    StoppedError
-        If another thread asks the process to stop.
+    Raise StoppedError if another thread asks the process to stop.
     """
     session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
     take = session.take

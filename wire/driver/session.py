@@ -27,8 +27,8 @@ from gridpeers.wire.driver.zenoh_settings import (
     zenoh_settings,
 )
 from gridpeers.wire.keys import LATEST_ONLY, is_token
-from gridpeers.wire.packages import not_importable
 from gridpeers.wire.trust.credentials import Credentials, LinkCertificates
+from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     import zenoh
@@ -263,11 +263,9 @@ class Session:
         self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))
 
     def hold_token(self, key: str) -> None:
-        """Declare a liveliness token, until it is withdrawn, or the session or the process ends."""
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def withdraw_token(self, key: str) -> None:
-        """Undeclare a liveliness token."""
         self._tokens.pop(key).undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def publish(self, key: str, payload: bytes) -> None:
@@ -295,7 +293,6 @@ class Session:
         return self._drops and key.split("/")[2] in LATEST_ONLY
 
     def peers(self) -> int:
-        """Number of peers and routers connected now."""
         info = self._session.info
         return len(info.peers_zid()) + len(info.routers_zid())
 

@@ -46,7 +46,6 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def name(self) -> str:
-        """The plugin, for people; the same text in every process."""
         return self.use
 
 

@@ -105,7 +105,6 @@ class Registry(Generic[T]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names that can be resolved, gridpeers' own first."""
         return tuple(dict.fromkeys((*self.own, *self._added, *entry_points_of(self.group))))
 
     def register(self, name: str) -> Callable[[T], T]:
@@ -226,7 +225,6 @@ def _as_it_is_now(module: ModuleType) -> ModuleType:
 
 
 def _home(it: Any) -> tuple[str, str]:
-    """Module and name under which an object can be imported."""
     kind = it if hasattr(it, "__qualname__") else type(it)
     return str(kind.__module__), str(kind.__qualname__)
 

@@ -47,13 +47,7 @@ def shown(raw: object) -> str:
 
 
 def in_words(*kinds: Any) -> str:
-    """Return types in words.
-
-    Examples
-    --------
-    >>> in_words(Literal["a", "b"], list[float])
-    'one of "a", "b" or a list of numbers'
-    """
+    """Return types in words, such as 'one of "a", "b" or a list of numbers'."""
     kinds = tuple(part for kind in kinds for part in kinds_of(kind))
     words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(structs_in(kind))))
     return " or ".join(words)
@@ -90,7 +84,6 @@ def kinds_of(kind: Any) -> tuple[Any, ...]:
 
 
 def structs_in(kind: Any) -> list[Any]:
-    """Return the structs that a value may be."""
     return [part for part in kinds_of(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
 
 
@@ -103,19 +96,16 @@ def inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
 
 
 def keys_of(struct: type) -> list[str]:
-    """Return the keys of a table."""
     nameless = (OtherKeys, NamedTables)
     return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(nameless))]
 
 
 def _named(kinds: typing.Sequence[Any], field: Field) -> str:
-    """Name what a key takes, for people, with an example."""
     example = field.mark(Example)
     return in_words(*kinds) + (f" such as {example.text}" if example else "")
 
 
 def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
-    """Name one type."""
     origin = get_origin(kind)
     if origin is Literal:
         return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
@@ -150,13 +140,9 @@ _KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", 
 
 
 def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Problem]]:
-    """Convert a file's tables to a struct.
+    """Convert a file's tables to a struct, which is of use only without problems.
 
-    Returns
-    -------
-    tuple[T, list[Problem]]
-        A key with a problem has its default, so that later checks find what else is wrong; the struct is of use only
-        without problems.
+    A key with a problem has its default, so that later checks find what else is wrong.
 
     Examples
     --------
@@ -172,12 +158,7 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
 
 
 def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Convert values for the parameters of a class, such as a law.
-
-    Returns
-    -------
-    tuple[dict[str, Any], list[Problem]]
-        The value of every parameter, by name; it is of use only without problems.
+    """Return the value of every parameter of a class, such as a law, by name; they are of use only without problems.
 
     Examples
     --------
@@ -195,10 +176,7 @@ def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any]
 def parameter_values(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the value of every parameter of a class, converted to its type.
 
-    Raises
-    ------
-    ValueError
-        If a value is wrong or missing; the text has all problems.
+    Raise ValueError if a value is wrong or missing; the text has all problems.
     """
     values, problems = read_parameters(cls, given)
     if problems:

@@ -30,8 +30,6 @@ LONGEST_COMMON_NAME = 64
 
 
 class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One name of the site."""
-
     name: str
     """Name; of an agent that of its inverter."""
     role: Role
@@ -229,8 +227,6 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Link(Protocol):
-    """A link of a session, as Zenoh describes it."""
-
     @property
     def auth_identifier(self) -> str | None:
         """Common name of the certificate of its other end; None without one."""
@@ -250,7 +246,6 @@ class LinkCertificates:
         self._lines: list[str] = []
 
     def note(self, links: Iterable[Link]) -> None:
-        """Note the certificates of the present links."""
         for link in links:
             name = link.auth_identifier or ""
             if name not in self._names:

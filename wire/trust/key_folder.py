@@ -53,13 +53,10 @@ class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     members: tuple[Member, ...] = ()
 
     def of(self, name: str) -> Member | None:
-        """Return the member of a name; None if there is none."""
         return next((member for member in self.members if member.name == name), None)
 
 
 class SignedList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The content of ``members.json``."""
-
     list: MemberList
     signature: str
     """Signature of the authority over the list as JSON (ECDSA with SHA-256, base64)."""
@@ -206,7 +203,6 @@ def _end_of(own: x509.Certificate, path: Path, folder: Path, member: Member, now
 
 
 def _common_name(certificate: x509.Certificate) -> str:
-    """Return the common name of a certificate; empty if it has none."""
     from cryptography.x509.oid import NameOID
 
     named = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
