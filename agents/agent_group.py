@@ -64,7 +64,6 @@ class AgentGroup:
         return listens
 
     def tick(self, measurements: Iterable[Measurement]) -> list[State]:
-        """Return the decision of each agent that has a measurement of this tick."""
         agents, neighbours = self._agents, self._neighbours
         states = [agents[measured.to].tick(measured, neighbours[measured.to]) for measured in measurements]
         if journals := self._journals:

@@ -33,7 +33,6 @@ class NeighbourStates:
         self._measured_at = 0.0
 
     def keep(self, message: State | Measurement, at: float) -> None:
-        """Keep a state or the own measurement, which arrived at this time (s)."""
         if isinstance(message, State):
             self._states[message.sender] = message, at
         else:
@@ -159,7 +158,6 @@ class AgentNode(PlantFollower):
         raise NotImplementedError
 
     def _listen_to(self, name: str) -> None:
-        """Subscribe to the states of an agent, once."""
         key = self.keys.state(name)
         if key not in self.routes:
             self.routes[key] = Route(name, (State,), self._on_state)
@@ -193,7 +191,6 @@ class AgentNode(PlantFollower):
                 self._keep(message, at)
 
     def _keep(self, message: State | Measurement, at: float) -> None:
-        """Keep a usable message, which arrived at this time (s of run time)."""
         if type(message) is State:
             self._agent.hear(message)
         self.states.keep(message, at)
@@ -201,6 +198,5 @@ class AgentNode(PlantFollower):
     # ---------------------------------------------------------------- reports
 
     def _report_links(self, *, final: bool = False) -> None:
-        """Send the account of the emulated links since the last report."""
         key, epoch = self.keys.report(self._name), self._config.epoch
         self._publish_link_reports(key, self._links, epoch, instance=self._instance, last=final)

@@ -16,8 +16,6 @@ _NOT_SATURATED = (0, 0)
 
 
 class DecisionJournal:
-    """Note the decisions of one agent in its journal."""
-
     def __init__(self, agent: Agent, journal: JournalBuffer) -> None:
         self._agent, self.journal = agent, journal
         self._neighbours: Sequence[str] | None = None
@@ -99,7 +97,6 @@ class DecisionJournal:
         )
 
     def _reasons(self, neighbours: Sequence[str], states: Sequence[int | None]) -> list[str]:
-        """Return why the agent left out each neighbour; empty for those that it used."""
         used = {neighbour.name for neighbour in self._agent.around}
         return [
             ""

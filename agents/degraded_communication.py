@@ -155,8 +155,6 @@ KEPT = 512
 
 @dataclass
 class _Pair:
-    """Angle difference between one neighbour and the own inverter."""
-
     since: tuple[float, float] | None = None
     """Times (s) from which the two angles count."""
     t: float = 0.0
@@ -173,7 +171,6 @@ class _Pair:
     """How long it was left out last (s)."""
 
     def compare(self, since: tuple[float, float], t: float, difference: float) -> None:
-        """Note the difference of the angles (cycles) at t (s)."""
         if since != self.since:
             self.since, self.usual = since, difference
         else:

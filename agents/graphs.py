@@ -191,7 +191,6 @@ class RosterGraph:
 
 
 def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[str]]:
-    """Return each agent's in-neighbours as the rule has them."""
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
         result = rule(ordered)
@@ -202,7 +201,6 @@ def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[
 
 
 def make_graph(plugin: Plugin) -> Graph:
-    """Return a plugged-in rule; raise PluginError if it is missing or cannot be made with its parameters."""
     rule = made(GRAPHS, plugin)
     if not callable(rule):
         raise PluginError(f"{plugin.name}: an instance of its class cannot be called with the members' nameplates")

@@ -32,7 +32,6 @@ class KnownAgents:
         self._own[nameplate.sender] = nameplate
 
     def introduce(self, name: str, instance: str, nameplate: Nameplate) -> None:
-        """Note the token and the nameplate of an agent in one process with all others."""
         self.members.appeared(name, instance)
         self.members.meet(instance, nameplate)
 
@@ -46,7 +45,6 @@ class KnownAgents:
         return self._latest[1]
 
     def take(self, message: Prepare) -> None:
-        """Take a new roster, whose processes count from now on."""
         if message is self._taken:
             return
         self._taken, self._graph, self._unmet = message, None, (-1, [])

@@ -112,11 +112,9 @@ class LockstepAgent(AgentNode):
         return self._barrier.deadline
 
     def note_siblings(self, names: frozenset[str]) -> None:
-        """Note the agents of the same process."""
         self._barrier.siblings = names
 
     def start(self, now: float) -> None:
-        """Start to wait for the plant, which is built first."""
         self._barrier.renew(now)
         self._barrier.deadline = max(self._barrier.deadline or 0.0, now + self._config.plant_wait)
 
@@ -153,14 +151,12 @@ class LockstepAgent(AgentNode):
             self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, or is on the roster."""
         match self.keys.parts(key):
             case ("alive", "agent", name, instance) if self._processes.get(name) == instance:
                 return True
         return super().is_noted(key)
 
     def vanished(self, key: str, now: float) -> None:
-        """Note that a token is gone; another agent of this process may have noted it before."""
         match self.keys.parts(key):
             case ("alive", "agent", name, instance):
                 if self._forget_process(name, instance) or self._processes.get(name) == instance:

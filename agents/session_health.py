@@ -39,7 +39,6 @@ class SessionHealth:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with a session of which nothing is known."""
         self._came: dict[str, float] = {}
         """Time (s) at which the last message of each sender came off the wire."""
         self._crossed: dict[str, tuple[str, float]] = {}

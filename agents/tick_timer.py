@@ -36,7 +36,6 @@ class TickTimer:
         return self._timer.due
 
     def measured(self, at: float) -> None:
-        """Note when a measurement came (s)."""
         self._measured = at
 
     def take(self, now: float) -> int:

@@ -54,8 +54,6 @@ _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 
 
 class RejectedError(Exception):
-    """A message that must be dropped."""
-
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
         self.kind = kind
@@ -108,7 +106,6 @@ def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
 
 
 def sound(payload: bytes) -> AnyMessage | None:
-    """Return the message of a payload; None if no receiver of this version would take it."""
     try:
         return decode(payload)
     except RejectedError:
@@ -131,7 +128,6 @@ def _kind(text: str, payload: bytes) -> str:
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether all numbers of a message are finite."""
     if isinstance(value, float):
         return isfinite(value)
     if isinstance(value, dict):
@@ -159,12 +155,10 @@ class RejectedMessages:
         self.counts[kind] += count
 
     def failed(self, key: str, error: Exception) -> None:
-        """Count a message that raised an error of ours; call it while that error is caught."""
         trace = "" if self.counts["failed"] else traceback.format_exc()
         self.add("failed", key, f"{type(error).__name__}: {error}", trace)
 
     def take_lines(self) -> tuple[str, ...]:
-        """Take out the log lines since the last call."""
         if not self._lines:
             return ()
         lines, self._lines = tuple(self._lines), []

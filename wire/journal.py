@@ -49,8 +49,6 @@ class Entry(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
 
 
 class KeyEntry(Entry, frozen=True, array_like=True):
-    """An entry about a key."""
-
     at: float | None
     """Time on the own clock (s, monotonic), of a message its arrival; None in simulated time."""
     key: str
@@ -193,8 +191,6 @@ _encode_into = msgspec.msgpack.Encoder().encode_into
 
 
 class JournalBuffer:
-    """Entries since the last part."""
-
     __slots__ = ("_bytes", "_counts", "_ends", "_lost", "_rejected")
 
     def __init__(self) -> None:
@@ -212,7 +208,6 @@ class JournalBuffer:
         return len(self._bytes)
 
     def add(self, entry: Entry) -> None:
-        """Add an entry at the end, if there is room."""
         if len(self._bytes) > ROOM:
             self._lost += 1
             return
@@ -241,7 +236,6 @@ class JournalBuffer:
         self._counts[rejected.key, rejected.kind] = rejected
 
     def take_parts(self) -> list[bytes]:
-        """Take out all entries, in parts of about `LOT` bytes."""
         for rejected in self._counts.values():
             self._append(rejected)
         self._counts.clear()
@@ -273,12 +267,10 @@ TO_LINKS = ("link_request", "command")
 
 
 def kind_of(key: str) -> str:
-    """Return the kind of a key."""
     return key.partition("/")[0]
 
 
 def name_of(key: str) -> str:
-    """Return the inverter that a key is about; empty if it is about none."""
     return key.partition("/")[2]
 
 

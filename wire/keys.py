@@ -69,7 +69,6 @@ class KeySpec(msgspec.Struct, frozen=True):
 
 
 def check_name(what: str, name: str) -> None:
-    """Raise ValueError if a name cannot be a part of a key."""
     if not is_name(name):
         raise ValueError(
             f'{what}: "{name}" cannot be part of a Zenoh key; use 1 to 64 letters, digits, "_", "-" or "."'
@@ -121,7 +120,6 @@ class Keys:
         return f"{self.prefix}alive/plant/{epoch}"
 
     def for_verb(self, verb: str) -> str:
-        """Return the key of a command, by its verb: that of requests if it changes nothing."""
         return self.request if verb in READING else self.command
 
     def parts(self, key: str) -> tuple[str, ...]:

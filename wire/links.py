@@ -27,8 +27,6 @@ class Arrival(NamedTuple):
 
 
 class CommandEffect(NamedTuple):
-    """Effect of a link command."""
-
     text: str
     """The command in words, in one line; a heal names the links that it heals."""
     receivers: tuple[str, ...]

@@ -62,15 +62,12 @@ class Admission:
         self.epochs[name] = epoch
 
     def release(self, name: str) -> None:
-        """Note that a name has no valid epoch any more, because its token is gone."""
         self.epochs.pop(name, None)
 
     def epoch(self, name: str) -> int | None:
-        """Return the valid epoch of a name; None if there is none."""
         return self.epochs.get(name)
 
     def lives(self, message: AnyMessage) -> bool:
-        """Whether a message has the valid epoch of its sender."""
         return self.epochs.get(message.sender) == message.epoch
 
     def check(self, message: AnyMessage) -> None:
@@ -188,7 +185,6 @@ class Membership:
         self.changes += 1
 
     def prefer(self, name: str, instance: str) -> None:
-        """Let one process of a name count as soon as its token is there."""
         self._preferred[name] = instance
         self._put_first(name)
         self._update(name)
@@ -216,7 +212,6 @@ class Membership:
 
     @property
     def unmet(self) -> Iterator[tuple[str, str]]:
-        """Name and instance of the processes that have not answered."""
         every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
         return (process for process in every if process not in self._answers)
 
@@ -228,7 +223,6 @@ class Membership:
         return unmet[begin : self._asked]
 
     def clear(self) -> None:
-        """Forget all members."""
         self.changes += 1
         for name in self.nameplates:
             self._admission.release(name)

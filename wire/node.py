@@ -36,8 +36,6 @@ from gridpeers.wire.traffic import Traffic
 
 
 class Publish(NamedTuple):
-    """Publish bytes on a key."""
-
     key: str
     payload: bytes
 
@@ -51,8 +49,6 @@ class Fetch(NamedTuple):
 
 
 class Listen(NamedTuple):
-    """Subscribe to a key, before any later request."""
-
     key: str
 
 
@@ -63,8 +59,6 @@ class WithdrawToken(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Write a line to the log."""
-
     text: str
 
 
@@ -270,7 +264,6 @@ class Node:
         """Note the nameplate of an agent that counts from now on."""
 
     def _forget_process(self, name: str, instance: str) -> bool:
-        """Note that the token of a process is gone; return whether the process counted."""
         self.routes.pop(self.keys.nameplate(name, instance), None)
         return self.members.vanished(name, instance)
 
@@ -324,7 +317,6 @@ class Node:
     def _publish_link_reports(
         self, key: str, links: Links | None, epoch: int, *, t: float = 0.0, instance: str = "", last: bool = False
     ) -> None:
-        """Publish the account of the emulated links into this node since the last report."""
         parts = () if links is None else links.report(last=last)
         for data in parts:
             final = last and bool(instance) and data is parts[-1]

@@ -42,8 +42,6 @@ class _Query(NamedTuple):
 
 
 class NodeGroup:
-    """Nodes behind one session, as one `Core`."""
-
     def __init__(self, nodes: Sequence[GroupedNode]) -> None:
         self.nodes = tuple(nodes)
         self.nameplates = dict(node.nameplate for node in nodes)

@@ -101,7 +101,6 @@ class TickBarrier:
         return name in self._awaited
 
     def came(self, name: str) -> None:
-        """Note that a sender has sent its message, or never will."""
         if self._awaited.pop(name, None) is not None and name not in self.siblings:
             self._from_outside -= 1
 

@@ -102,7 +102,6 @@ class TickTraffic:
         self._add_exchange(tick, list(map(astuple, measurements)), list(map(astuple, states)))
 
     def ticked(self, tick: int) -> None:
-        """Note that tick k is complete, or that it ends as it is."""
         self._add_exchange(tick, self._measurements, self._states)
         self._measurements.clear()
         self._states.clear()

@@ -38,7 +38,6 @@ def utf8(text: str) -> str:
 
 
 def counted(number: int, one: str, several: str = "") -> str:
-    """Return a number of things with its noun, such as "2 switches"."""
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 

@@ -96,7 +96,6 @@ def _is_of_neighbour(name: str) -> bool:
 
 
 def named(description: Any, causality: str) -> dict[str, Any]:
-    """Return the variables of a causality, e.g. the inputs, by name."""
     return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
 
 

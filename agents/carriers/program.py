@@ -61,13 +61,11 @@ class ProcessGroup:
             raise
 
     def end_input(self) -> None:
-        """End the input of the program, by which it is asked to end."""
         assert self.program.stdin is not None
         with contextlib.suppress(OSError):
             self.program.stdin.close()
 
     def wait(self, seconds: float) -> int | None:
-        """Wait for the program to end; return its exit code, None if it still runs."""
         try:
             return self.program.wait(seconds)
         except subprocess.TimeoutExpired:
@@ -98,8 +96,6 @@ class ProgramReady(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Decision(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to the line "step"."""
-
     P_set: float | None = None
     V_set: float | None = None
     shared: dict[str, float] = {}
@@ -146,7 +142,6 @@ class ProgramLaw(Law):
         return SetPoints(decision.P_set, decision.V_set, shared, decision.send)
 
     def end_input(self) -> None:
-        """Ask the program to end; `close` waits for it."""
         if self._group is not None and not self._input_ended:
             self._input_ended = monotonic()
             self._group.end_input()
@@ -183,7 +178,6 @@ class ProgramLaw(Law):
         return decoded
 
     def _says(self, error: str, what: str) -> str:
-        """Return what an error of the program's own is told as."""
         return f"{self._name} says: {printable(error, 200)} ({what})"
 
     def _put(self, line: bytes, what: str) -> None:

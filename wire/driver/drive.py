@@ -48,7 +48,6 @@ class StoppedOnLeashError(StoppedError):
 
 
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
-    """Perform the actions of a core, in its order."""
     for action in actions:
         if isinstance(action, Publish):
             session.publish(action.key, action.payload)

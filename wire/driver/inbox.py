@@ -123,7 +123,6 @@ class Inbox:
         return True
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
-        """Put a message in that is one of many, or long, if it may wait."""
         _, key, payload = event
         size, known = len(payload), asked or self.is_known(key, payload)
         long = size if size > SMALL else 0
@@ -148,7 +147,6 @@ class Inbox:
         self._losses[key, kind] = Loss(key, kind, text, 1) if first is None else first._replace(number=first.number + 1)
 
     def take_losses(self) -> tuple[Loss, ...]:
-        """Take out the messages and tokens that were dropped since the last call."""
         if not self._losses:
             return ()
         with self._guard:

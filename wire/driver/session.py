@@ -173,7 +173,6 @@ class Session:
         self._changeable = False
 
     def _meets_router(self) -> bool:
-        """Wait for the first link; return whether it leads to a router."""
         linked = threading.Event()
 
         def on_event(event: zenoh.TransportEvent) -> None:
@@ -185,7 +184,6 @@ class Session:
         return bool(self._session.info.routers_zid())
 
     def setting(self, path: str) -> Any:
-        """Return a setting of Zenoh in force, by its path in Zenoh's configuration, e.g. "transport/link/tx/lease"."""
         return json.loads(self._config.get_json(path))
 
     @property
@@ -223,8 +221,6 @@ class Session:
         self._declared.append(self._session.declare_subscriber(key, handler, allowed_origin=remote))
 
     def answer(self, key: str, payload: bytes) -> None:
-        """Answer every query on a key with the same bytes."""
-
         def on_query(query: zenoh.Query) -> None:
             with query:
                 query.reply(key, payload)
@@ -277,7 +273,6 @@ class Session:
             self._session.put(key, payload, **self._delivery(key))
 
     def prepare(self, key: str) -> None:
-        """Declare the publisher of a key, once: a message on it then takes less time."""
         if key not in self._publishers:
             self._publishers[key] = self._session.declare_publisher(key, **self._delivery(key))
 
@@ -322,7 +317,6 @@ class Session:
                 end_left_links()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
-        """Run a callback in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
         return self._zenoh.handlers.Callback(callback, indirect=False)
 
 

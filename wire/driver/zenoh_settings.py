@@ -75,7 +75,6 @@ def zenoh_settings(
 
 
 def as_client(config: dict[str, Any]) -> dict[str, Any]:
-    """Return the configuration of the same session as the client of the router that it has met."""
     return config | {"mode": "client", "listen": {"endpoints": []}}
 
 

@@ -83,7 +83,6 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
 
 
 def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[Problem]:
-    """Return all that is wrong with a plugin, at its parameters, or at "" for the whole."""
     try:
         found = registry.resolve(plugin.use, plugin.folder)
     except PluginError as error:

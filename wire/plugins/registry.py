@@ -100,7 +100,6 @@ class Registry(Generic[T]):
 
     @property
     def group(self) -> str:
-        """Group of entry points by which an installed distribution adds to this registry."""
         return f"gridpeers.{self.plural.replace(' ', '_')}"
 
     @property

@@ -38,7 +38,6 @@ _KIND_WORDS = {
 
 
 def shown(raw: object) -> str:
-    """Return a value as TOML writes it, or nearly."""
     try:
         text = json.dumps(raw, ensure_ascii=False, default=str)
     except (TypeError, ValueError, RecursionError):  # what Python has and no file
@@ -54,7 +53,6 @@ def in_words(*kinds: Any) -> str:
 
 
 def wrong_type(field: Field, raw: Any) -> str:
-    """Say what a key takes in place of a value of another type."""
     kinds = kinds_of(field.type)
     literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
     if literal is not None and isinstance(raw, str):
@@ -67,7 +65,6 @@ def wrong_type(field: Field, raw: Any) -> str:
 
 
 def expected(field: Field) -> str:
-    """Say what to write for a key that is missing."""
     kind, example = without_none(field.type), field.mark(Example)
     if get_origin(kind) is dict:
         return f"write at least one table [{field.key}.NAME]"
@@ -125,7 +122,6 @@ def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
 
 
 def without_none(kind: Any) -> Any:
-    """Return a type without None: TOML has no null."""
     return functools.reduce(operator.or_, kinds_of(kind))
 
 
@@ -290,7 +286,6 @@ class _Reader:
         return value
 
     def _chosen(self, structs: list[type[T]], raw: Mapping[str, Any], path: str) -> type[T] | None:
-        """Return the struct that a table names by its tag, after noting that it names none."""
         if len(structs) == 1:
             return structs[0]
         tags = {str(struct.__struct_config__.tag): struct for struct in structs}
@@ -354,7 +349,6 @@ def _names(fields: list[Field]) -> Iterator[str]:
 
 
 def _fallback(field: Field) -> Any:
-    """Return what stands for a wrong value while the rest is read."""
     return _placeholder(field.type) if field.required else field.default
 
 

@@ -35,8 +35,6 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True)
 class Example:
-    """A right value, written as in the file."""
-
     text: str
 
 
@@ -99,8 +97,6 @@ _RANGES = (Plausible, Probability, Range)
 
 
 class Field(NamedTuple):
-    """One field of a table."""
-
     name: str
     """Of the attribute."""
     key: str
@@ -117,7 +113,6 @@ class Field(NamedTuple):
 
     @property
     def number(self) -> Field:
-        """The field that says unit and range of the number: of a shorthand that of its struct, else this one."""
         shorthand = self.mark(Shorthand)
         return named(shorthand.struct, shorthand.field) if shorthand else self
 

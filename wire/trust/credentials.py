@@ -131,7 +131,6 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
 
 
 def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
-    """Return what a process allows on a link whose other end has the certificate of a member."""
     return tuple(_rules(own, other, star=star))
 
 
@@ -199,7 +198,6 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         )
 
     def stranger(self, common_name: str) -> str:
-        """Return why the holder of a certificate that TLS has accepted has no access; empty if it has."""
         if any(common_name in member.accepted for member in self.members):
             return ""
         shown = printable(common_name, 64) or "nobody"
@@ -254,7 +252,6 @@ class LinkCertificates:
                     self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
 
     def take_lines(self) -> tuple[str, ...]:
-        """Take out lines on links whose other end has a certificate and no access."""
         lines, self._lines = tuple(self._lines), []
         return lines
 

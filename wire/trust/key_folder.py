@@ -152,13 +152,11 @@ def open_credentials(
 
 
 def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
-    """Return the first member of these roles whose key is in the folder."""
     there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
     return next((member for role in roles for member in there if member.role == role), None)
 
 
 def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
-    """Return why a viewer cannot give a command, and who can."""
     who = [each for each in known.members if each.role in COMMANDING and not each.revoked]
     here = next((each.name for each in who if (folder / f"{each.name}.key").is_file()), "")
     names = " or ".join(each.name for each in who)

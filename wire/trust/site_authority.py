@@ -177,7 +177,6 @@ def _with(known: MemberList, member: Member) -> MemberList:
 
 
 def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurvePrivateKey]:
-    """Return the members, and certificate and private key of the authority."""
     known, path = read_list(folder), folder / CA_KEY
     if not path.is_file():
         raise KeysError(f"{path}: is missing; certificates are issued and revoked where the site was made")
