@@ -11,7 +11,7 @@ import importlib
 import sys
 from collections.abc import Callable
 from functools import cache
-from importlib.machinery import PathFinder
+from importlib.machinery import ModuleSpec, PathFinder
 from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
@@ -188,7 +188,9 @@ class Registry(Generic[T]):
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
             _folders.add(folder)
         try:
-            if name not in sys.modules and find_spec(name) is None:
+            known = sys.modules.get(name)
+            spec = find_spec(name) if known is None else known.__spec__
+            if (known is None and spec is None) or (meant is None and _is_of_another(spec, folder)):
                 place = f" in {folder} or" if folder else ""
                 text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
                 raise PluginError(f"{reference}: {text}")
@@ -208,6 +210,11 @@ class Registry(Generic[T]):
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
+
+
+def _is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
+    """Whether a module stands in the folder of another scenario: only this process would find it there."""
+    return spec is not None and bool(spec.origin) and str(spec.origin).rpartition("/")[0] in _folders - {folder}
 
 
 def _as_it_is_now(module: ModuleType) -> ModuleType:
@@ -245,7 +252,7 @@ def folder_of(reference: str, folder: str) -> str:
         spec = find_spec(top)
     except ValueError:  # a module without a specification, as of an embedded interpreter
         return folder
-    if spec is None or spec.origin is None or spec.origin == "frozen":
+    if spec is None or spec.origin is None or spec.origin == "frozen" or _is_of_another(spec, folder):
         return folder
     place = spec.origin.rpartition("/")[0]
     return place.rpartition("/")[0] if spec.submodule_search_locations else place
