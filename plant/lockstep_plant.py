@@ -54,25 +54,12 @@ Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "clos
 TELEMETRY_TICKS = 10
 """Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
 
-AGAIN = 1.0
-"""Time (s) after which a question without an answer is asked again."""
-
-SILENT = 3.0
-"""Time (s) after a recorder's last word after which it counts as silent; it speaks every second."""
+AGAIN = 1.0  # time (s) after which a question without an answer is asked again
+SILENT = 3.0  # time (s) after a recorder's last word after which it counts as silent; it speaks every second
 
 
 class LockstepPlant(PlantNode):
-    """The plant under simulated time.
-
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents and recorders to wait for, the control period and the end.
-    plant : PlantLike
-        The plant at t = 0.
-    links : Links, optional
-        Emulated links to the plant; None for none.
-    """
+    """The plant under simulated time."""
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
         super().__init__(config, plant, links)
@@ -84,22 +71,18 @@ class LockstepPlant(PlantNode):
         joiners = self._schedule.joiners.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
         """All agents that may ever take part, in the order of the inverters."""
-        self._roster: tuple[str, ...] = ()
-        """Agents of the last roster sent."""
+        self._roster: tuple[str, ...] = ()  # agents of the last roster sent
         self._roster_number = -1
-        self._roster_changed = False
-        """Whether an agent has joined or gone since."""
+        self._roster_changed = False  # whether an agent has joined or gone since
         self._joining: tuple[str, ...] = ()
         """Newcomers that the held tick waits for: they may appear although the run has begun."""
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._last_heard = self._barrier.last_heard
-        self._ask_at = inf
-        """When open questions are asked again (s on the driver's clock)."""
+        self._ask_at = inf  # when open questions are asked again (s on the driver's clock)
         self._unacknowledged = UnacknowledgedTelemetry(config.recorders)
         self._recorders_at = dict.fromkeys(config.recorders, -inf)
         """When each recorder that the run waits for has spoken last (s on the driver's clock)."""
-        self._prepare_bytes = b""
-        """The last roster sent."""
+        self._prepare_bytes = b""  # the last roster sent
         self._states: dict[str, State] = {}
         for name in self._everyone:
             self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
@@ -109,7 +92,6 @@ class LockstepPlant(PlantNode):
         if config.recorders:
             self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
-        """Keys to subscribe to before the token is declared."""
         self._tick_traffic: TickTraffic | None = None
         if self.journal is not None:
             self._tick_traffic = self.traffic = TickTraffic(self.keys, self._everyone, self.journal)
@@ -178,8 +160,7 @@ class LockstepPlant(PlantNode):
             self.reproducible = False
             self._close(reason, now)
 
-    interrupt = abort
-    """End the run because this process must leave."""
+    interrupt = abort  # end the run because this process must leave
 
     # ---------------------------------------------------------------- liveliness
 

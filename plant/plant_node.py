@@ -27,37 +27,15 @@ from gridpeers.wire.wording import printable
 class TickActions(NamedTuple):
     """Scheduled joins, leaves and deaths of one tick."""
 
-    leave: tuple[str, ...] = ()
-    """Inverters whose agents leave."""
-    join: tuple[str, ...] = ()
-    """Inverters whose agents join."""
-    die: tuple[str, ...] = ()
-    """Inverters whose agents die."""
+    leave: tuple[str, ...] = ()  # inverters whose agents leave
+    join: tuple[str, ...] = ()  # inverters whose agents join
+    die: tuple[str, ...] = ()  # inverters whose agents die
 
 
 class AgentSchedule:
     """Scheduled joins, leaves and deaths of a run, by tick.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        Has the schedule and the control period.
-    inverters : tuple[str, ...]
-        The plant's inverters.
-
-    Raises
-    ------
-    ValueError
-        If an action names no inverter of the plant, or its time is no tick after 0.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.plant_config import PlantSettings, ScheduledAction
-    >>> leave = ScheduledAction(t=2.0, inverter="inv2", action="leave")
-    >>> config = PlantConfig(run="demo", settings=PlantSettings(), agents=("inv1", "inv2"), T_c=0.02, end=5.0,
-    ...     record_step=0.01, deadline=10.0, listen=(), schedule=(leave,))
-    >>> AgentSchedule(config, ("inv1", "inv2")).take(100)
-    TickActions(leave=('inv2',), join=(), die=())
+    ValueError if an action names no inverter of the plant, or its time is no tick after 0.
     """
 
     def __init__(self, config: PlantConfig, inverters: tuple[str, ...]) -> None:
@@ -85,32 +63,16 @@ class AgentSchedule:
         return self._at.pop(tick, TickActions())
 
 
-CLOSING = 2.0
-"""Longest wait (s) for the other nodes to close."""
-
-MOST_RECORDERS = 20
-"""Recorders that are noted beside those that the run waits for: anybody may hold tokens."""
-
-STAYS = "its inverter stays on primary droop at its last set-points"
-"""State of the inverter whose agent has died."""
-
-IDLE = "; its agent is idle, its inverter stays on primary droop"
-"""End of the event of a law that failed."""
+CLOSING = 2.0  # longest wait (s) for the other nodes to close
+MOST_RECORDERS = 20  # recorders that are noted beside those that the run waits for: anybody may hold tokens
+STAYS = "its inverter stays on primary droop at its last set-points"  # state of the inverter whose agent has died
+IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the event of a law that failed
 
 
 class PlantNode(Node):
     """The plant as a participant of a run.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents and recorders to wait for, the control period and the end.
-    plant : PlantLike
-        The plant at t = 0.
-    links : Links or None
-        Emulated links to the plant; None for none.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
+    `rate`: most messages of one sender per s of run time; see `gridpeers.wire.membership`.
     """
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:
@@ -119,12 +81,9 @@ class PlantNode(Node):
             check_name("agents", name)
             if name not in plant.inverters:
                 raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
-        self.outcome = ""
-        """Why the run broke; empty while it is sound."""
-        self.cause: Exception | None = None
-        """Error of the plant that broke the run, if any."""
-        self.tick = 0
-        """k: the plant is at k T_c."""
+        self.outcome = ""  # why the run broke; empty while it is sound
+        self.cause: Exception | None = None  # error of the plant that broke the run, if any
+        self.tick = 0  # k: the plant is at k T_c
         self.config = config
         self._inverters = tuple(plant.inverters)
         self._links = links
@@ -138,10 +97,8 @@ class PlantNode(Node):
             self.journal = JournalBuffer()
         self._awaits_journals = self.journal is not None and config.clock == "wall"
         """Whether agents send the end of their journals when they close."""
-        self._last_due = False
-        """Whether the run has ended and the last telemetry is still to be sent."""
-        self._failed_laws: dict[str, str] = {}
-        """By agent, why its law failed."""
+        self._last_due = False  # whether the run has ended and the last telemetry is still to be sent
+        self._failed_laws: dict[str, str] = {}  # by agent, why its law failed
 
     @property
     def token(self) -> str:

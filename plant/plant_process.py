@@ -49,26 +49,11 @@ def run_plant(
 
     The session opens first, because it is the rendezvous: the agents find each other while the plant is built.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        The plant, its agents and its times.
-    builder : Callable[[PlantConfig], LivePlant], optional
-        Builds the plant; tests have smaller ones.
-    make_links : MakeLinks, optional
-        Makes the emulated links to the plant, if there are any.
-    on_word : Callable[[str], None], optional
-        Receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
+    `on_word`: receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
 
-    Returns
-    -------
-    str
-        Why the run broke; empty after a good end.
+    Return why the run broke; empty after a good end.
 
-    Raises
-    ------
-    ConfigurationError, SessionError
-        If the configuration cannot work.
+    ConfigurationError, SessionError if the configuration cannot work.
     """
     log = logging.getLogger("plant")
     wall = config.clock == "wall"

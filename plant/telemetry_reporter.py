@@ -13,8 +13,7 @@ from gridpeers.plant.plant_interface import PlantLike, ReadingLike
 from gridpeers.wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.wording import printable
 
-_NUMBER_BYTES = 9
-"""Bytes of one float in msgpack."""
+_NUMBER_BYTES = 9  # bytes of one float in msgpack
 
 
 def measurement_of(
@@ -52,38 +51,21 @@ def _scale(field: str) -> Callable[[float], float]:
 
 _in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
 
-_LATEST = 20
-"""Number of latest events for late clients: with twice as many of the longest, an answer is still short."""
-
-
-ROWS_BYTES = 32_000
-"""Bytes of rows in a message: Zenoh sends it in one piece."""
-
-EVENTS = 30
-"""Most events in a message; the longest possible ones fit within the limit."""
+_LATEST = 20  # number of latest events for late clients: with twice as many of the longest, an answer is still short
+ROWS_BYTES = 32_000  # bytes of rows in a message: Zenoh sends it in one piece
+EVENTS = 30  # most events in a message; the longest possible ones fit within the limit
 
 
 class Reporter:
-    """Gather rows and events between two reports.
-
-    Parameters
-    ----------
-    epoch : int
-        Epoch of the plant.
-    plant : PlantLike
-        Source of the rows.
-    """
+    """Gather rows and events between two reports."""
 
     def __init__(self, epoch: int, plant: PlantLike) -> None:
         self._epoch, self._plant = epoch, plant
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
-        self._quiet: dict[float, int] = {}
-        """Number of quiet states, by run time (s)."""
-        self.seq = 0
-        """Number of the next Telemetry, or of the one under way."""
-        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
-        """The latest events, for late clients."""
+        self._quiet: dict[float, int] = {}  # number of quiet states, by run time (s)
+        self.seq = 0  # number of the next Telemetry, or of the one under way
+        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)  # the latest events, for late clients
 
     @property
     def has_events(self) -> bool:
@@ -161,13 +143,6 @@ class UnacknowledgedTelemetry:
 
     Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
 
-    Parameters
-    ----------
-    recorders : Iterable[str]
-        Names of the recorders.
-
-    Examples
-    --------
     >>> kept = UnacknowledgedTelemetry(["history"])
     >>> for number, payload in [(0, b"T0"), (1, b"L1"), (1, b"T1")]:
     ...     kept.keep(number, payload)
@@ -178,8 +153,7 @@ class UnacknowledgedTelemetry:
     """
 
     def __init__(self, recorders: Iterable[str]) -> None:
-        self._needed = dict.fromkeys(recorders, 0)
-        """Number of the Telemetry that each recorder needs next."""
+        self._needed = dict.fromkeys(recorders, 0)  # number of the Telemetry that each recorder needs next
         self._kept: deque[tuple[int, bytes]] = deque()
         self._bytes = 0
 

@@ -25,10 +25,7 @@ class PlantError(RuntimeError):
 class NoSolutionError(PlantError):
     """Islands of a network have no solution with the present injections.
 
-    Attributes
-    ----------
-    islands : tuple of int
-        Their numbers in the network's reduction.
+    `islands`: their numbers in the network's reduction.
     """
 
     def __init__(self, islands: tuple[int, ...]) -> None:
@@ -39,10 +36,7 @@ class NoSolutionError(PlantError):
 class NoPowerFlowError(PlantError):
     """No operating point at the start.
 
-    Attributes
-    ----------
-    weak : dict of int to float
-        Load branches that the network cannot feed even alone, and their short-circuit powers (VA).
+    `weak`: load branches that the network cannot feed even alone, and their short-circuit powers (VA).
     """
 
     def __init__(self, weak: dict[int, float]) -> None:
@@ -50,18 +44,13 @@ class NoPowerFlowError(PlantError):
         self.weak = weak
 
 
-PHASES = np.array([1.0, A120.conjugate(), A120])
-"""Balanced set of phasors, phase A at 0."""
-
-_ONTO_A = np.array([1.0, A120, A120**2])
-"""Factors that turn the phases of a balanced set onto phase A."""
+PHASES = np.array([1.0, A120.conjugate(), A120])  # balanced set of phasors, phase A at 0
+_ONTO_A = np.array([1.0, A120, A120**2])  # factors that turn the phases of a balanced set onto phase A
 
 
 def aligned_sum(V: Complex) -> Complex:
     """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence.
 
-    Examples
-    --------
     >>> float(abs(aligned_sum(240.0 * PHASES)).round(9)), float(abs(aligned_sum(240.0 * PHASES[::-1])).round(9))
     (720.0, 0.0)
     """
@@ -72,10 +61,8 @@ def aligned_sum(V: Complex) -> Complex:
 class LoadLaw:
     """The law of m load branches, as parallel arrays."""
 
-    S: Complex
-    """Constant power of each (VA)."""
-    I0: Complex
-    """Constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)."""
+    S: Complex  # constant power of each (VA)
+    I0: Complex  # constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)
     limited_at: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
     """Branches with a `LoadPart`'s law; their S and I0 are 0."""
     law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))
@@ -131,19 +118,15 @@ class Circuit:
     Y: sp.csc_array
     """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that are merged
     into another are empty."""
-    sources: NDArray[np.int64]
-    """Nodes held by an ideal source; may be empty."""
+    sources: NDArray[np.int64]  # nodes held by an ideal source; may be empty
     source_voltage: NDArray[np.complex128]
-    """Their phasors (V)."""
     terminals: NDArray[np.int64]
     """Inverter terminals: n_inv x 3 nodes, phases A, B, C; of a single-phase inverter its one node three times."""
     C: sp.csc_array
     """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
     I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
-    loads: LoadLaw
-    """Law of the currents that the branches draw."""
-    V_branch: NDArray[np.complex128]
-    """Nominal phasor of each branch (V): where the first solution starts."""
+    loads: LoadLaw  # law of the currents that the branches draw
+    V_branch: NDArray[np.complex128]  # nominal phasor of each branch (V): where the first solution starts
     reference: NDArray[np.int64] | None = None
     """Node from which each node's voltage counts, -1: earth; None: all from earth. It counts from earth itself."""
     neutrals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))

@@ -22,14 +22,11 @@ from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droo
 class OperatingPoint:
     """Injections and voltages of an equilibrium, n_inv x 3 each."""
 
-    J: Complex
-    """Norton injections (A)."""
-    V: Complex
-    """Terminal voltages (V)."""
+    J: Complex  # Norton injections (A)
+    V: Complex  # terminal voltages (V)
     I: Complex  # noqa: E741  # the paper's symbol for current
     """Currents out of the inverters (A)."""
-    V_branch: Complex
-    """Voltages of the live load branches (V)."""
+    V_branch: Complex  # voltages of the live load branches (V)
     on_droop: NDArray[np.bool_]
     """Inverters whose voltage is V_set - m_q q; the others are within a dead band, or at the limit of their Q."""
     on_edge: NDArray[np.bool_]
@@ -47,25 +44,12 @@ def equilibrium(
 ) -> OperatingPoint:
     """Return the operating point of section 7.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    units
-        The inverters; disconnected ones take no part.
-    P
-        Real power of each (pu); ignored for a swing.
-    Q
-        Reactive power of each (pu), or the first guess where `V_set` is given.
-    V_set
-        Voltage set-point of each (pu), from which Q follows by droop and dead band; None to keep Q.
-    swing_voltage
-        Phasors that a swing holds on its three phases (pu of nominal).
+    `units`: the inverters; disconnected ones take no part; `P`: real power of each (pu); ignored for a swing; `Q`:
+    reactive power of each (pu), or the first guess where `V_set` is given; `V_set`: voltage set-point of each (pu),
+    from which Q follows by droop and dead band; None to keep Q; `swing_voltage`: phasors that a swing holds on its
+    three phases (pu of nominal).
 
-    Raises
-    ------
-    PlantError
-        If there is no such point.
+    PlantError if there is no such point.
     """
     n, online = len(units), units.connected
     _, label = circuit.components()
@@ -121,17 +105,10 @@ def set_equilibrium(
 ) -> None:
     """Set the inverters' set-points and controller states so that they rest at an operating point.
 
-    Parameters
-    ----------
-    units
-        The inverters; written.
-    point
-        Operating point.
-    online
-        Inverters that deliver; the others keep their states, with `P` and `V_set` as set-points.
-    P, V_set
-        Real powers and set-points of the point (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
-        V_set := v, Q_set := q; else all the reactive power comes from the droop, within dead band and limit.
+    `units`: the inverters; written; `online`: inverters that deliver; the others keep their states, with `P` and
+    `V_set` as set-points; `P`, `V_set`: real powers and set-points of the point (pu). Without `V_set` a GFL rests at
+    its voltage and its reactive power, V_set := v, Q_set := q; else all the reactive power comes from the droop, within
+    dead band and limit.
     """
     S, v = units.measured(point.V, point.I)
     held = units.regulated(point.V, point.I)

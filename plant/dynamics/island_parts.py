@@ -20,8 +20,7 @@ from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Real, R
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
 from gridpeers.plant.dynamics.threads import each_on_a_core
 
-PART = 1000
-"""Nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters."""
+PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
 
 Integers = NDArray[np.int64]
 
@@ -31,8 +30,7 @@ _OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")
 _ADVANCED = ("gfm_state", "gfl_state", "J", "V", "I", "limiting")
 """Arrays of the inverters that the steps advance; of the others they only read, or need the room."""
 
-Which = Integers | slice
-"""Some of the inverters: a slice where they are neighbours, which needs no copy."""
+Which = Integers | slice  # some of the inverters: a slice where they are neighbours, which needs no copy
 
 
 @dataclass(frozen=True)
@@ -40,17 +38,12 @@ class Part:
     """Some islands of a network: their arrays, and where these stand in the network's."""
 
     net: Reduced
-    branches: Integers
-    """Its live branches."""
+    branches: Integers  # its live branches
     nodes: int
-    """Number of its nodes."""
     size: int
-    """Number of its inverters."""
     inverters: Which
-    gfm: Which
-    """Its grid-forming inverters, among all of them."""
-    gfm_at: Integers
-    """The inverter of the part that each is."""
+    gfm: Which  # its grid-forming inverters, among all of them
+    gfm_at: Integers  # the inverter of the part that each is
     gfl: Which
     gfl_at: Integers
 
@@ -71,14 +64,8 @@ class Part:
 class IslandParts:
     """The parts of a network at one tangent of its loads.
 
-    Parameters
-    ----------
-    net
-        The network, by sparse factors.
-    node_island
-        Island of each of its nodes, in the order of the factors.
-    units
-        The inverters; only which of them are of which kind is read.
+    `net`: the network, by sparse factors; `node_island`: island of each of its nodes, in the order of the factors;
+    `units`: the inverters; only which of them are of which kind is read.
     """
 
     def __init__(self, net: Reduced, node_island: Integers, units: Units) -> None:

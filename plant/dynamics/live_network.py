@@ -16,8 +16,7 @@ from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
 
-ROOM = 64
-"""Values that are foreseen that are kept: a factored network of 123 nodes has 1 MB."""
+ROOM = 64  # values that are foreseen that are kept: a factored network of 123 nodes has 1 MB
 
 OTHERS = 8
 """Values that are not foreseen that are kept: a person who switches to and fro needs a few. With 64 a plant grew by
@@ -33,8 +32,6 @@ class ForeseenCache(Generic[K, V]):
     The first `ROOM` values that are foreseen stay. Further ones, as of a schedule with hundreds of events, count as
     others: none may keep an unbounded part of the memory.
 
-    Examples
-    --------
     >>> cache = ForeseenCache()
     >>> cache.get("event", lambda: [1], foreseen=True)
     [1]
@@ -55,14 +52,7 @@ class ForeseenCache(Generic[K, V]):
     def get(self, key: K, make: Callable[[], V], *, foreseen: bool = False) -> V:
         """Return the value of a key; make it if it is not there.
 
-        Parameters
-        ----------
-        key
-            What it is for.
-        make
-            Makes it.
-        foreseen
-            Whether an event to come needs it, so that it stays.
+        `foreseen`: whether an event to come needs it, so that it stays.
         """
         if key in self._foreseen:
             return self._foreseen[key]
@@ -77,28 +67,17 @@ class ForeseenCache(Generic[K, V]):
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
 
-WORTH = 40
-"""Iterations of a network solution that cost as much time as new sparse factors."""
+WORTH = 40  # iterations of a network solution that cost as much time as new sparse factors
 
 
 class LiveNetwork:
     """The network between the inverters, from one switching to the next.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    inverters
-        One per row of its terminals. `solve` reads their injections and writes their voltages.
+    `inverters`: one per row of its terminals. `solve` reads their injections and writes their voltages.
 
-    Attributes
-    ----------
-    reduction : Reduction
-        Reduction of the present circuit and its connected inverters.
-    net : Reduced
-        Its arrays for the inner loop, linearised; set by the first `solve`.
-    x : float64[2 m]
-        [Re; Im] of the live branches' voltages (V), each in its island's frame: the next solution's first guess.
+    `reduction`: reduction of the present circuit and its connected inverters; `net`: its arrays for the inner loop,
+    linearised; set by the first `solve`; `x`: [Re; Im] of the live branches' voltages (V), each in its island's frame:
+    the next solution's first guess (2 m).
     """
 
     net: Reduced
@@ -113,8 +92,7 @@ class LiveNetwork:
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self._noted: Complex = circuit.V_branch.astype(complex)
-        self._steps_since = False
-        """Whether steps were taken since `V_branch` was written."""
+        self._steps_since = False  # whether steps were taken since `V_branch` was written
         self._excess = 0
         self._parts: IslandParts | None = None
 
@@ -150,10 +128,7 @@ class LiveNetwork:
     def solve(self) -> None:
         """Linearise at the solution of the present injections, by Newton's method with a fresh tangent each time.
 
-        Raises
-        ------
-        NoSolutionError
-            If islands have no solution; the terminal voltages are then as before.
+        NoSolutionError if islands have no solution; the terminal voltages are then as before.
         """
         units, branches = self._inverters, self.reduction.branches
         V_b, theta, V = self.V_branch[branches], units.theta(), units.V.copy()
@@ -179,10 +154,7 @@ class LiveNetwork:
     def renew(self) -> None:
         """Linearise again at the solution of the present injections, starting from the present voltages.
 
-        Raises
-        ------
-        NoSolutionError
-            If islands have no solution.
+        NoSolutionError if islands have no solution.
         """
         self._linearise(self._solve_islands(self._branch_voltages()))
 
@@ -191,11 +163,6 @@ class LiveNetwork:
 
         A tangent at the present voltages needs one iteration a solution. Dense matrices are never renewed for their
         speed: a new inverse costs more than it saves.
-
-        Parameters
-        ----------
-        iterations, solutions
-            Of the steps since the last call.
         """
         if self.net.sparse.constant.size:
             self._excess += max(iterations - 2 * solutions, 0)
@@ -265,16 +232,8 @@ def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> i
 
     Nothing but the work arrays of `net` is changed.
 
-    Parameters
-    ----------
-    net
-        Linearised at the present angles: all frames stand at 0.
-    units
-        Of which a network solution within the current limits has failed.
-    x
-        Where that solution began (V), [Re; Im] of all branches.
-    tolerance
-        Of a network solution (V).
+    `net`: linearised at the present angles: all frames stand at 0; `units`: of which a network solution within the
+    current limits has failed; `x`: where that solution began (V), [Re; Im] of all branches.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
     I_b, work = np.empty(x.size // 2, complex), np.empty(12 * len(J) + 3 * x.size)

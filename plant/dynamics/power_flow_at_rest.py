@@ -26,8 +26,7 @@ MOST_ROUNDS = 500
 """Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:
 near the largest power that a network carries a round leaves most of an error."""
 
-NEAR = 4
-"""Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
+NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
 
 
 class PowerFlow:
@@ -39,8 +38,7 @@ class PowerFlow:
         self.reduction = reduce_network(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
-        self.I_b = np.empty(self.V_b.size, complex)
-        """Currents of the live load branches (A), of the last solution."""
+        self.I_b = np.empty(self.V_b.size, complex)  # currents of the live load branches (A), of the last solution
         self.net = self._linearise()
         self._near = False
 
@@ -118,18 +116,13 @@ AT_ONCE = 8
 class VoltVarAtRest(NamedTuple):
     """Droops and bands of inverters, and the set-points and limits at rest; arrays over the inverters."""
 
-    V_set: Real
-    """pu."""
-    m_q: Real
-    """pu per pu."""
-    db_UV: Real
-    """Dead bands below V_set (pu); 0 for a GFM, infinite without volt-var."""
-    db_OV: Real
-    """The same above V_set."""
+    V_set: Real  # pu
+    m_q: Real  # pu per pu
+    db_UV: Real  # dead bands below V_set (pu); 0 for a GFM, infinite without volt-var
+    db_OV: Real  # the same above V_set
     from_edge: NDArray[np.bool_]
     """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
-    Q_min: Real
-    """Limits of reactive power (pu)."""
+    Q_min: Real  # limits of reactive power (pu)
     Q_max: Real
 
     def first_places(self) -> NDArray[np.int64]:
@@ -156,14 +149,8 @@ class VoltVarAtRest(NamedTuple):
     def next_places(self, place: NDArray[np.int64], v: Real, Q: Real, rounds: int) -> NDArray[np.int64]:
         """Return where inverters belong that rest with Q at v; the same places once they are right.
 
-        Parameters
-        ----------
-        place
-            Where they were taken to be.
-        v, Q
-            Voltages and reactive powers with which they rest there (pu).
-        rounds
-            How often places have changed before.
+        `place`: where they were taken to be; `v`, `Q`: voltages and reactive powers with which they rest there (pu);
+        `rounds`: how often places have changed before.
         """
         low = self.V_set - v
         within = (-self.db_OV < low) & (low < self.db_UV) & ~self.from_edge
@@ -200,36 +187,20 @@ MOST_PLACE_ROUNDS = 100
 class DroopPowers(NamedTuple):
     """Injections, voltages and reactive powers at rest, and where each inverter rests on its characteristic."""
 
-    J: Complex
-    """Norton injections (A)."""
-    V: Complex
-    """Terminal voltages (V)."""
-    Q: Real
-    """pu."""
-    on_droop: NDArray[np.bool_]
-    """Inverters whose voltage is V_set - m_q q."""
-    on_edge: NDArray[np.bool_]
-    """Inverters on the edge of a dead band."""
+    J: Complex  # Norton injections (A)
+    V: Complex  # terminal voltages (V)
+    Q: Real  # pu
+    on_droop: NDArray[np.bool_]  # inverters whose voltage is V_set - m_q q
+    on_edge: NDArray[np.bool_]  # inverters on the edge of a dead band
 
 
 def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: NDArray[np.bool_]) -> DroopPowers:
     """Find the Q that each characteristic gives at its terminal's voltage.
 
-    Parameters
-    ----------
-    flow
-        The power flow of constant powers.
-    J, Q
-        First guesses of the injections (A) and reactive powers (pu).
-    P, V_set
-        Real powers and voltage set-points (pu).
-    swing
-        Inverters that hold their voltage, whatever their droop.
+    `J`, `Q`: first guesses of the injections (A) and reactive powers (pu); `P`, `V_set`: real powers and voltage
+    set-points (pu); `swing`: inverters that hold their voltage, whatever their droop.
 
-    Raises
-    ------
-    PlantError
-        If there are none.
+    PlantError if there are none.
     """
     units = flow.units
     free = ~swing & flow.reduction.online

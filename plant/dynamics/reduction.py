@@ -39,13 +39,7 @@ from gridpeers.plant.dynamics.threads import one_thread
 
 
 class DenseReduction(SwitchState):
-    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation.
-
-    Parameters
-    ----------
-    circuit, y_f, forming, online
-        As for `SwitchState`.
-    """
+    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation."""
 
     @one_thread()
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
@@ -82,17 +76,7 @@ class DenseReduction(SwitchState):
                 self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = turn[row]
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        """Return branch voltages (V) by Newton's method, and the islands that have no solution, which keep the guess.
-
-        Parameters
-        ----------
-        J
-            Injections (A), n_inv x 3, in the common frame.
-        source_voltage
-            Phasors of the ideal sources (V).
-        guess
-            Where to begin (V, live branches).
-        """
+        """Return branch voltages (V) by Newton's method, and the islands without solution, which keep the guess."""
         at_branches, at_terminals = self.without_load(J, source_voltage)
         V_b, failed = guess.copy(), []
         for k in np.flatnonzero(self.live).tolist():
@@ -125,14 +109,7 @@ class DenseReduction(SwitchState):
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Return the inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
-        Parameters
-        ----------
-        V_b
-            Point of linearisation.
-        source_voltage
-            Phasors of the ideal sources (V).
-        theta
-            Angle of every inverter at that point (rad).
+        `V_b`: point of linearisation; `theta`: angle of every inverter at that point (rad).
         """
         net = self.at_tangent(V_b, theta)
         s_b, s_G = self.source_parts(source_voltage)
@@ -173,13 +150,7 @@ def _stack(V: Complex) -> Real:
 
 
 class SparseReduction(SwitchState):
-    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers.
-
-    Parameters
-    ----------
-    circuit, y_f, forming, online
-        As for `SwitchState`.
-    """
+    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers."""
 
     def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
         super().__init__(circuit, y_f, forming, online)
@@ -300,18 +271,8 @@ class SparseReduction(SwitchState):
 class SparseIsland:
     r"""An island by its node voltages, :math:`F(V) = Y V + C I_b(C^T V + c) - J`.
 
-    Parameters
-    ----------
-    Y
-        Admittances between its unknown nodes (S).
-    C
-        Incidence of its load branches.
-    loads
-        What they draw.
-    from_sources
-        What sources contribute to the branches' voltages, c (V).
-    right
-        Currents (A) into the nodes, J: of inverters, and from sources.
+    `from_sources`: what sources contribute to the branches' voltages, c (V); `right`: currents (A) into the nodes, J:
+    of inverters, and from sources.
     """
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
@@ -349,8 +310,7 @@ def _interleaved(V: Complex) -> Real:
 
 Reduction = DenseReduction | SparseReduction
 
-MOST_DENSE = 30
-"""Load branches up to which dense matrices are faster: their cost grows with the square of it."""
+MOST_DENSE = 30  # load branches up to which dense matrices are faster: their cost grows with the square of it
 
 
 def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:

@@ -26,28 +26,10 @@ MOST_RENEWALS = 20
 class Dynamics:
     """Inverters and network, stepped with fixed h.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    inverters
-        One per row of `circuit.terminals`.
-    h
-        Step (s).
-    connected
-        Whether each inverter is switched on at the start; by default all are.
-    method
-        Of time stepping.
+    `inverters`: one per row of `circuit.terminals`.
 
-    Attributes
-    ----------
-    inverters : Inverters
-        Their state; set-points may be written between runs.
-    network : LiveNetwork
-        Network between them.
+    `inverters`: their state; set-points may be written between runs; `network`: network between them.
 
-    Notes
-    -----
     Call `start` once; then `run` and, at switching, `connect` or `switch_inverter`.
     """
 
@@ -61,8 +43,7 @@ class Dynamics:
     ) -> None:
         self.h, self._method = h, method
         self.inverters = Inverters(inverters, connected, method)
-        self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))
-        """Of a network solution (V)."""
+        self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))  # of a network solution (V)
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[switching.Trip] = []
@@ -83,10 +64,7 @@ class Dynamics:
         With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a
         GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop and its dead band.
 
-        Raises
-        ------
-        PlantError
-            If there is no such equilibrium.
+        PlantError if there is no such equilibrium.
         """
         units, network = self.inverters, self.network
         first = np.zeros(P.size) if Q is None else Q

@@ -16,14 +16,10 @@ from gridpeers.plant.dynamics.live_network import LiveNetwork
 class Trip(NamedTuple):
     """Inverters, and perhaps the substation, disconnected because their island has no solution."""
 
-    step: int
-    """Number of steps of the present `Dynamics.run` before it."""
-    inverters: tuple[int, ...]
-    """Disconnected inverters."""
-    substation: bool
-    """Whether the substation was disconnected too."""
-    V_min: float
-    """Their lowest terminal voltage before (pu); inf where only the substation was left."""
+    step: int  # number of steps of the present `Dynamics.run` before it
+    inverters: tuple[int, ...]  # disconnected inverters
+    substation: bool  # whether the substation was disconnected too
+    V_min: float  # their lowest terminal voltage before (pu); inf where only the substation was left
 
 
 def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Trip]:
@@ -80,14 +76,7 @@ def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], s
     An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
     `switch_inverters` reconnects inverters; the substation stays off.
 
-    Parameters
-    ----------
-    units, network
-        The inverters and the network between them.
-    islands
-        Their numbers in the present reduction.
-    step
-        Number of steps of the present run before; the trips repeat it.
+    `step`: number of steps of the present run before; the trips repeat it.
     """
     trip = _trip(units, network, islands, step)
     return [trip, *(later._replace(step=step) for later in connect(units, network, network.circuit))]

@@ -16,8 +16,7 @@ from gridpeers.wire.driver.machine import usable_cores
 
 _LIBRARIES = ThreadpoolController().select(user_api="blas").lib_controllers
 _lock = threading.Lock()
-_before: list[int] = []
-"""Threads of each library before the first run."""
+_before: list[int] = []  # threads of each library before the first run
 _inside = 0
 
 
@@ -48,8 +47,7 @@ def _set(threads: list[int]) -> None:
 T = TypeVar("T")
 R = TypeVar("R")
 
-MOST_THREADS = 4
-"""Threads, as far as there are cores: more of them share one path to the memory."""
+MOST_THREADS = 4  # threads, as far as there are cores: more of them share one path to the memory
 
 
 def each_on_a_core(work: Callable[[T], R], items: Sequence[T]) -> list[R]:

@@ -17,13 +17,7 @@ def switch_names(feeder: Feeder) -> dict[str, str]:
 
 
 def switch_name(feeder: Feeder, text: str) -> str:
-    """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables.
-
-    Raises
-    ------
-    ValueError
-        If no switch has this name.
-    """
+    """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables."""
     known = switch_names(feeder)
     if text not in known:
         shown = [switch.alias or switch.name for switch in feeder.switches]
@@ -33,15 +27,7 @@ def switch_name(feeder: Feeder, text: str) -> str:
 
 
 def bus_islands(feeder: Feeder, closed: Collection[str]) -> tuple[frozenset[str], ...]:
-    """Return the sets of buses joined by branches and these closed switches, in the order of their first buses.
-
-    Parameters
-    ----------
-    feeder
-        Its tables.
-    closed
-        Names of the closed switches, as in the tables.
-    """
+    """Return the sets of buses joined by branches and these closed switches, in the order of their first buses."""
     above = {bus.name: bus.name for bus in feeder.buses}
 
     def root(bus: str) -> str:
@@ -70,8 +56,7 @@ def islands_after(feeder: Feeder, operations: Iterable[SwitchOperations]) -> Ite
         yield bus_islands(feeder, closed)
 
 
-Node = tuple[str, str]
-"""A bus and one of its phases."""
+Node = tuple[str, str]  # a bus and one of its phases
 
 
 class Connectivity:
@@ -80,11 +65,6 @@ class Connectivity:
     Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and a
     grid-forming inverter of three phases join all three. Equipment that feeds nothing by itself, or is connected to
     ground (loads, capacitors, grid-following inverters), joins none.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        Its tables.
     """
 
     def __init__(self, feeder: Feeder) -> None:
@@ -117,14 +97,8 @@ class Connectivity:
     ) -> tuple[frozenset[Node], ...]:
         """Return the sets of connected nodes, in the order of their first buses.
 
-        Parameters
-        ----------
-        closed : Collection[str], optional
-            Names of the closed switches; by default all.
-        whole : Iterable[str], optional
-            Buses whose three phases count as one, because their source feeds all of them.
-        tied : Iterable[tuple[Node, Node]], optional
-            Further pairs of nodes that count as connected.
+        `whole`: buses whose three phases count as one, because their source feeds all of them; `tied`: further pairs of
+        nodes that count as connected.
         """
         above = {node: node for node in self.nodes}
 
@@ -150,12 +124,7 @@ class Connectivity:
     ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
         """Return the parts that the substation or a grid-forming inverter feeds, and the de-energised parts.
 
-        Parameters
-        ----------
-        closed : Collection[str]
-            Names of the closed switches.
-        forming : Iterable[InverterRow]
-            The connected grid-forming inverters.
+        `forming`: the connected grid-forming inverters.
         """
         alive, whole = set[Node](), list[str]()
         for row in forming:
@@ -184,17 +153,7 @@ def buses_without_ground(
 ) -> frozenset[str]:
     """Return the buses behind a delta winding, from which no current can return through ground.
 
-    Parameters
-    ----------
-    transformers, lines, others
-        The feeder's; the others are its regulators and switches.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.tables import read_feeder
-    >>> feeder = read_feeder("microgrid123")
-    >>> buses_without_ground(feeder.transformers, feeder.lines, feeder.switches)
-    frozenset({'610'})
+    `transformers`, `lines`, `others`: the feeder's; the others are its regulators and switches.
     """
     beside: dict[str, set[str]] = {}
     grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]

@@ -22,15 +22,6 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
     lines' susceptances, and the capacitors' reactive power go with the frequency. Loads are powers at nominal
     frequency, and inverters' filters per-unit values at nominal frequency; both stay as they are.
 
-    Parameters
-    ----------
-    feeder : Feeder
-        As its tables have it.
-    changes : FeederChanges
-        What is to be otherwise; inverters that there are not are left out.
-
-    Examples
-    --------
     >>> from gridpeers.plant.tables import read_feeder
     >>> feeder = read_feeder("microgrid123")
     >>> slower = changed(feeder, FeederChanges(f_nom=50.0, m_p_factor=2.0))
@@ -86,27 +77,17 @@ def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
     )
 
 
-TIE_LENGTH = 0.3
-"""Length (km) of the line of a tie."""
+TIE_LENGTH = 0.3  # length (km) of the line of a tie
 
 AnyFeeder = TypeVar("AnyFeeder", bound=Feeder)
 Row = TypeVar("Row", bound=msgspec.Struct)
 
-_REFERENCES = ("bus", "from_bus", "to_bus")
-"""Fields of equipment that name a bus."""
-
-_NAMES = ("name", "alias", "microgrid", "zone")
-"""Fields whose names differ from copy to copy."""
+_REFERENCES = ("bus", "from_bus", "to_bus")  # fields of equipment that name a bus
+_NAMES = ("name", "alias", "microgrid", "zone")  # fields whose names differ from copy to copy
 
 
 def copy_name(name: str, k: int) -> str:
-    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names.
-
-    Examples
-    --------
-    >>> copy_name("inv1", 1), copy_name("inv1", 3)
-    ('inv1', 'inv1_3')
-    """
+    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names."""
     return name if k == 1 or not name else f"{name}_{k}"
 
 
@@ -116,19 +97,8 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
     All copies hang on the first one's substation by closed switches. A tie is a closed switch and a line, so the copies
     remain one network when each is cut off the substation. Spare inverters are left out.
 
-    Parameters
-    ----------
-    feeder
-        A feeder with a substation.
-    copies
-        How many, at least 1.
-    joint
-        A bus with phases A, B and C.
-
-    Raises
-    ------
-    ValueError
-        If the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
+    ValueError if the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a
+    phase.
     """
     bus = next((each for each in feeder.buses if each.name == joint), None)
     if feeder.source is None:

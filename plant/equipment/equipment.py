@@ -19,86 +19,60 @@ from gridpeers.plant.equipment.inverter_parameters import (
 )
 
 Phase = Literal["A", "B", "C"]
-PHASES: tuple[Phase, ...] = ("A", "B", "C")
-"""Order of the phases in every table and vector."""
+PHASES: tuple[Phase, ...] = ("A", "B", "C")  # order of the phases in every table and vector
 
 NODES = "ABC456789DEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
 """Letters of a bus's nodes 1, 2, 3, ... in a feeder from another program: the phases, then neutrals and the like."""
 
 
-F_NOM = 60.0
-"""Nominal frequency (Hz) of a feeder without one in its data."""
+F_NOM = 60.0  # nominal frequency (Hz) of a feeder without one in its data
 
 
 class Bus(msgspec.Struct, frozen=True, kw_only=True):
     """A connection point of equipment; one node per phase."""
 
-    name: str
-    """Name, as in the feeder's drawings: "13", "150r"."""
-    phases: str
-    """The phases that exist here, in order: "ABC", "AC", "B"."""
-    V_nom: float
-    """Nominal voltage (V, line-to-neutral)."""
-    zone: str = ""
-    """Its part of the feeder, for drawings only."""
-    x: float = 0.0
-    """Place in the drawing (drawing units)."""
-    y: float = 0.0
-    """Place in the drawing (drawing units)."""
+    name: str  # name, as in the feeder's drawings: "13", "150r"
+    phases: str  # the phases that exist here, in order: "ABC", "AC", "B"
+    V_nom: float  # nominal voltage (V, line-to-neutral)
+    zone: str = ""  # its part of the feeder, for drawings only
+    x: float = 0.0  # place in the drawing (drawing units)
+    y: float = 0.0  # place in the drawing (drawing units)
 
 
 class LineConfig(msgspec.Struct, frozen=True, kw_only=True):
     """A kind of line: conductors and spacing, per length, at nominal frequency, earth return reduced."""
 
-    name: str
-    """Name, to which lines refer."""
-    phases: str
-    """Phases of the rows and columns."""
-    Z: tuple[tuple[complex, ...], ...]
-    """Series impedance matrix (ohm/km)."""
-    B: tuple[tuple[float, ...], ...]
-    """Shunt susceptance matrix (S/km)."""
+    name: str  # name, to which lines refer
+    phases: str  # phases of the rows and columns
+    Z: tuple[tuple[complex, ...], ...]  # series impedance matrix (ohm/km)
+    B: tuple[tuple[float, ...], ...]  # shunt susceptance matrix (S/km)
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True):
     """A line section between two buses of equal nominal voltage."""
 
     name: str
-    """Name, unique."""
     from_bus: str
-    """One end."""
     to_bus: str
-    """Other end."""
     phases: str
-    """Phases it carries."""
-    config: str
-    """Name of its `LineConfig`."""
+    config: str  # name of its `LineConfig`
     length: float
-    """Length (km)."""
 
 
 class Switch(msgspec.Struct, frozen=True, kw_only=True):
     """An ideal switch: closed, it merges two nodes on each of its phases; open, it has no effect."""
 
-    name: str
-    """Its buses: "13-152"."""
-    alias: str
-    """A second name ("sw1_2"), or empty."""
+    name: str  # its buses: "13-152"
+    alias: str  # a second name ("sw1_2"), or empty
     from_bus: str
-    """One end."""
     to_bus: str
-    """Other end."""
-    phases: str
-    """Phases that it switches together."""
+    phases: str  # phases that it switches together
     closed: bool
-    """Its state at the start."""
 
     @property
     def names(self) -> tuple[str, ...]:
         """All its names: its buses in either order, and its alias.
 
-        Examples
-        --------
         >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).names
         ('13-152', '152-13', 'sw1')
         """
@@ -106,22 +80,13 @@ class Switch(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def event_name(self) -> str:
-        """Its name in events: its buses; the alias alone where an import has put a bus behind it.
-
-        Examples
-        --------
-        >>> ends = dict(from_bus="632", to_bus="632~632-671")
-        >>> Switch(name="632-632~632-671", alias="632-671", **ends, phases="ABC", closed=True).event_name
-        '632-671'
-        """
+        """Its name in events: its buses; the alias alone where an import has put a bus behind it."""
         return self.alias if self.alias and is_behind(self.to_bus) else self.name
 
     @property
     def full_name(self) -> str:
         """Its name in sentences: both of its names, if it has another one than in events.
 
-        Examples
-        --------
         >>> Switch(name="13-152", alias="sw1", from_bus="13", to_bus="152", phases="ABC", closed=True).full_name
         'sw1 (13-152)'
         """
@@ -132,94 +97,62 @@ class Load(msgspec.Struct, frozen=True, kw_only=True):
     """A spot load of one kind: constant impedance (Z), current (I) or power (P)."""
 
     bus: str
-    """Its bus."""
-    connection: Literal["Y", "D"]
-    """Y: phases to ground. D: between phases A-B, B-C, C-A."""
-    model: Literal["Z", "I", "P"]
-    """Z: power goes with V^2, I: with V, P: constant."""
-    S: tuple[complex, complex, complex]
-    """Power at nominal voltage (VA) on phases A, B, C (Y) or A-B, B-C, C-A (D)."""
+    connection: Literal["Y", "D"]  # Y: phases to ground. D: between phases A-B, B-C, C-A.
+    model: Literal["Z", "I", "P"]  # Z: power goes with V^2, I: with V, P: constant
+    S: tuple[complex, complex, complex]  # power at nominal voltage (VA) on phases A, B, C (Y) or A-B, B-C, C-A (D)
 
 
 class Capacitor(msgspec.Struct, frozen=True, kw_only=True):
     """A shunt capacitor bank, each phase to ground."""
 
     bus: str
-    """Its bus."""
-    Q: tuple[float, float, float]
-    """Reactive power at rated voltage (var) on phases A, B, C."""
-    V_rated: float
-    """Rated voltage (V, line-to-neutral)."""
+    Q: tuple[float, float, float]  # reactive power at rated voltage (var) on phases A, B, C
+    V_rated: float  # rated voltage (V, line-to-neutral)
 
 
 class Regulator(msgspec.Struct, frozen=True, kw_only=True):
     """A step voltage regulator at a fixed tap: an ideal autotransformer, V_to = ratio V_from."""
 
-    name: str
-    """Name; phases with different taps are separate rows of one name."""
-    from_bus: str
-    """Side without taps."""
-    to_bus: str
-    """Regulated side."""
-    phases: str
-    """Phases on this tap."""
-    ratio: float
-    """V_to / V_from, 1 + tap * tap_step."""
+    name: str  # name; phases with different taps are separate rows of one name
+    from_bus: str  # side without taps
+    to_bus: str  # regulated side
+    phases: str  # phases on this tap
+    ratio: float  # V_to / V_from, 1 + tap * tap_step
 
 
 class Transformer(msgspec.Struct, frozen=True, kw_only=True):
     """A three-phase two-winding transformer whose rated voltages are the nominal voltages of its buses."""
 
     name: str
-    """Name, unique."""
     from_bus: str
-    """One side."""
     to_bus: str
-    """Other side."""
-    connection: Literal["D-D", "Yg-Yg"]
-    """Windings; neither shifts the phase."""
-    S_rated: float
-    """Rated power (VA, three phases)."""
-    z: complex
-    """Series impedance (pu of the rating)."""
+    connection: Literal["D-D", "Yg-Yg"]  # windings; neither shifts the phase
+    S_rated: float  # rated power (VA, three phases)
+    z: complex  # series impedance (pu of the rating)
 
 
 class Source(msgspec.Struct, frozen=True, kw_only=True):
     """The substation: a stiff three-phase voltage."""
 
     bus: str
-    """Its bus."""
-    V_pu: float
-    """Voltage (pu of the bus's nominal voltage)."""
-    angle: float
-    """Angle of phase A (rad)."""
+    V_pu: float  # voltage (pu of the bus's nominal voltage)
+    angle: float  # angle of phase A (rad)
 
 
 class InverterRow(msgspec.Struct, frozen=True, kw_only=True):
     """An inverter's nameplate and bus."""
 
-    name: str
-    """Name, unique: "inv1"."""
-    kind: Literal["GFM", "GFL"]
-    """Grid-forming or grid-following."""
-    bus: str
-    """Bus of its terminals; each of its nodes has one inverter at most."""
+    name: str  # name, unique: "inv1"
+    kind: Literal["GFM", "GFL"]  # grid-forming or grid-following
+    bus: str  # bus of its terminals; each of its nodes has one inverter at most
     microgrid: str
-    """Its microgrid."""
-    P_rated: float
-    """Rated power (W, of all its phases), base of its per-unit values."""
-    V_nom: float
-    """Nominal terminal voltage (V, line-to-neutral)."""
-    m_p: float
-    """P-f droop (pu frequency per pu power)."""
-    m_q: float
-    """Q-V droop (pu voltage per pu reactive power)."""
-    phases: Literal["ABC", "A", "B", "C"] = "ABC"
-    """Phases of the bus at which it stands: all three, or one."""
-    neutral: str = ""
-    """Node of the bus to which its phases return, by its letter; empty for earth."""
-    spare: bool = False
-    """Whether it stays off until an agent joins for it."""
+    P_rated: float  # rated power (W, of all its phases), base of its per-unit values
+    V_nom: float  # nominal terminal voltage (V, line-to-neutral)
+    m_p: float  # P-f droop (pu frequency per pu power)
+    m_q: float  # Q-V droop (pu voltage per pu reactive power)
+    phases: Literal["ABC", "A", "B", "C"] = "ABC"  # phases of the bus at which it stands: all three, or one
+    neutral: str = ""  # node of the bus to which its phases return, by its letter; empty for earth
+    spare: bool = False  # whether it stays off until an agent joins for it
     parameters: str = ""
     """Name of its set of parameters (`Feeder.parameter_sets`, or a published one); empty for none."""
     own: OwnParameters = OwnParameters()
@@ -235,11 +168,8 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """All tables of a feeder with one load set. `gridpeers.plant.tables.read_feeder` has checked their consistency."""
 
     name: str
-    """Name of the folder."""
-    load_set: str
-    """Name of the load set: "main" is from loads_main.csv."""
-    buses: tuple[Bus, ...]
-    """Buses; their order is that of the nodes in every vector."""
+    load_set: str  # name of the load set: "main" is from loads_main.csv
+    buses: tuple[Bus, ...]  # buses; their order is that of the nodes in every vector
     lines: tuple[Line, ...] = ()
     line_configs: tuple[LineConfig, ...] = ()
     switches: tuple[Switch, ...] = ()
@@ -248,14 +178,11 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     regulators: tuple[Regulator, ...] = ()
     transformers: tuple[Transformer, ...] = ()
     inverters: tuple[InverterRow, ...] = ()
-    source: Source | None
-    """The substation, or None in a feeder with inverters alone."""
-    f_nom: float = F_NOM
-    """Nominal frequency (Hz) of the impedances."""
+    source: Source | None  # the substation, or None in a feeder with inverters alone
+    f_nom: float = F_NOM  # nominal frequency (Hz) of the impedances
     elements: tuple[LinearElement, ...] = ()
     """Linear elements given by their admittance: of feeders that were written for another program."""
-    load_parts: tuple[LoadPart, ...] = ()
-    """Loads of such feeders."""
+    load_parts: tuple[LoadPart, ...] = ()  # loads of such feeders
     notes: tuple[str, ...] = ()
     """Notes of the import of such a feeder: commands that were not run, protection that was left out."""
     places: dict[str, str] = {}
@@ -266,22 +193,7 @@ class Feeder(msgspec.Struct, frozen=True, kw_only=True):
     """Parameters that single inverters have instead of their kind's, by the name of the set."""
 
     def parameters_of(self, row: InverterRow, gfm: GfmParameters, gfl: GflParameters) -> InverterParameters:
-        """Return the parameters of one inverter: its own, then those of its set, then its kind's.
-
-        Parameters
-        ----------
-        row
-            One of this feeder's inverters.
-        gfm, gfl
-            Parameters by kind, as the scenario has them.
-
-        Examples
-        --------
-        >>> from gridpeers.plant.tables import read_feeder
-        >>> feeder = read_feeder("microgrid123")
-        >>> feeder.parameters_of(feeder.inverters[0], GfmParameters(P_max=1.2), GflParameters()).P_max
-        1.2
-        """
+        """Return the parameters of one inverter: its own, then those of its set, then its kind's."""
         of_set = with_published(self.parameter_sets).get(row.parameters, OwnParameters())
         kind: InverterParameters = gfm if row.kind == "GFM" else gfl
         own = given(of_set) | given(row.own)

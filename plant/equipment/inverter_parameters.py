@@ -240,13 +240,7 @@ def with_published(sets: Mapping[str, OwnParameters]) -> dict[str, OwnParameters
 
 
 def given(own: OwnParameters) -> dict[str, Any]:
-    """Return what a set gives, by the names of `GfmParameters` and `GflParameters`.
-
-    Examples
-    --------
-    >>> given(OwnParameters(P_max=1.2))
-    {'P_max': 1.2}
-    """
+    """Return what a set gives, by the names of `GfmParameters` and `GflParameters`."""
     values = {name: getattr(own, name) for name in own.__struct_fields__}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -254,8 +248,6 @@ def given(own: OwnParameters) -> dict[str, Any]:
 def foreign(own: OwnParameters, kind: str) -> list[str]:
     """Return what a set gives and a kind of inverter does not have: keys, and words of a choice with their key.
 
-    Examples
-    --------
     >>> foreign(OwnParameters(P_max=1.2, S_max=1.2), "GFM")
     ['S_max_pu']
     >>> foreign(OwnParameters(model="regfm_a1"), "GFL")

@@ -13,18 +13,11 @@ from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.merging import Merge
 
-ROUNDING = 1e-14
-"""Size of a sum of admittances relative to its terms below which the sum is 0 but for rounding."""
+ROUNDING = 1e-14  # size of a sum of admittances relative to its terms below which the sum is 0 but for rounding
 
 
 class Circuits:
-    """A feeder's circuits; each is made at the first call for its switches and loads, and kept as in `ForeseenCache`.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """A feeder's circuits, each made at the first call for its switches and loads, and kept as in `ForeseenCache`."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -41,10 +34,7 @@ class Circuits:
 
         One that is `foreseen`, for an event to come, stays.
 
-        Raises
-        ------
-        PlantError
-            If ideal devices tie an inverter to another: their sharing would be undetermined.
+        PlantError if ideal devices tie an inverter to another: their sharing would be undetermined.
         """
         of = self._network if network is None else network
         return self._made.get((of, closed), lambda: circuit_of(of, closed, self._loads_of(of)), foreseen=foreseen)

@@ -12,8 +12,7 @@ from gridpeers.plant.dynamics import Dynamics
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays
 from gridpeers.plant.plant_config import Protection
 
-Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]
-"""Takes an event: step, kind, subject, text."""
+Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]  # takes an event: step, kind, subject, text
 
 Settle = Callable[[int, list[int]], None]
 """Called after inverters were switched at a step: reads them again, and reports islands."""
@@ -26,21 +25,6 @@ class InService:
     delay. In a de-energised island all tripped inverters return at once, when the last of them has waited as long: a
     black start, which needs a GFM. There is no load shedding, so these inverters take the whole load of the island;
     an inverter that trips repeatedly stays off.
-
-    Parameters
-    ----------
-    settings
-        Trip settings and delay.
-    names
-        The inverters.
-    V_nom
-        Their nominal voltages (V).
-    dynamics
-        The inverters and their network.
-    connected
-        Inverters that are connected at the start.
-    tell, settle
-        See `Tell` and `Settle`.
     """
 
     def __init__(
@@ -104,12 +88,8 @@ class InService:
     def watch(self, step: int, out: NDArray[np.float64]) -> None:
         """Trip inverters beyond their settings after these steps, and bring back those that may return.
 
-        Parameters
-        ----------
-        step
-            Present step of the plant; changes act from the next step on.
-        out
-            Readings of the steps since the last call, of `Dynamics.run`.
+        `step`: present step of the plant; changes act from the next step on; `out`: readings of the steps since the
+        last call, of `Dynamics.run`.
         """
         reduction = self._dynamics.network.reduction
         f, V_low, V_high = out[:, :, 0], out[:, :, 4] / self._V_nom, out[:, :, 5] / self._V_nom

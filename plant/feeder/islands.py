@@ -18,18 +18,11 @@ from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import counted
 
-GRID = "grid"
-"""Name of the island that the substation feeds."""
+GRID = "grid"  # name of the island that the substation feeds
 
 
 class Islands:
-    """Name a feeder's islands, and report their changes.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """Name a feeder's islands, and report their changes."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -37,8 +30,7 @@ class Islands:
         self._dead: list[str] = []
         self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None
         """The last switch state, and its `names`."""
-        self._reported: dict[str, str] = {}
-        """Last reported text of each island."""
+        self._reported: dict[str, str] = {}  # last reported text of each island
 
     def change_loads(self, network: Network) -> None:
         """Go on with the same network with other loads."""
@@ -101,18 +93,11 @@ class Islands:
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]
 
 
-TOUCHABLE = 50.0
-"""Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""
+TOUCHABLE = 50.0  # voltage to earth (V) that may last on what people touch (IEC 60364-4-41)
 
 
 class NeutralEvents:
-    """Report the neutrals of a feeder when its network has changed; each once, until it is as before.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """Report the neutrals of a feeder when its network has changed; each once, until it is as before."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -184,24 +169,17 @@ class NeutralEvents:
         return [int(i) for i in forming[alone]]
 
 
-RECENT = 1.0
-"""Time (s) after a closing out of phase within which a collapse counts as its effect."""
-
-BEYOND = 10.0
-"""Voltage (pu) that no network has: where there is no solution, it says nothing."""
+RECENT = 1.0  # time (s) after a closing out of phase within which a collapse counts as its effect
+BEYOND = 10.0  # voltage (pu) that no network has: where there is no solution, it says nothing
 
 
 class Closing(NamedTuple):
     """A switch that has joined two live islands."""
 
     t: float
-    """Time (s)."""
     switch: str
-    """Its name."""
-    angle: float
-    """Angle between the two sides before (deg, 0 to 180)."""
-    in_phase: bool
-    """Whether the angle was within the window of a synchronism check."""
+    angle: float  # angle between the two sides before (deg, 0 to 180)
+    in_phase: bool  # whether the angle was within the window of a synchronism check
 
 
 def raise_for_trip(events: Iterable[PlantEvent]) -> None:
@@ -214,21 +192,7 @@ def raise_for_trip(events: Iterable[PlantEvent]) -> None:
 def trip_event(
     t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
 ) -> PlantEvent:
-    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase).
-
-    Parameters
-    ----------
-    t
-        Time (s).
-    trip
-        Disconnected units.
-    network
-        The feeder's network.
-    closed
-        Switches closed at that time.
-    closings
-        Earlier closings that joined live islands.
-    """
+    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase)."""
     names = [network.inverters[i].name for i in trip.inverters]
     buses = {network.inverters[i].bus for i in trip.inverters}
     if trip.substation:

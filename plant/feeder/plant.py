@@ -56,20 +56,13 @@ def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inve
 class Reading(NamedTuple):
     """Sensor readings of one inverter."""
 
-    P: float
-    """Real power out (W)."""
-    Q: float
-    """Reactive power out (var)."""
-    V: float
-    """Mean terminal voltage (V, line-to-neutral)."""
+    P: float  # real power out (W)
+    Q: float  # reactive power out (var)
+    V: float  # mean terminal voltage (V, line-to-neutral)
     f: float
-    """Frequency (Hz)."""
-    P_set: float
-    """Set-point held (W)."""
-    V_set: float
-    """Set-point held (V)."""
-    grid_connected: bool
-    """Whether the substation feeds its island."""
+    P_set: float  # set-point held (W)
+    V_set: float  # set-point held (V)
+    grid_connected: bool  # whether the substation feeds its island
     island: str
     """"grid", or the name of the first inverter in its island; `OFF` for one that is off the network or idle."""
 
@@ -77,32 +70,17 @@ class Reading(NamedTuple):
 class Plant:
     """The feeder with its inverters, advanced by control periods.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    settings
-        Parameters, events and step.
-    T_c
-        Control period (s), a multiple of `settings.h`.
-    record_step
-        Distance of the recorded rows (s), a multiple of h that divides T_c.
+    `T_c`: control period (s), a multiple of `settings.h`; `record_step`: distance of the recorded rows (s), a multiple
+    of h that divides T_c.
 
-    Raises
-    ------
-    PlantError
-        If there is no operating point at the start.
-    ValueError
-        If a parameter or a switch's name is wrong.
+    PlantError if there is no operating point at the start. ValueError if a parameter or a switch's name is wrong.
     """
 
     def __init__(self, network: Network, settings: PlantSettings, T_c: float, record_step: float) -> None:
         self.network, self.settings = network, settings
         self.inverters = tuple(unit.name for unit in network.inverters)
-        self.tick = 0
-        """k: the plant is at k T_c."""
-        self._t = 0.0
-        """Its time (s)."""
+        self.tick = 0  # k: the plant is at k T_c
+        self._t = 0.0  # its time (s)
         self._row = {name: i for i, name in enumerate(self.inverters)}
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
@@ -115,8 +93,7 @@ class Plant:
             self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
         self._P_rated = np.array([unit.P_rated for unit in network.inverters])
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
-        self._base = np.column_stack([self._P_rated, self._V_nom])
-        """Bases of P_set (W) and V_set (V)."""
+        self._base = np.column_stack([self._P_rated, self._V_nom])  # bases of P_set (W) and V_set (V)
         self._bases: list[tuple[float, float]] = list(map(tuple, self._base.tolist()))
         connected = [not unit.spare for unit in network.inverters]
         self._dynamics = Dynamics(
@@ -206,16 +183,10 @@ class Plant:
         A closing switch joins two live islands as they are, and a warning gives their differences; with
         `synchronised` it closes only if they are in step.
 
-        Returns
-        -------
-        bool
-            Whether it was in that state already, or will be by another command since the last step.
+        Return whether it was in that state already, or will be by another command since the last step.
 
-        Raises
-        ------
-        ValueError
-            If there is no such switch, or its sides are not in step; the message lists the switches, or the
-            differences of the sides.
+        ValueError if there is no such switch, or its sides are not in step; the message lists the switches, or the
+        differences of the sides.
         """
         known = self.network.switch_name(name)
         if synchronised and action == "close" and (refusal := self._closings.refusal(known)):

@@ -20,34 +20,14 @@ class Operation(NamedTuple):
     """An operation of a switch."""
 
     switch: str
-    """Its name."""
-    action: str
-    """"open" or "close"."""
-    synchronised: bool = False
-    """Whether to close only in step."""
+    action: str  # "open" or "close"
+    synchronised: bool = False  # whether to close only in step
 
 
 class Switchboard:
     """The switches of a feeder.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    events
-        Operations on schedule.
-    h
-        Step (s).
-
-    Attributes
-    ----------
-    closed : frozenset of str
-        Names of the switches that are closed now.
-
-    Raises
-    ------
-    ValueError
-        If an event names no switch; the message lists all switches.
+    ValueError if an event names no switch; the message lists all switches.
     """
 
     def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
@@ -70,10 +50,7 @@ class Switchboard:
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
         """Schedule an operation ("open" or "close") of a switch, by its name or alias, at a step.
 
-        Raises
-        ------
-        ValueError
-            If there is no such switch; the message lists all switches.
+        ValueError if there is no such switch; the message lists all switches.
         """
         known = self._network.switch_name(name)  # first, so that an error leaves the schedule as it is
         self._at.setdefault(step, []).append(Operation(known, action, synchronised))
@@ -123,19 +100,7 @@ def _operated(closed: frozenset[str], name: str, action: str) -> frozenset[str]:
 class LoadBoard:
     """The powers of a feeder's loads at nominal voltage, and those that they are to have.
 
-    Parameters
-    ----------
-    network
-        The feeder's network as the run began.
-    events
-        Changes on schedule, in the order of time.
-    h
-        Step (s).
-
-    Raises
-    ------
-    ValueError
-        If an event names no load, or a number of it makes no sense.
+    ValueError if an event names no load, or a number of it makes no sense.
     """
 
     def __init__(self, network: Network, events: Iterable[LoadEvent] = (), h: float = 1.0) -> None:
@@ -174,17 +139,7 @@ class LoadBoard:
     def put(self, text: str, setting: LoadSetting) -> str:
         """Have a load take another power at nominal voltage from the next step on; return it in words.
 
-        Parameters
-        ----------
-        text
-            Name of the load, or of its bus.
-        setting
-            Its power; what is None stays as it is.
-
-        Raises
-        ------
-        ValueError
-            If there is no such load, or a number makes no sense.
+        ValueError if there is no such load, or a number makes no sense.
         """
         name = self._powers.name(text)
         S = self._coming[name] = self._power(name, setting, self._set | self._coming)

@@ -31,8 +31,7 @@ _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0
 LOCKED = 0.01
 """Difference of frequency (Hz) below which two islands count as held at one frequency: a beat lasts 100 s and more."""
 
-LEAST = 0.1
-"""Voltage without load (pu) below which a pole of a switch is a neutral's."""
+LEAST = 0.1  # voltage without load (pu) below which a pole of a switch is a neutral's
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,15 +39,10 @@ class Difference:
     """Difference across an open switch between two separate live islands."""
 
     switch: str
-    """Name of the switch."""
-    angle: float
-    """Largest angle between equal phases (deg), 0 to 180."""
-    f: float
-    """Difference of frequency (Hz)."""
-    V: float
-    """Largest difference of voltage of equal phases (pu of nominal)."""
+    angle: float  # largest angle between equal phases (deg), 0 to 180
+    f: float  # difference of frequency (Hz)
+    V: float  # largest difference of voltage of equal phases (pu of nominal)
     limits: SynchronizationLimits
-    """Limits of these three."""
 
     @property
     def within(self) -> bool:
@@ -59,8 +53,6 @@ class Difference:
     def way_out(self) -> str:
         """Advice that brings the two sides within the limits.
 
-        Examples
-        --------
         >>> apart = {"switch": "sw", "V": 0.0, "limits": SynchronizationLimits(angle=10.0, f=0.1, V=0.03)}
         >>> Difference(angle=90.0, f=0.05, **apart).way_out
         'try again: the angle passes through zero every 20 s'
@@ -84,11 +76,8 @@ class SynchronizationLimits:
     """Largest differences at which a switch may close."""
 
     angle: float
-    """Angle (deg)."""
     f: float
-    """Frequency (Hz)."""
     V: float
-    """Voltage (pu)."""
 
     def __str__(self) -> str:
         return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
@@ -99,8 +88,6 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
 
     The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
-    Examples
-    --------
     >>> limits_for(1.3e6, SyncCheck())
     SynchronizationLimits(angle=15.0, f=0.2, V=0.05)
     >>> str(limits_for(3.9e6, SyncCheck(angle=5.0)))
@@ -115,14 +102,7 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
 class Synchronism:
     """Measure differences across the open switches of a feeder.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    dynamics
-        Its inverters.
-    check
-        Limits that replace those of the standard.
+    `check`: limits that replace those of the standard.
     """
 
     def __init__(self, network: Network, dynamics: Dynamics, check: SyncCheck) -> None:
@@ -131,14 +111,7 @@ class Synchronism:
     def across(self, switch: str, closed: frozenset[str], others: Iterable[str] = ()) -> Difference | None:
         """Return the difference across a switch (by its name) now; None if it does not separate two live islands.
 
-        Parameters
-        ----------
-        switch
-            Its name.
-        closed
-            Switches that are closed now.
-        others
-            Switches that close with it. A dead side that one of them energizes counts as the energizing island.
+        `others`: switches that close with it. A dead side that one of them energizes counts as the energizing island.
         """
         device = self._network.switches[switch]
         at = [self._network.index(device.from_bus, phase) for phase in device.phases]
@@ -196,30 +169,16 @@ class Synchronism:
 class _Pending(NamedTuple):
     """A closing that waits for synchronism."""
 
-    since: int
-    """Step of its scheduled closing."""
-    last: int
-    """Step at which it gives up."""
+    since: int  # step of its scheduled closing
+    last: int  # step at which it gives up
 
 
 class Closings:
     """Judge the closings of a feeder's switches.
 
-    Parameters
-    ----------
-    switches
-        The switches.
-    sync
-        Measures the differences across them.
-    timeout
-        Longest wait of a switch for synchronism (steps).
-    h
-        Step (s).
+    `timeout`: longest wait of a switch for synchronism (steps).
 
-    Attributes
-    ----------
-    joined : list of Closing
-        Closings that have joined live islands, the latest last.
+    `joined`: closings that have joined live islands, the latest last.
     """
 
     def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:

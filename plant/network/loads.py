@@ -28,20 +28,14 @@ class LoadBranches:
     `law`. Constant-impedance loads are not here, but in `Network.admittance`.
     """
 
-    n_from: NDArray[np.int64]
-    """Node at the beginning."""
-    n_to: NDArray[np.int64]
-    """Node at the end, -1: ground."""
-    law: LoadLaw
-    """Law of their currents."""
-    V_nom: NDArray[np.float64]
-    """Nominal voltage across the branch (V)."""
-    phi0: NDArray[np.float64]
-    """Nominal angle of the voltage across the branch (rad)."""
+    n_from: NDArray[np.int64]  # node at the beginning
+    n_to: NDArray[np.int64]  # node at the end, -1: ground
+    law: LoadLaw  # law of their currents
+    V_nom: NDArray[np.float64]  # nominal voltage across the branch (V)
+    phi0: NDArray[np.float64]  # nominal angle of the voltage across the branch (rad)
     a_from: NDArray[np.float64]
     """Ratio of the voltage at the branch's beginning to that of node `n_from`: 1 unless merged."""
-    a_to: NDArray[np.float64]
-    """The same at its end; 0 at ground, where index -1 would read the last node's voltage."""
+    a_to: NDArray[np.float64]  # the same at its end; 0 at ground, where index -1 would read the last node's voltage
 
     def __len__(self) -> int:
         return len(self.n_from)
@@ -102,15 +96,7 @@ class LoadBranches:
     def currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
         """Return the currents that the loads draw from the nodes (A), positive into the load.
 
-        Parameters
-        ----------
-        V : complex128[n]
-            Voltages of all nodes (V, line-to-ground).
-
-        Returns
-        -------
-        complex128[n]
-            In the order of V; those of a delta load sum to zero unless ratios differ.
+        Those of a delta load sum to zero unless ratios differ.
         """
         current = self.branch_currents(V)
         drawn = np.zeros(len(V), dtype=np.complex128)

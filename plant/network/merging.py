@@ -19,22 +19,8 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
 
     .. math:: Y = \begin{pmatrix} z^{-1} + y/2 & -z^{-1} \\ -z^{-1} & z^{-1} + y/2 \end{pmatrix}
 
-    Parameters
-    ----------
-    line : Line
-        Its phases and length.
-    config : LineConfig
-        Its impedance and susceptance per length.
-    charging : bool
-        Whether to include the shunt capacitance.
+    Nodes in the order: phases of the from end, phases of the to end.
 
-    Returns
-    -------
-    complex128[2p, 2p]
-        Nodes in the order: phases of the from end, phases of the to end.
-
-    References
-    ----------
     Kersting, Distribution System Modeling and Analysis, section 6.1 (exact line segment model).
     """
     keep = [config.phases.index(phase) for phase in line.phases]
@@ -56,20 +42,8 @@ def transformer_admittance(transformer: Transformer, V_from: float, V_to: float)
     It carries no current, hence changes nothing, as long as nothing else at `to_bus` is connected to ground; loads
     behind a delta winding must be delta loads.
 
-    Parameters
-    ----------
-    transformer : Transformer
-        Its connection, rating and impedance.
-    V_from, V_to : float
-        Nominal voltages of its buses (V, line-to-neutral).
+    Nodes in the order: A, B, C of from_bus, A, B, C of to_bus.
 
-    Returns
-    -------
-    complex128[6, 6]
-        Nodes in the order: A, B, C of from_bus, A, B, C of to_bus.
-
-    References
-    ----------
     Kersting, Distribution System Modeling and Analysis, chapter 8.
     """
     y = transformer.S_rated / (3.0 * V_from**2 * transformer.z)
@@ -94,12 +68,8 @@ class Merge:
     with :math:`a_i = 1` through switches and the tap ratio through regulators. The second equation follows from the
     first, because ideal devices take no power.
 
-    Attributes
-    ----------
-    representative : int64[n]
-        Node -> its representative. A representative represents itself.
-    ratio : float64[n]
-        :math:`a_i`; exactly 1 for representatives.
+    `representative`: node -> its representative. A representative represents itself; `ratio`: :math:`a_i`; exactly
+    1 for representatives.
     """
 
     def __init__(self, representative: NDArray[np.int64], ratio: NDArray[np.float64]) -> None:
@@ -130,19 +100,10 @@ class Merge:
 def merge_nodes(names: Sequence[str], ties: Iterable[tuple[int, int, float]], preferred: Sequence[int]) -> Merge:
     """Group nodes that are tied together.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the nodes, for errors.
-    ties : iterable of (from, to, ratio)
-        Ideal devices: V_to = ratio * V_from.
-    preferred : sequence of int
-        Nodes that represent their groups by preference, the most preferred first; else the first node does.
+    `names`: names of the nodes, for errors; `ties`: ideal devices: V_to = ratio * V_from; `preferred`: nodes that
+    represent their groups by preference, the most preferred first; else the first node does.
 
-    Raises
-    ------
-    ValueError
-        If two paths between the same nodes have different ratios: an ideal short circuit.
+    ValueError if two paths between the same nodes have different ratios: an ideal short circuit.
     """
     n = len(names)
     neighbours: list[list[tuple[int, float]]] = [[] for _ in range(n)]

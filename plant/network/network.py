@@ -24,8 +24,7 @@ from gridpeers.plant.network.loads import LoadBranches, law_row
 from gridpeers.plant.network.merging import Merge, line_admittance, merge_nodes, transformer_admittance
 from gridpeers.wire.wording import first_of
 
-ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
-"""Nominal angles of the phases (rad)."""
+ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}  # nominal angles of the phases (rad)
 
 DELTA_PAIRS = (("A", "B"), ("B", "C"), ("C", "A"))
 """Ends of the three branches of a delta load; its nominal angles are +30, -90, +150 degrees."""
@@ -40,37 +39,17 @@ class Network:
     Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); tied nodes keep
     one unknown. In `admittance` only representatives have entries.
 
-    Parameters
-    ----------
-    feeder : Feeder
-        Tables from `gridpeers.plant.tables.read_feeder`.
-    line_charging : bool, optional
-        Whether to include the lines' shunt capacitance. The published solution of the standard feeder has it.
-    spares : iterable of str, optional
-        Names of the spare inverters in this run; ValueError for an unknown one.
+    `line_charging`: whether to include the lines' shunt capacitance. The published solution of the standard feeder has
+    it; `spares`: names of the spare inverters in this run; ValueError for an unknown one.
 
-    Attributes
-    ----------
-    nodes : tuple of (bus, phase)
-        Order of all vectors.
-    V_nom : float64[n]
-        Nominal voltages (V, line-to-neutral).
-    nominal : complex128[n]
-        Nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers too; in
-        a feeder of `LinearElement`s they are the voltages without load.
-    switches : dict of str to Switch
-        By name ("13-152"); `switch_name` finds the name.
-    closed0 : frozenset of str
-        Names of the switches that are closed at the start.
-    source_nodes : int64[3] or int64[0]
-        Nodes of the substation, if there is one. They always represent themselves.
-    source_voltage : complex128[3] or complex128[0]
-        Its voltages (V).
-    inverters : tuple of InverterRow
-        In the table's order, spares last.
-    Y_branches, Y_capacitors, Y_loads : csc_array, complex, n x n
-        Parts of the admittance matrix (S) before merging: lines and transformers; capacitor banks;
-        constant-impedance loads.
+    `V_nom`: nominal voltages (V, line-to-neutral);
+    `nominal`: nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers
+    too; in a feeder of `LinearElement`s they are the voltages without load;
+    `switches`: by name ("13-152"); `switch_name` finds the name;
+    `source_nodes`: nodes of the substation, if there is one. They always represent themselves (3);
+    `inverters`: in the table's order, spares last;
+    `Y_branches`, `Y_capacitors`, `Y_loads`: parts of the admittance matrix (S) before merging: lines and transformers;
+    capacitor banks; constant-impedance loads.
     """
 
     def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
@@ -116,13 +95,7 @@ class Network:
         return all((bus, phase) in self._index for phase in phases)
 
     def switch_name(self, text: str) -> str:
-        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`.
-
-        Raises
-        ------
-        ValueError
-            If no switch has this name.
-        """
+        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`."""
         return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
@@ -138,10 +111,7 @@ class Network:
         It has lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
         their representative are empty, and so is the matrix outside of the islands' blocks.
 
-        Returns
-        -------
-        csc_array, complex, n x n
-            T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
+        Return T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
         """
         T = self.merge(closed).matrix()
         Y = sp.csc_array(T.T @ self._Y @ T)
@@ -157,10 +127,8 @@ class Network:
     def weak_loads(self, weak: Mapping[int, float]) -> str:
         """Say which loads the network cannot feed even alone, and what to do; of none, that the load may be too much.
 
-        Parameters
-        ----------
-        weak
-            Branches of `loads`, and the short-circuit powers there (VA): see `gridpeers.plant.dynamics.island_newton`.
+        `weak`: branches of `loads`, and the short-circuit powers there (VA): see
+        `gridpeers.plant.dynamics.island_newton`.
         """
         pairs = zip(self.feeder.loads, self._first.loads, strict=True)
         names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]

@@ -21,29 +21,20 @@ Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
 MOST_ITERATIONS = 200
 """Most iterations: a feeder that can carry its loads takes about 10, one that cannot diverges long before."""
 
-NOISE = 1e-8
-"""Change (pu) that may be rounding in any network; more where a section has next to nothing to ground."""
-
-STALL = 8
-"""Iterations without a smaller change after which it is rounding."""
+NOISE = 1e-8  # change (pu) that may be rounding in any network; more where a section has next to nothing to ground
+STALL = 8  # iterations without a smaller change after which it is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class PowerFlow:
     """A solved state of a network."""
 
-    V: NDArray[np.complex128]
-    """Voltages of all nodes (V, line-to-ground); zero where the substation does not reach."""
-    S_source: complex
-    """Power out of the substation (VA)."""
-    S_loads: complex
-    """Power taken by all loads of any kind (VA)."""
-    S_losses: complex
-    """Power taken by lines and transformers (VA); the imaginary part includes line charging."""
-    S_capacitors: complex
-    """Power taken by capacitor banks (VA); their imaginary part is negative."""
-    iterations: int
-    """Number of network solutions."""
+    V: NDArray[np.complex128]  # voltages of all nodes (V, line-to-ground); zero where the substation does not reach
+    S_source: complex  # power out of the substation (VA)
+    S_loads: complex  # power taken by all loads of any kind (VA)
+    S_losses: complex  # power taken by lines and transformers (VA); the imaginary part includes line charging
+    S_capacitors: complex  # power taken by capacitor banks (VA); their imaginary part is negative
+    iterations: int  # number of network solutions
 
 
 def solve_power_flow(
@@ -60,34 +51,15 @@ def solve_power_flow(
 
     .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
 
-    Parameters
-    ----------
-    network : Network
-        The network; it must have a source.
-    closed : frozenset of str
-        Names of the closed switches.
-    loads : LoadBranches, optional
-        Loads of constant power and current; by default the network's own.
-    shunt : complex128[n], optional
-        Admittances to ground added at the nodes (S): filters of inverters.
-    injection : callable, optional
-        Currents fed into the nodes (A) from their voltages (V), in addition.
-    tolerance : float, optional
-        Largest change of any voltage in the last iteration (pu).
-    start : complex128[n], optional
-        Voltages to start from (V); by default those without load.
+    `network`: the network; it must have a source;
+    `loads`: loads of constant power and current; by default the network's own;
+    `shunt`: admittances to ground added at the nodes (S): filters of inverters;
+    `injection`: currents fed into the nodes (A) from their voltages (V), in addition;
+    `tolerance`: largest change of any voltage in the last iteration (pu);
+    `start`: voltages to start from (V); by default those without load.
 
-    Returns
-    -------
-    PowerFlow
-        Voltages and power balance.
-
-    Raises
-    ------
-    ValueError
-        If the feeder has no source.
-    ArithmeticError
-        If it does not converge, mostly because the feeder cannot carry the load.
+    ValueError if the feeder has no source. ArithmeticError if it does not converge, mostly because the feeder cannot
+    carry the load.
     """
     if not len(network.source_nodes):
         raise ValueError(f'feeder "{network.feeder.name}" has no source; a power flow needs one, give source.csv')

@@ -27,20 +27,14 @@ from gridpeers.wire.messages import PLANT, Command, PlantEvent, Waiting
 from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
 from gridpeers.wire.timing import RateLimit, Timer
 
-TELEMETRY = 0.2
-"""Time (s, wall) between two telemetry messages."""
-
-LINKS = 0.5
-"""Time (s, wall) between two reports on links in a recorded run."""
-
-LEAD = 0.25
-"""Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
+TELEMETRY = 0.2  # time (s, wall) between two telemetry messages
+LINKS = 0.5  # time (s, wall) between two reports on links in a recorded run
+LEAD = 0.25  # time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other
 
 RECORDING = 15.0
 """Longest time (s, wall) that an ended run stays for a recorder that has not got all of it: it may have stood still."""
 
-WAITING = 0.5
-"""Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
+WAITING = 0.5  # time (s, wall) between two messages of a plant that waits for agents to those that are there
 
 
 COMMANDS, COMMAND_INTERVAL = 100, 0.02
@@ -67,12 +61,10 @@ class RealtimePlant(LivePlantNode):
         self._warnings = RateLimit(burst=5)
         self._commands = RunCommands(self)
         self._command_limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
-        self._stays = False
-        """Whether the end is kept back only for recorders."""
+        self._stays = False  # whether the end is kept back only for recorders
         self.routes[self.keys.command] = Route(ANYBODY, (Command,), self._on_command)
         self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
-        """Keys to subscribe to before the token is declared."""
 
     # ---------------------------------------------------------------- what the driver needs
 

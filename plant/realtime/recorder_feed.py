@@ -10,8 +10,7 @@ KEPT_BYTES, KEPT_BYTES_RECORDED = 4_000_000, 40_000_000
 """Bytes that are kept, without and with journals: two minutes of nine inverters at real time, a part of the
 process's memory."""
 
-AT_ONCE = 20
-"""Messages that are published again in one control period, so that the plant keeps its pace."""
+AT_ONCE = 20  # messages that are published again in one control period, so that the plant keeps its pace
 
 
 BLOCK = 1 << 20
@@ -22,8 +21,7 @@ holes: a plant grew by 35 MB in five minutes, with nothing more in use than befo
 class _Entry(NamedTuple):
     """A message that is kept."""
 
-    number: int
-    """Number of the Telemetry that it counts to."""
+    number: int  # number of the Telemetry that it counts to
     block: bytearray
     start: int
     end: int
@@ -38,21 +36,6 @@ class KeptTelemetry:
 
     Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
     While messages are published again, new ones wait for their turn: a recorder gets all in order.
-
-    Parameters
-    ----------
-    limit : int, optional
-        Bytes that are kept.
-
-    Examples
-    --------
-    >>> kept = KeptTelemetry(limit=8)
-    >>> [kept.add(number, payload) for number, payload in [(0, b"T0"), (1, b"T1"), (2, b"L2"), (2, b"T2"), (3, b"T3")]]
-    [True, True, True, True, True]
-    >>> kept.again_from(0)
-    1
-    >>> kept.add(4, b"T4"), kept.take(3), kept.take(3), kept.add(5, b"T5")
-    (False, [b'T1', b'L2', b'T2'], [b'T3', b'T4'], True)
     """
 
     def __init__(self, limit: int = KEPT_BYTES) -> None:
@@ -60,8 +43,7 @@ class KeptTelemetry:
         self._kept: deque[_Entry] = deque()
         self._due: deque[_Entry] = deque()
         self._block, self._filled = bytearray(), 0
-        self._spare: list[bytearray] = []
-        """Blocks to be filled again."""
+        self._spare: list[bytearray] = []  # blocks to be filled again
         self._latest, self._count = 0, 0
 
     def add(self, number: int, payload: bytes) -> bool:
@@ -117,24 +99,13 @@ class KeptTelemetry:
 
 
 class RecorderFeed:
-    """The recorders that the run waits for, and what is published for them.
-
-    Parameters
-    ----------
-    needed : Iterable[str]
-        Names of the recorders that the run waits for.
-    publish : Callable[[bytes], None]
-        Publishes bytes on the key of telemetry.
-    limit : int, optional
-        Bytes that are kept.
-    """
+    """The recorders that the run waits for, and what is published for them."""
 
     def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT_BYTES) -> None:
         self._needed, self._publish = frozenset(needed), publish
         self._out_of_reach: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""
-        self.kept = KeptTelemetry(limit)
-        """Messages that recorders can have again."""
+        self.kept = KeptTelemetry(limit)  # messages that recorders can have again
         self.paced = False
         """Whether the plant keeps pace, so that `replay` publishes a little in each period; else all goes at once."""
 

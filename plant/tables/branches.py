@@ -173,13 +173,7 @@ def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tup
 
 
 def _positive_definite(matrix: tuple[tuple[float, ...], ...]) -> bool:
-    """Return whether a symmetric matrix of up to three rows is positive definite, by its leading minors.
-
-    Examples
-    --------
-    >>> _positive_definite(((2.0, 1.0), (1.0, 2.0))), _positive_definite(((1.0, 2.0), (2.0, 1.0)))
-    (True, False)
-    """
+    """Return whether a symmetric matrix of up to three rows is positive definite, by its leading minors."""
     (a, *ab), rest = matrix[0], matrix[1:]
     if a <= 0.0:
         return False

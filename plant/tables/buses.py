@@ -13,8 +13,7 @@ from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
 from gridpeers.plant.tables.feeder_columns import BusColumns, ImportedBusColumns
 from gridpeers.wire.wording import first_of, suggestion
 
-_SHOWN = 24
-"""So many buses that are cut off are named."""
+_SHOWN = 24  # so many buses that are cut off are named
 
 
 GROUND_NEEDED = (
@@ -30,13 +29,7 @@ def is_imported(folder: Path) -> bool:
 
 
 class BusTable:
-    """Reads buses.csv and checks references to buses.
-
-    Attributes
-    ----------
-    rows : tuple of Bus
-        The buses, in the table's order.
-    """
+    """Reads buses.csv and checks references to buses."""
 
     def __init__(self, folder: Path, problems: list[str]) -> None:
         self._by_name: dict[str, Bus] = {}

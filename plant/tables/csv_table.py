@@ -24,24 +24,12 @@ C = TypeVar("C", bound=msgspec.Struct)
 class PhaseLetters:
     """Annotation of a text that is a set of phases, such as "ABC" or "AC"."""
 
-    stand_in: str = ""
-    """Phases in place of wrong ones; no later check asks anything of no phase."""
-    others: bool = False
-    """Whether letters of further nodes may stand behind them (`gridpeers.plant.equipment.NODES`)."""
+    stand_in: str = ""  # phases in place of wrong ones; no later check asks anything of no phase
+    others: bool = False  # whether letters of further nodes may stand behind them (`gridpeers.plant.equipment.NODES`)
 
 
 class CsvRow(Generic[C]):
-    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN.
-
-    Attributes
-    ----------
-    columns : C
-        Its values.
-    mistaken : bool
-        Whether a problem was noted so far.
-    wrong : set[str]
-        Columns whose cells are wrong.
-    """
+    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN."""
 
     def __init__(self, table: type[C], where: str, cells: Mapping[str, str], problems: list[str]) -> None:
         self._table, self._where, self._problems = table, where, problems
@@ -108,23 +96,11 @@ def _converted(field: Field, cell: str) -> tuple[Any, str]:
 class CsvTable(Generic[C]):
     """A CSV file with one header line. Columns beyond the declared ones are free (origin, note).
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the feeder.
-    file : str
-        Name of the file in it.
-    columns : type[C]
-        Struct that declares the columns; one without a default must be there.
-    problems : list of str
-        Takes the problems; those of a row when the row is reached.
-    required : bool
-        Whether it is a problem if the file does not exist; else it then has no rows.
+    `columns`: struct that declares the columns; one without a default must be there; `problems`: takes the problems;
+    those of a row when the row is reached; `required`: whether it is a problem if the file does not exist; else it then
+    has no rows.
 
-    Attributes
-    ----------
-    readable : bool
-        Whether its rows are what the file says; if not, references to them cannot be judged.
+    `readable`: whether its rows are what the file says; if not, references to them cannot be judged.
     """
 
     def __init__(

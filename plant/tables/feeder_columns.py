@@ -306,24 +306,7 @@ LOAD_SETS = ("loads_", "load_parts_")
 
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
-    """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound.
-
-    Parameters
-    ----------
-    what : str
-        Its load, bank or machine.
-    V_nom : float
-        Nominal voltage (V, line-to-neutral).
-    current : float
-        Greatest current (A per phase).
-    phases : int
-        How many phases carry the power.
-
-    Examples
-    --------
-    >>> power_of("a load", 2400.0, 2000.0, 1)
-    Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0, above_zero=False, hint='')
-    """
+    """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound."""
     if math.isnan(V_nom):  # the bus has its own problem
         return Plausible(what, -math.inf, math.inf)
     high = phases * V_nom * current / 1e3

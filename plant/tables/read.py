@@ -27,7 +27,6 @@ from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
 
 MANIFEST = "feeder.toml"
-"""Name of the file."""
 
 
 def read_f_nom(folder: Path, problems: list[str]) -> float:
@@ -51,8 +50,7 @@ def _tables(path: Path, problems: list[str]) -> dict[str, Any]:
     return {}
 
 
-DATA = Path(__file__).parents[1] / "data"
-"""Folder of the feeders that come with the package."""
+DATA = Path(__file__).parents[1] / "data"  # folder of the feeders that come with the package
 
 KEPT = 8
 """Feeders that are kept as they were read, by the bytes of their files: to read one again is a tenth of the work."""
@@ -63,10 +61,7 @@ _read: dict[tuple[str | bytes, ...], Feeder] = {}
 class FeederError(ValueError):
     """A feeder that cannot be used, with everything that is wrong with it.
 
-    Attributes
-    ----------
-    problems : tuple of str
-        One sentence each: file, row (the header is row 1), value, what would be right.
+    `problems`: one sentence each: file, row (the header is row 1), value, what would be right.
     """
 
     def __init__(self, feeder: str, problems: tuple[str, ...]) -> None:
@@ -76,13 +71,7 @@ class FeederError(ValueError):
 
 
 def feeders() -> tuple[str, ...]:
-    """Names of the feeders that come with the package.
-
-    Examples
-    --------
-    >>> feeders()
-    ('ieee34', 'microgrid123', 'standard123')
-    """
+    """Names of the feeders that come with the package."""
     return tuple(sorted(path.name for path in DATA.iterdir() if path.is_dir() and path.name != "__pycache__"))
 
 
@@ -94,25 +83,11 @@ def load_sets(folder: Path) -> tuple[str, ...]:
 def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     """Read all tables of a feeder and check them.
 
-    Parameters
-    ----------
-    feeder : str
-        Name of a feeder in `plant/data`, or the path of a folder of the same layout.
-    load_set : str, optional
-        Which loads: "main" reads loads_main.csv.
+    `feeder`: name of a feeder in `plant/data`, or the path of a folder of the same layout; `load_set`: which loads:
+    "main" reads loads_main.csv.
 
-    Returns
-    -------
-    Feeder
-        Frozen tables in SI units that fit together.
+    FeederError if anything is wrong; it lists all of it.
 
-    Raises
-    ------
-    FeederError
-        If anything is wrong; it lists all of it.
-
-    Examples
-    --------
     >>> feeder = read_feeder("microgrid123", "main")
     >>> len(feeder.buses), [inverter.name for inverter in feeder.inverters if inverter.kind == "GFM"]
     (134, ['inv1', 'inv4', 'inv7'])

@@ -17,8 +17,7 @@ from gridpeers.plant.tables import feeder_columns as columns
 from gridpeers.plant.tables.parameter_sets import FILE
 from gridpeers.wire.schema.table_schema import fields_of
 
-TAP_STEP = 0.00625
-"""Step (pu) in which the ratios of regulators are written."""
+TAP_STEP = 0.00625  # step (pu) in which the ratios of regulators are written
 
 Row = Sequence[Any]
 Table = tuple[str, type[msgspec.Struct], list[Row]]
@@ -28,11 +27,6 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
     """Write a feeder's tables into a folder, which is made if need be; they replace those of a feeder that is there.
 
     Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
     """
     tables = list(_tables(feeder))
     folder.mkdir(parents=True, exist_ok=True)

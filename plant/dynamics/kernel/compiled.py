@@ -55,8 +55,7 @@ def user_cache() -> Path | None:
     return folder / "gridpeers" if folder.is_absolute() else None
 
 
-FOLDER = kernel_folder()
-"""Where machine code of these sources is kept."""
+FOLDER = kernel_folder()  # where machine code of these sources is kept
 
 
 def is_compiled(function: str) -> bool:
@@ -129,8 +128,7 @@ def _compiled(function: Callable[_P, _R], *, nogil: bool) -> Callable[_P, _R]:
     return result
 
 
-A120 = complex(-0.5, 0.5 * np.sqrt(3.0))
-"""a = exp(j 120 deg)."""
+A120 = complex(-0.5, 0.5 * np.sqrt(3.0))  # a = exp(j 120 deg)
 
 
 @compiled
@@ -155,18 +153,7 @@ def unit_phasor(angle: float) -> complex:
 def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
     """Predictor x0 + h d, or corrector x0 + h (d1 + d) / 2 in the second pass.
 
-    Parameters
-    ----------
-    x0
-        State at the start of the step.
-    d1
-        Slope of the first pass; not read in the first pass.
-    d
-        Slope of this pass.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `x0`: state at the start of the step; `d1`: slope of the first pass; not read in the first pass.
     """
     if second:
         return x0 + 0.5 * h * (d1 + d)

@@ -24,38 +24,25 @@ whether its phase currents were limited (1 or 0)."""
 class Units(NamedTuple):
     """The inverters of a run as the compiled functions take them: parameters, states, and their terminals."""
 
-    f_nom: float
-    """Nominal frequency (Hz)."""
-    gfm: Any
-    """Records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`."""
-    gfm_at: NDArray[np.int64]
-    """The inverter that each belongs to."""
-    gfm_state: Any
-    """Their states; advanced by a pass."""
-    gfm_0: Any
-    """Their states at the start of the step."""
-    gfm_d: Any
-    """Slopes of the step's first pass."""
-    gfl: Any
-    """The same for `gridpeers.plant.dynamics.kernel.gfl`."""
+    f_nom: float  # nominal frequency (Hz)
+    gfm: Any  # records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`
+    gfm_at: NDArray[np.int64]  # the inverter that each belongs to
+    gfm_state: Any  # their states; advanced by a pass
+    gfm_0: Any  # their states at the start of the step
+    gfm_d: Any  # slopes of the step's first pass
+    gfl: Any  # the same for `gridpeers.plant.dynamics.kernel.gfl`
     gfl_at: NDArray[np.int64]
     gfl_state: Any
     gfl_0: Any
     gfl_d: Any
-    online: NDArray[np.bool_]
-    """Inverters that are connected and in a live island."""
-    set_points: NDArray[np.float64]
-    """n_inv x 3: P_set, V_set, Q_set (pu)."""
-    J: NDArray[np.complex128]
-    """Injections (A), n_inv x 3: in, those of the network solution; out, the new ones."""
-    J_0: NDArray[np.complex128]
-    """Injections (A) at the start of the step."""
-    V: NDArray[np.complex128]
-    """Terminal voltages (V), n_inv x 3, of the last network solution."""
+    online: NDArray[np.bool_]  # inverters that are connected and in a live island
+    set_points: NDArray[np.float64]  # n_inv x 3: P_set, V_set, Q_set (pu)
+    J: NDArray[np.complex128]  # injections (A), n_inv x 3: in, those of the network solution; out, the new ones
+    J_0: NDArray[np.complex128]  # injections (A) at the start of the step
+    V: NDArray[np.complex128]  # terminal voltages (V), n_inv x 3, of the last network solution
     I: NDArray[np.complex128]  # noqa: E741  # the paper's symbol
     """Currents out of the inverters (A), n_inv x 3, of the last network solution."""
-    limiting: NDArray[np.bool_]
-    """Inverters whose phase currents were limited in the last network solution."""
+    limiting: NDArray[np.bool_]  # inverters whose phase currents were limited in the last network solution
 
 
 @compiled
@@ -112,16 +99,7 @@ def keep_start(units: Any) -> None:
 def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDArray[np.complex128]) -> None:
     """Write the factor that turns phasors into each island's frame, by the present angle of its leader.
 
-    Parameters
-    ----------
-    units
-        `Units`.
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    theta
-        Room for a number an inverter.
-    rotation
-        One factor an island, written here.
+    `theta`: room for a number an inverter; `rotation`: one factor an island, written here.
     """
     for k in range(units.gfm_at.size):
         theta[units.gfm_at[k]] = units.gfm_state[k].theta
@@ -135,16 +113,9 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
 def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.float64]) -> None:
     """Take one pass of every inverter on the network.
 
-    Parameters
-    ----------
-    units
-        `Units`: V is read; states, J and I are advanced.
-    h
-        Step (s); 0: only slopes and outputs at the present states.
-    second
-        Whether this is the step's second pass.
-    readings
-        n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network solution.
+    `units`: `Units`: V is read; states, J and I are advanced; `h`: step (s); 0: only slopes and outputs at the present
+    states; `readings`: n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network
+    solution.
     """
     set_points, J, V = units.set_points, units.J, units.V
     for k in range(units.gfm_at.size):

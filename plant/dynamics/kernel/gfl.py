@@ -99,10 +99,7 @@ def pack(
 
     In the method "second-order" the unit is a current source towards the network, in either model.
 
-    Raises
-    ------
-    ValueError
-        If the current controller's one-pass feedback cannot be stable (checklist row 23).
+    ValueError if the current controller's one-pass feedback cannot be stable (checklist row 23).
     """
     if method == "first-order" and par.model == "voltage_source" and abs(own_feedback(par)) >= 1.0:
         raise ValueError(
@@ -135,16 +132,8 @@ def settle(
 ) -> None:
     """Set a state to rest, in step with the voltage (section 7).
 
-    Parameters
-    ----------
-    g, state
-        Records of `PARAMETERS` and `STATE`; the state is written.
-    V, I
-        Phase voltages (V) and currents out of the inverter (A).
-    S
-        Terminal power (pu).
-    v
-        Mean terminal voltage (pu).
+    `V`, `I`: phase voltages (V) and currents out of the inverter (A); `S`: terminal power (pu); `v`: mean terminal
+    voltage (pu).
     """
     theta = float(np.angle(V @ np.array([1.0, A120, A120**2])))
     turn = np.exp(-1j * theta) * np.array([1.0, A120, A120.conjugate()])
@@ -253,22 +242,9 @@ def advance_gfl(
 
     The order of the blocks is that of section 5 and matters in the first 20 ms.
 
-    Parameters
-    ----------
-    g
-        Record of `PARAMETERS`.
-    P_set, V_set, Q_set
-        Set-points (pu), equations (7) and (8).
-    x0, x, d
-        Records of `STATE`: start of the step; trial state, advanced here; first pass' slopes.
-    V_A, V_B, V_C
-        Terminal voltages (V) of this pass' network solution.
-    J_A, J_B, J_C
-        Injections (A) that went into that solution.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `P_set`, `V_set`, `Q_set`: set-points (pu), equations (7) and (8); `x0`, `x`, `d`: records of `STATE`: start of the
+    step; trial state, advanced here; first pass' slopes; `V_A`, `V_B`, `V_C`: terminal voltages (V) of this pass'
+    network solution; `J_A`, `J_B`, `J_C`: injections (A) that went into that solution.
     """
     # 1: measure in the frame the pass starts with
     to_dq = unit_phasor(-x.theta)

@@ -68,20 +68,8 @@ STATE = np.dtype(
 def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them.
 
-    Parameters
-    ----------
-    par
-        Per-unit parameters of the type.
-    S_b
-        Rating (VA, three phases).
-    V_b
-        Nominal voltage (V, line-to-neutral).
-    m_p
-        P-f droop (pu frequency per pu power).
-    m_q
-        Q-V droop (pu voltage per pu reactive power).
-    f_nom
-        Nominal frequency (Hz), base of m_p.
+    `S_b`: rating (VA, three phases); `m_p`: P-f droop (pu frequency per pu power); `m_q`: Q-V droop (pu voltage per pu
+    reactive power); `f_nom`: nominal frequency (Hz), base of m_p.
     """
     Z_b = V_b**2 / (S_b / 3.0)
     record = np.zeros((), PARAMETERS)
@@ -98,16 +86,8 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
 def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> None:
     """Set a state to rest (section 7).
 
-    Parameters
-    ----------
-    g, state
-        Records of `PARAMETERS` and `STATE`; the state is written.
-    J_A
-        Injection of phase A (A), from which the internal voltage follows.
-    S
-        Measured power (pu).
-    v
-        Measured voltage (pu).
+    `J_A`: injection of phase A (A), from which the internal voltage follows; `S`: measured power (pu); `v`: measured
+    voltage (pu).
     """
     E = J_A / g["y_f"]
     state["p"], state["q"], state["v"] = S.real, S.imag, v
@@ -139,21 +119,9 @@ def advance_gfm(
     Integrator slopes are taken from the filters' values at the end of the pass, in both passes
     (section 5): that is what the reference implementation does, and the first 20 ms depend on it.
 
-    Parameters
-    ----------
-    g
-        Record of `PARAMETERS`.
-    P_set, V_set
-        Set-points (pu), equations (3) and (4).
-    x0, x, d
-        Records of `STATE`: at the start of the step; the trial state, advanced here; slopes of
-        the first pass, written in the first and read in the second.
-    P, Q, v
-        Power and voltage (pu) of this pass' network solution, as the model measures them.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `P_set`, `V_set`: set-points (pu), equations (3) and (4); `x0`, `x`, `d`: records of `STATE`: at the start of the
+    step; the trial state, advanced here; slopes of the first pass, written in the first and read in the second; `P`,
+    `Q`, `v`: power and voltage (pu) of this pass' network solution, as the model measures them.
     """
     # measurement filters, 3.2
     dp = (P - x.p) / g.T_p

@@ -21,16 +21,11 @@ Real = NDArray[np.float64]
 class BlockFactors(NamedTuple):
     """A matrix of n x n blocks whose pattern is symmetric, as (L + 1) D (1 + D^-1 U); before, as its own blocks."""
 
-    start: Integers
-    """First entry of each node in `later`, n + 1."""
-    later: Integers
-    """Later nodes that each node is coupled with, ascending."""
-    D: Real
-    """Inverse pivots, n x 4; before, the diagonal."""
-    L: Real
-    """Blocks below the diagonal, [later, node], by columns."""
-    U: Real
-    """Blocks above it, [node, later], by rows."""
+    start: Integers  # first entry of each node in `later`, n + 1
+    later: Integers  # later nodes that each node is coupled with, ascending
+    D: Real  # inverse pivots, n x 4; before, the diagonal
+    L: Real  # blocks below the diagonal, [later, node], by columns
+    U: Real  # blocks above it, [node, later], by rows
 
 
 def no_factors() -> BlockFactors:
@@ -51,16 +46,8 @@ def add_tangent(
 ) -> None:
     """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
 
-    Parameters
-    ----------
-    f
-        The matrix; written.
-    first, second, a_first, a_second
-        Nodes of each branch, or -1, and the ratios with which they count.
-    across
-        Entry that couples the two nodes, or -1.
-    A, B
-        Factors of each branch (S).
+    `f`: the matrix; written; `first`, `second`, `a_first`, `a_second`: nodes of each branch, or -1, and the ratios with
+    which they count; `across`: entry that couples the two nodes, or -1; `A`, `B`: factors of each branch (S).
     """
     for b in range(first.size):
         p, q, r, s = A[b].real + B[b].real, B[b].imag - A[b].imag, A[b].imag + B[b].imag, A[b].real - B[b].real
@@ -147,8 +134,7 @@ def solve_blocks(f: BlockFactors, x: Real) -> None:
         x[two * row], x[two * row + one] = D[row, 0] * re + D[row, 1] * im, D[row, 2] * re + D[row, 3] * im
 
 
-COPY = -2
-"""In place of the position of a terminal that copies the first one of its single-phase inverter."""
+COPY = -2  # in place of the position of a terminal that copies the first one of its single-phase inverter
 
 
 class SparseMaps(NamedTuple):
@@ -157,30 +143,19 @@ class SparseMaps(NamedTuple):
     Unknowns are node voltages, [Re V_1, Im V_1, Re V_2, ...].
     """
 
-    factored: BlockFactors
-    """Of the admittances and the loads' tangent."""
-    constant: Real
-    """Right-hand side (A) without injections: sources, and the constant part of the tangent."""
-    first: Integers
-    """Position of the node at each branch's beginning, or -1: at a source."""
-    second: Integers
-    """The same at its end, or -1: ground, or a source."""
-    a_first: Real
-    """Ratio with which the first node's voltage counts in the branch's."""
-    a_second: Real
-    """The same for the second."""
-    from_sources: NDArray[np.complex128]
-    """Part of each branch's voltage that the ideal sources give (V)."""
+    factored: BlockFactors  # of the admittances and the loads' tangent
+    constant: Real  # right-hand side (A) without injections: sources, and the constant part of the tangent
+    first: Integers  # position of the node at each branch's beginning, or -1: at a source
+    second: Integers  # the same at its end, or -1: ground, or a source
+    a_first: Real  # ratio with which the first node's voltage counts in the branch's
+    a_second: Real  # the same for the second
+    from_sources: NDArray[np.complex128]  # part of each branch's voltage that the ideal sources give (V)
     terminals: Integers
     """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
-    fixed: NDArray[np.complex128]
-    """Voltages (V) of the terminals that have no position: a source's, or 0."""
-    feeds: NDArray[np.bool_]
-    """Which inverters inject."""
-    scratch: Real
-    """Room for the solution and its right-hand side."""
-    increments: Real
-    """How the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last."""
+    fixed: NDArray[np.complex128]  # voltages (V) of the terminals that have no position: a source's, or 0
+    feeds: NDArray[np.bool_]  # which inverters inject
+    scratch: Real  # room for the solution and its right-hand side
+    increments: Real  # how the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last
     rate: Real
     """Part of an iteration's change that the next one has, when last seen, 1: unknown; and how much it can grow by a
     change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
@@ -245,18 +220,9 @@ def draw_remainders(
 ) -> None:
     """Take what the branches draw (A) beyond the loads' tangent from the nodes at their ends.
 
-    Parameters
-    ----------
-    maps
-        The network.
-    I_b
-        Currents of the branches (A) at x.
-    i_c, A, B
-        The tangent; see `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    x
-        [Re V_b; Im V_b] of the branches (V).
-    right
-        Currents into the nodes (A); written.
+    `I_b`: currents of the branches (A) at x; `i_c`, `A`, `B`: the tangent; see
+    `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`; `x`: [Re V_b; Im V_b] of the branches (V); `right`:
+    currents into the nodes (A); written.
     """
     first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
     m = first.size
@@ -304,39 +270,22 @@ class Reduced(NamedTuple):
     Real matrices act on [Re; Im] and are stored transposed, rows contiguous.
     """
 
-    S: Complex
-    """Constant power of the live branches (VA)."""
-    I0: Complex
-    """Constant current of the live branches (A)."""
-    limited_at: NDArray[np.int64]
-    """Live branches with the law of a `LoadPart`."""
-    law: Real
-    """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
-    i_c: Complex
-    """Tangent of the load law, constant part (A)."""
-    A: Complex
-    """Tangent, factor of V_b (S)."""
-    B: Complex
-    """Tangent, factor of V_b^* (S)."""
-    branch_island: NDArray[np.int64]
-    """Island of each live branch."""
-    inverter_island: NDArray[np.int64]
-    """Island of each inverter."""
+    S: Complex  # constant power of the live branches (VA)
+    I0: Complex  # constant current of the live branches (A)
+    limited_at: NDArray[np.int64]  # live branches with the law of a `LoadPart`
+    law: Real  # their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`
+    i_c: Complex  # tangent of the load law, constant part (A)
+    A: Complex  # tangent, factor of V_b (S)
+    B: Complex  # tangent, factor of V_b^* (S)
+    branch_island: NDArray[np.int64]  # island of each live branch
+    inverter_island: NDArray[np.int64]  # island of each inverter
     leader: NDArray[np.int64]
     """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
-    theta_lin: Real
-    """That inverter's angle at the point of linearisation (rad)."""
-    PT: Real = NO_MATRIX
-    """J to x, (6 n_inv) x (2 m)."""
-    QT: Real = NO_MATRIX
-    """N to x, (2 m) x (2 m)."""
-    x_c: Real = NO_VECTOR
-    """Constant part of x, 2 m (V)."""
-    GGT: Real = NO_MATRIX
-    """J to V_G, (6 n_inv) x (6 n_inv)."""
-    GBT: Real = NO_MATRIX
-    """I_b to V_G, (2 m) x (6 n_inv)."""
-    s_G: Real = NO_VECTOR
-    """Constant part of V_G, 6 n_inv (V)."""
-    sparse: SparseMaps = NO_MAPS
-    """Sparse factors in place of the dense matrices."""
+    theta_lin: Real  # that inverter's angle at the point of linearisation (rad)
+    PT: Real = NO_MATRIX  # J to x, (6 n_inv) x (2 m)
+    QT: Real = NO_MATRIX  # N to x, (2 m) x (2 m)
+    x_c: Real = NO_VECTOR  # constant part of x, 2 m (V)
+    GGT: Real = NO_MATRIX  # J to V_G, (6 n_inv) x (6 n_inv)
+    GBT: Real = NO_MATRIX  # I_b to V_G, (2 m) x (6 n_inv)
+    s_G: Real = NO_VECTOR  # constant part of V_G, 6 n_inv (V)
+    sparse: SparseMaps = NO_MAPS  # sparse factors in place of the dense matrices

@@ -23,8 +23,7 @@ from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
 CONSISTENT = 1e-10
 """Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
 
-LOOSE = 0.01
-"""Tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)."""
+LOOSE = 0.01  # tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)
 
 MAX_ROUNDS = 60
 
@@ -32,16 +31,11 @@ MAX_ROUNDS = 60
 class Slopes(NamedTuple):
     """States and slopes of all inverters as tables of numbers, a row each: the memory of the records in `Units`."""
 
-    gfm: NDArray[np.float64]
-    """States."""
-    gfm_0: NDArray[np.float64]
-    """States at the start of the step."""
-    gfm_d: NDArray[np.float64]
-    """Slopes of the last pass; 0 for an output."""
-    gfm_d0: NDArray[np.float64]
-    """Slopes at the start of the step."""
-    gfl: NDArray[np.float64]
-    """The same for the GFL."""
+    gfm: NDArray[np.float64]  # states
+    gfm_0: NDArray[np.float64]  # states at the start of the step
+    gfm_d: NDArray[np.float64]  # slopes of the last pass; 0 for an output
+    gfm_d0: NDArray[np.float64]  # slopes at the start of the step
+    gfl: NDArray[np.float64]  # the same for the GFL
     gfl_0: NDArray[np.float64]
     gfl_d: NDArray[np.float64]
     gfl_d0: NDArray[np.float64]
@@ -55,10 +49,8 @@ class FeedForward(NamedTuple):
     itself, or its internal voltage is a state and the admittance is part of the network."""
     gain: NDArray[np.complex128]
     """1 / (1 - a), where the current after a pass changes by a times what the current before it changes."""
-    I_b: NDArray[np.float64]
-    """Rated currents (A)."""
-    V_b: float
-    """Highest nominal voltage (V)."""
+    I_b: NDArray[np.float64]  # rated currents (A)
+    V_b: float  # highest nominal voltage (V)
 
 
 @compiled
@@ -71,18 +63,8 @@ def take_round(
 ) -> float:
     """Write slopes and injections that belong to the present voltages; returns a current's largest change (pu).
 
-    Parameters
-    ----------
-    units
-        `Units` whose states at the start of the step are the present ones.
-    forward
-        `FeedForward`.
-    used
-        Injections (A) of the network solution.
-    change
-        How the injections change (A); written.
-    readings
-        As in `advance_inverters`.
+    `units`: `Units` whose states at the start of the step are the present ones; `used`: injections (A) of the network
+    solution; `change`: how the injections change (A); written.
     """
     advance_inverters(units, 0.0, False, readings)
     largest = 0.0
@@ -114,25 +96,10 @@ def solve_together(
     current reference P / u_d, weighted by k_pc: each round gains a decade, and the secant through the last two rounds
     (Anderson acceleration of depth 1, each island by itself) two.
 
-    Parameters
-    ----------
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        `Units` whose states at the start of the step are the present ones.
-    forward
-        `FeedForward`.
-    rotation
-        Factor that turns phasors into each island's frame.
-    x, I_b, tolerance, work
-        As in `solve_within_limits`.
-    readings
-        n_inv x READING, written here.
+    `units`: `Units` whose states at the start of the step are the present ones; `rotation`: factor that turns phasors
+    into each island's frame; `readings`: n_inv x READING, written here.
 
-    Returns
-    -------
-    int
-        Iterations of the network, without the one that each round after the first takes at least.
+    Return iterations of the network, without the one that each round after the first takes at least.
     """
     n, islands = units.online.size, net.leader.size
     J = units.J
@@ -185,28 +152,10 @@ def run_second_order_steps(
 ) -> int:
     """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
 
-    Parameters
-    ----------
-    begin
-        Solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the end.
-    steps, h
-        Number of steps and their length (s).
-    tolerance
-        Of the network solution (V).
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
-    present
-        The same, with the present states in place of those at the start of the step.
-    slopes
-        `Slopes` of the same memory.
-    forward
-        `FeedForward`.
-    x
-        Branch voltages in the islands' frames, the first guess of the next solution.
-    out
-        steps x n_inv x READING: f, P, Q and V at the end of each step.
+    `begin`: solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the
+    end; `present`: the same, with the present states in place of those at the start of the step; `slopes`: `Slopes` of
+    the same memory; `x`: branch voltages in the islands' frames, the first guess of the next solution; `out`: steps x
+    n_inv x READING: f, P, Q and V at the end of each step.
     """
     total = 0
     if steps == 0:

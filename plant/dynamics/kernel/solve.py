@@ -38,12 +38,7 @@ def power(m: float, n: float) -> float:
 def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
     """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
 
-    Parameters
-    ----------
-    row
-        A row of `COLUMNS`.
-    V
-        Magnitude of the voltage across the load (V).
+    `V`: magnitude of the voltage across the load (V).
     """
     P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off, V_off_above = row
     per_square = 1.0 / (V_nom * V_nom)
@@ -103,8 +98,7 @@ def limited_tangents(
 
 MAX_ITERATIONS = 60
 
-CAUTION = 0.1
-"""Part of the tolerance that what is left of an iteration may have by its rate so far."""
+CAUTION = 0.1  # part of the tolerance that what is left of an iteration may have by its rate so far
 
 NOISE = 100.0
 """Change of an iteration, as a multiple of the tolerance, from which on the next one tells its rate, not rounding."""
@@ -207,24 +201,13 @@ def solve_network(
 ) -> int:
     """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
-    Parameters
-    ----------
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    J
-        Injections, n_inv x 3 (A).
-    rotation
-        exp(-j angle) into each island's frame.
-    x
-        Branch voltages in that frame (V), [Re; Im]: first guess, then solution.
-    I_b
-        Branch currents in that frame (A), written here.
-    V
-        Terminal voltages, n_inv x 3 (V), written here.
-    tolerance
-        Largest change of a branch voltage in the last iteration (V).
-    work
-        Room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
+    `J`: injections, n_inv x 3 (A);
+    `rotation`: exp(-j angle) into each island's frame;
+    `x`: branch voltages in that frame (V), [Re; Im]: first guess, then solution;
+    `I_b`: branch currents in that frame (A), written here;
+    `V`: terminal voltages, n_inv x 3 (V), written here;
+    `tolerance`: largest change of a branch voltage in the last iteration (V);
+    `work`: room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
     """
     if net.sparse.constant.size:
         return solve_sparse(net, J, rotation, x, I_b, V, tolerance)
@@ -286,8 +269,7 @@ EXACT, SETTLED = 1e-13, 1e-11
 
 PATIENCE = 100
 
-NO_NETWORK = -1
-"""Result of `settle_powers` where the network has no solution at the injections."""
+NO_NETWORK = -1  # result of `settle_powers` where the network has no solution at the injections
 
 
 @compiled
@@ -310,26 +292,13 @@ def settle_powers(
     The change is that of an injection (pu of its rated current). Where they have not settled, one round more than
     `most` is returned; where the network has no solution at the injections J, `NO_NETWORK`.
 
-    Parameters
-    ----------
-    most
-        Most rounds.
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest.
-    J
-        Injections (A), n_inv x 3: first guess, then solution.
-    S
-        Powers of all three phases (VA).
-    y
-        Admittances of the inverters that are part of the network (S).
-    rated
-        Ratings over nominal voltages (A).
-    delivers
-        Inverters whose injection is to be found; the others keep theirs.
-    balanced
-        Inverters of equal powers, in place of a balanced injection.
-    x, I_b, V, tolerance
-        As in `solve_network`.
+    `net`: a `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest;
+    `J`: injections (A), n_inv x 3: first guess, then solution;
+    `S`: powers of all three phases (VA);
+    `y`: admittances of the inverters that are part of the network (S);
+    `rated`: ratings over nominal voltages (A);
+    `delivers`: inverters whose injection is to be found; the others keep theirs;
+    `balanced`: inverters of equal powers, in place of a balanced injection.
     """
     n = J.shape[0]
     work = np.empty(12 * n + 6 * net.S.size)

@@ -35,10 +35,8 @@ def limit_currents(
 ) -> float:
     """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V).
 
-    Parameters
-    ----------
-    gfm, gfm_at, online, J, V, limiting
-        As in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is reduced, and `limiting` says whose.
+    `gfm`, `gfm_at`, `online`, `J`, `V`, `limiting`: as in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is
+    reduced, and `limiting` says whose.
     """
     largest = 0.0
     for k in range(gfm_at.size):
@@ -69,13 +67,8 @@ def solve_on(
 ) -> int:
     """Solve again and again until no phase is beyond its limit; return the iterations, or -1 as `solve_network`.
 
-    Parameters
-    ----------
-    net, rotation, x, I_b, tolerance, work
-        As for `solve_network`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the last
-        solution.
+    `units`: a `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the
+    last solution.
     """
     total = 0
     for _ in range(MAX_LIMITING):
@@ -128,22 +121,9 @@ def run_steps(
     A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with
     `begin` = 2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0` of the units.
 
-    Parameters
-    ----------
-    begin
-        Network solution to begin with, two a step.
-    steps, h
-        Number of steps and their length (s).
-    tolerance
-        Of the network solution (V).
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
-    x
-        Branch voltages in the islands' frames, the first guess of the next solution.
-    out
-        steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second solution.
+    `begin`: network solution to begin with, two a step; `x`: branch voltages in the islands' frames, the first guess of
+    the next solution; `out`: steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second
+    solution.
     """
     n, m = units.J.shape[0], net.S.size
     work = np.empty(12 * n + 6 * m)
