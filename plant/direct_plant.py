@@ -33,7 +33,6 @@ class DirectPlant(LockstepPlant):
         self._reporter.collect()
 
     def begin_tick(self) -> list[Measurement]:
-        """Return the measurements of this tick, one for each agent."""
         measurements = list(self._measurements())
         if self.tick == 0:
             self._report(final=False)

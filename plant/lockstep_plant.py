@@ -101,17 +101,14 @@ class LockstepPlant(PlantNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return self.phase == "over"
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages that the plant needs to continue."""
         return self._barrier.messages_needed
 
     @property
@@ -121,13 +118,11 @@ class LockstepPlant(PlantNode):
         return None if deadline == inf else deadline
 
     def start(self, now: float) -> None:
-        """Start to wait for the agents."""
         self._barrier.renew(now)
         self._ask_at = now + AGAIN
         self._gather(now)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Return the missing messages with their senders."""
         match self.phase:
             case "gathering":
                 absent = [name for name in self.config.recorders if name not in self._recorders]
@@ -139,7 +134,6 @@ class LockstepPlant(PlantNode):
         return ()
 
     def expire(self, now: float) -> None:
-        """Ask again, and end the run if the deadline has passed."""
         if now >= self._ask_at:
             self._ask_again(now)
         if self._barrier.is_over(now):
@@ -154,7 +148,6 @@ class LockstepPlant(PlantNode):
                 self.abort(self._barrier.complaint(missing, now), now)
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because of a failure."""
         if self.phase not in ("closing", "over"):
             self.outcome = reason
             self.reproducible = False
@@ -165,7 +158,6 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- liveliness
 
     def _unmet(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
-        """Return the missing tokens and nameplates of these agents."""
         here = {name for name in names if self.members.instance(name)}
         tokens = [Awaited("token", name) for name in names if name not in here]
         met = self.members.nameplates
@@ -281,7 +273,6 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- the roster
 
     def _gather(self, now: float) -> None:
-        """Prepare the first roster, if all agents and recorders are there."""
         enough = len(self.members.nameplates) >= len(self.config.agents)  # else it would ask n times for all n
         if self.phase == "gathering" and enough and not self.missing_messages():
             self._reporter.collect()
@@ -289,7 +280,6 @@ class LockstepPlant(PlantNode):
             assert set(self._roster) == set(self.config.agents)
 
     def _prepare(self, now: float) -> None:
-        """Send the next roster: all present agents."""
         self._roster = tuple(name for name in self._everyone if self.members.instance(name))
         self._roster_number += 1
         self._roster_changed = False
@@ -337,7 +327,6 @@ class LockstepPlant(PlantNode):
         self._note_event("roster", name, text)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
-        """Connect or disconnect an inverter."""
         if self.outcome:
             return
         try:
@@ -388,14 +377,12 @@ class LockstepPlant(PlantNode):
             self._report(final=False)
 
     def _measurements(self) -> Iterator[Measurement]:
-        """Yield the measurement of this tick of each agent on the roster."""
         t, tick, epoch = self.t, self.tick, self.config.epoch
         readings = self._plant.measure()
         for name in self._roster:
             yield measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t)
 
     def _finish_tick(self, now: float) -> None:
-        """Hold the set-points and advance."""
         if self._stops_for_a_law(now):
             return
         if self._tick_traffic is not None:

@@ -33,13 +33,9 @@ class PlantLike(Protocol):
     """The part of a plant that the lock-step uses; `gridpeers.plant.feeder.Plant` has it."""
 
     @property
-    def inverters(self) -> tuple[str, ...]:
-        """Names of the inverters."""
-        ...
+    def inverters(self) -> tuple[str, ...]: ...
 
-    def measure(self) -> Mapping[str, ReadingLike]:
-        """Read all sensors now."""
-        ...
+    def measure(self) -> Mapping[str, ReadingLike]: ...
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
         """Take set-points (W, V)."""
@@ -63,9 +59,7 @@ class PlantLike(Protocol):
         """
         ...
 
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        """Take out the events since the last call."""
-        ...
+    def take_events(self) -> tuple[PlantEvent, ...]: ...
 
     def close(self) -> None:
         """End what belongs to the plant outside of this process, after a good end and after a bad one."""

@@ -25,8 +25,6 @@ from gridpeers.wire.wording import printable
 
 
 class TickActions(NamedTuple):
-    """Scheduled joins, leaves and deaths of one tick."""
-
     leave: tuple[str, ...] = ()  # inverters whose agents leave
     join: tuple[str, ...] = ()  # inverters whose agents join
     die: tuple[str, ...] = ()  # inverters whose agents die
@@ -55,7 +53,6 @@ class AgentSchedule:
 
     @property
     def joiners(self) -> frozenset[str]:
-        """Names of the agents that are yet to join."""
         return frozenset(name for actions in self._at.values() for name in actions.join)
 
     def take(self, tick: int) -> TickActions:
@@ -102,11 +99,9 @@ class PlantNode(Node):
 
     @property
     def token(self) -> str:
-        """Key of the plant's liveliness token."""
         return self.keys.alive_plant(self.config.epoch)
 
     def use_links(self, links: Links) -> None:
-        """Use other emulated links from now on."""
         self._links = links
 
     @property
@@ -155,7 +150,6 @@ class PlantNode(Node):
         return known or len(self._recorders) < MOST_RECORDERS
 
     def _is_taken(self, name: str, instance: str) -> bool:
-        """Whether another process holds a name."""
         return self.members.instance(name) not in ("", instance)
 
     def _refusal(self, name: str, instance: str) -> str:
@@ -163,7 +157,6 @@ class PlantNode(Node):
         raise NotImplementedError
 
     def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
-        """Tell a process that it cannot take part."""
         self.stop(self.keys.stop_request(name, instance), reason, refused=True)
 
     def _recorder_came(self, name: str, now: float) -> None:
@@ -173,7 +166,6 @@ class PlantNode(Node):
         """Note that a recorder's token is gone."""
 
     def _agent_gone(self, name: str, now: float) -> None:
-        """Note that the process that took part for a name is gone."""
         raise NotImplementedError
 
     def _close_if_alone(self) -> None:
@@ -183,7 +175,6 @@ class PlantNode(Node):
     # ---------------------------------------------------------------- the plant itself
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because of a failure."""
         raise NotImplementedError
 
     def _operate(self, operation: Callable[[], object], now: float) -> bool:
@@ -204,7 +195,6 @@ class PlantNode(Node):
             self._note_event("link", name, text)
 
     def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
-        """Note an event at the plant's time."""
         self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
@@ -214,7 +204,6 @@ class PlantNode(Node):
         self._publish(key, encode(stop))
 
     def _note_state(self, state: State) -> None:
-        """Note a failed law or a quiet state."""
         if state.fault:
             self._failed_laws.setdefault(state.sender, state.fault)
             self._note_event("law", state.sender, f"{state.sender}: {state.fault}{IDLE}")
@@ -242,11 +231,9 @@ class PlantNode(Node):
             self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
     def _on_journal(self, journal: Journal, payload: bytes, now: float) -> None:
-        """Pass on a part of an agent's journal."""
         self._publish(self.keys.telemetry, payload)
 
     def _report_journal(self, *, last: bool = False) -> None:
-        """Send the own journal since the last report."""
         self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
 
     def _report_links(self, *, last: bool = False) -> None:
@@ -267,7 +254,6 @@ class PlantNode(Node):
         impaired: tuple[str, ...] = (),
         others: int = 0,
     ) -> None:
-        """Send rows and events."""
         messages = self._reporter.report(
             self.t,
             final=final,
@@ -282,7 +268,6 @@ class PlantNode(Node):
             self._send(message)
 
     def _send(self, message: Telemetry) -> None:
-        """Send a message of telemetry."""
         self._publish(self.keys.telemetry, encode(message))
 
     # ---------------------------------------------------------------- the end
@@ -301,7 +286,6 @@ class PlantNode(Node):
         return not self._tokens
 
     def _send_the_last(self) -> None:
-        """Send the last telemetry, unless it is sent already."""
         if self._last_due:
             self._last_due = False
             self._report_journal(last=True)

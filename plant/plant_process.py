@@ -25,7 +25,6 @@ from gridpeers.wire.wording import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:
-    """Start the configuration's plant."""
     from gridpeers.plant.build import (
         start_plant,  # numba and scipy take a second: import them only once the session is open
     )
@@ -34,7 +33,6 @@ def build(config: PlantConfig) -> LivePlant:
 
 
 def print_word(word: str) -> None:
-    """Print a word at once, for the parent process."""
     sys.stdout.write(word + "\n")
     sys.stdout.flush()
 

@@ -102,12 +102,10 @@ class RequestProcess:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed."""
         return self._log.closed
 
     def send(self, request: Mapping[str, Any]) -> None:
@@ -135,7 +133,6 @@ class RequestProcess:
         return answer
 
     def printed(self) -> str:
-        """Return what the program has printed on standard error."""
         return os.pread(self._log.fileno(), os.fstat(self._log.fileno()).st_size, 0).decode(errors="replace")
 
     def close(self, patience: float = 0.0) -> None:

@@ -69,23 +69,19 @@ class Reporter:
 
     @property
     def has_events(self) -> bool:
-        """Whether events wait for the next report."""
         return bool(self._events)
 
     def collect(self) -> None:
-        """Take the plant's new rows and events."""
         self._rows += self._plant.take_rows()
         for event in self._plant.take_events():
             self.note(event)
 
     def note(self, event: PlantEvent) -> None:
-        """Add an event."""
         event = replace(event, subject=printable(event.subject, 200), text=printable(event.text))
         self._events.append(event)
         self.latest.append(event)
 
     def note_quiet(self, t: float) -> None:
-        """Count a quiet state at run time t (s)."""
         self._quiet[t] = self._quiet.get(t, 0) + 1
 
     def report(
@@ -158,7 +154,6 @@ class UnacknowledgedTelemetry:
         self._bytes = 0
 
     def keep(self, number: int, payload: bytes) -> None:
-        """Keep a message that counts to the Telemetry of this number."""
         if self._needed:
             self._kept.append((number, payload))
             self._bytes += len(payload)
@@ -185,5 +180,4 @@ class UnacknowledgedTelemetry:
 
     @property
     def is_empty(self) -> bool:
-        """Whether the recorders have everything."""
         return not self._kept

@@ -69,7 +69,6 @@ class LoadLaw:
     """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
 
     def __add__(self, others: LoadLaw) -> LoadLaw:
-        """Return the law of these branches and then of the others."""
         return LoadLaw(
             S=np.concatenate([self.S, others.S]),
             I0=np.concatenate([self.I0, others.I0]),
@@ -78,7 +77,6 @@ class LoadLaw:
         )
 
     def of(self, branches: NDArray[np.int64]) -> LoadLaw:
-        """Return the law of some of the branches."""
         place = np.full(self.S.size, -1, np.int64)
         place[branches] = np.arange(branches.size)
         at = place[self.limited_at]
@@ -169,7 +167,6 @@ class Circuit:
         return V if self.reference is None else V + np.where(self.reference >= 0, V[self.reference], 0.0)
 
     def without_source(self) -> Circuit:
-        """Return the same network with its substation disconnected."""
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 
     def components(self) -> tuple[int, NDArray[np.int64]]:

@@ -21,8 +21,6 @@ from gridpeers.plant.plant_config import Method
 
 @dataclass(frozen=True, kw_only=True)
 class Inverter:
-    """One inverter at a circuit's terminal."""
-
     name: str
     kind: Literal["GFM", "GFL"]
     phases: str = "ABC"  # phases of its terminal: all three, or one
@@ -35,7 +33,6 @@ class Inverter:
 
     @property
     def single(self) -> bool:
-        """Whether it has one phase."""
         return len(self.phases) == 1
 
     @property

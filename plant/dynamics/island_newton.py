@@ -54,12 +54,10 @@ class DenseIsland:
         self._Z, self._loads, self.V_nom, self.without_load = Z, loads, np.abs(nominal), E
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        """Return F (V) and its size (pu) with this part of the load."""
         F = V - self.without_load + part * (self._Z @ self._loads.currents(V))
         return F, float(np.max(np.abs(F) / self.V_nom, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
         A, B = self._loads.tangent(V)
         ZA, ZB = part * self._Z * A, part * self._Z * B
         real: Real = np.block([[(ZA + ZB).real, (ZB - ZA).imag], [(ZA + ZB).imag, (ZA - ZB).real]])

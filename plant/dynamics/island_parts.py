@@ -48,14 +48,12 @@ class Part:
     gfl_at: Integers
 
     def take(self, units: Units) -> Units:
-        """Return its inverters, with copies of what the steps advance."""
         own: dict[str, Any] = {"gfm_at": self.gfm_at, "gfl_at": self.gfl_at}
         for which, names in ((self.gfm, _OF_GFM), (self.gfl, _OF_GFL), (self.inverters, _OF_INVERTERS)):
             own |= {name: getattr(units, name)[which] for name in names}
         return units._replace(**own | {name: own[name].copy() for name in _ADVANCED})
 
     def put(self, own: Units, units: Units) -> None:
-        """Write its inverters back after the steps."""
         units.gfm_state[self.gfm], units.gfl_state[self.gfl] = own.gfm_state, own.gfl_state
         units.J[self.inverters], units.V[self.inverters], units.I[self.inverters] = own.J, own.V, own.I
         units.limiting[self.inverters] = own.limiting
@@ -99,7 +97,6 @@ class IslandParts:
 
 
 def is_large(net: Reduced) -> bool:
-    """Return whether a network may have several parts."""
     return bool(net.sparse.constant.size // 2 >= 2 * PART)
 
 

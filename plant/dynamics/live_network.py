@@ -98,7 +98,6 @@ class LiveNetwork:
 
     @property
     def source_voltage(self) -> Complex:
-        """Phasors of the connected ideal sources (V)."""
         return self.reduction.circuit.source_voltage
 
     def reduced(self, circuit: Circuit, *, foreseen: bool = False) -> Reduction:

@@ -185,8 +185,6 @@ MOST_PLACE_ROUNDS = 100
 
 
 class DroopPowers(NamedTuple):
-    """Injections, voltages and reactive powers at rest, and where each inverter rests on its characteristic."""
-
     J: Complex  # Norton injections (A)
     V: Complex  # terminal voltages (V)
     Q: Real  # pu

@@ -127,7 +127,6 @@ class DenseReduction(SwitchState):
 
     @one_thread()
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return every node's voltage (V), 0 in dead islands, for injections J (n_inv x 3, A) and currents I_b (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         Z_G, Z_C, Z_S = self._columns
         V[self.unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
@@ -168,7 +167,6 @@ class SparseReduction(SwitchState):
         self._lu: SuperLU | None = None
 
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        """Return the inner loop's arrays; see `DenseReduction.linearise`."""
         net = self.at_tangent(V_b, theta)
         kept = self._kept
         from_sources = kept.C_S.T @ source_voltage
@@ -210,7 +208,6 @@ class SparseReduction(SwitchState):
         )
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        """Return branch voltages by Newton's method; see `DenseReduction.solve_islands`."""
         V_b, failed, C = guess.copy(), [], self._kept.C
         from_sources = self._kept.C_S.T @ source_voltage
         right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
@@ -240,11 +237,9 @@ class SparseReduction(SwitchState):
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
         return self.circuit.turn * self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
 
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         if self.unknown.size:
             if self._lu is None:
@@ -290,7 +285,6 @@ class SparseIsland:
         return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
         A, B = self._loads.tangent(self._C.T @ V + self._c)
         matrix = self._pattern.matrix(part * A, part * B)
         # without load the determinant is that of a complex matrix, squared in magnitude: positive

@@ -75,15 +75,12 @@ class Dynamics:
         return point
 
     def connect(self, circuit: Circuit) -> None:
-        """Continue with another network; see `gridpeers.plant.dynamics.switching.connect`."""
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
-        """Connect or disconnect an inverter; see `switch_inverters`."""
         self.switch_inverters((i,), on)
 
     def switch_inverters(self, which: Sequence[int], on: bool) -> None:
-        """Connect or disconnect inverters, all at once; see `gridpeers.plant.dynamics.switching.switch_inverters`."""
         self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:

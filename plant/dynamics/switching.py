@@ -146,5 +146,4 @@ def _rest_voltage(units: Inverters, i: int) -> float:
 
 
 def _mean_voltage(units: Inverters, i: int) -> float:
-    """Return the mean terminal voltage of inverter i (pu)."""
     return float(np.mean(np.abs(units.V[i]))) / float(units.V_b[i])

@@ -86,7 +86,6 @@ class Connectivity:
             ]
 
     def closed_at_start(self) -> frozenset[str]:
-        """Return the switches that are closed at the start."""
         return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
 
     def parts(

@@ -57,7 +57,6 @@ def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
 
 
 def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
-    """The same equipment at another nominal frequency (Hz)."""
     if f_nom == feeder.f_nom:
         return feeder
     k = f_nom / feeder.f_nom
@@ -160,13 +159,11 @@ def _tie_switch(one: str, other: str, alias: str) -> Switch:
 
 
 def _tie_line(feeder: Feeder, one: str, other: str) -> Line:
-    """Return a line as the first of three phases."""
     kind = next(line for line in feeder.lines if line.phases == "ABC")
     return Line(name=one, from_bus=one, to_bus=other, phases="ABC", config=kind.config, length=TIE_LENGTH)
 
 
 def _tie_element(feeder: Feeder, V_nom: float, one: str, other: str) -> LinearElement:
-    """Return a line as the first of three phases at this voltage."""
     voltages = {bus.name: bus.V_nom for bus in feeder.buses}
     for element in feeder.elements:
         buses = [bus for bus, _ in element.nodes]

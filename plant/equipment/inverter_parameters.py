@@ -225,7 +225,6 @@ BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})
 
 
 def _published(own: InverterParameters) -> OwnParameters:
-    """Return a set of all parameters that a specification has."""
     names = [name for name in own.__struct_fields__ if name not in BOUNDS_OF_SET_POINTS]
     return OwnParameters(**{name: getattr(own, name) for name in names})
 

@@ -28,7 +28,6 @@ class NamedLoad(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
-    """Return the loads of a feeder by name, in the order of its tables."""
     found: dict[str, NamedLoad] = {}
     for name, bus, S in (
         *((load.bus, load.bus, sum(load.S)) for load in feeder.loads),
@@ -96,7 +95,6 @@ def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
 
 
 def _shared(branches: Sequence[complex], total: complex) -> list[complex]:
-    """Return the powers (VA) of a load's branches for another total."""
     P = _scaled([S.real for S in branches], [abs(S) for S in branches], total.real)
     Q = _scaled([S.imag for S in branches], [abs(S) for S in branches], total.imag)
     return [complex(p, q) for p, q in zip(P, Q, strict=True)]
@@ -129,11 +127,9 @@ class LoadPowers:
         self._most = MOST * max(sum(abs(load.S) for load in self._loads.values()), P_rated) / 1e3
 
     def name(self, text: str) -> str:
-        """Return the name of a load by its name, or by its bus; see `load_name`."""
         return load_name(self._loads, text)
 
     def table(self, name: str) -> complex:
-        """Return the power (VA) of a load, by its name, in the feeder's tables."""
         return self._loads[name].S
 
     def power(self, name: str, setting: LoadSetting, before: complex) -> complex:
@@ -156,7 +152,6 @@ class LoadPowers:
         return complex(P, Q)
 
     def words(self, name: str, S: complex) -> str:
-        """Return a power (VA) of a load in words, beside that of its table."""
         return f"{S.real / 1e3:.6g} kW and {S.imag / 1e3:.6g} kvar at nominal voltage{_beside(S, self.table(name))}"
 
 

@@ -116,6 +116,5 @@ def _conductors(elements: Iterable[LinearElement]) -> Iterator[tuple[Node, Node]
 
 
 def _poles(switches: Iterable[Switch]) -> Iterator[tuple[Node, Node]]:
-    """Yield the two ends of each pole of switches."""
     for switch in switches:
         yield from (((switch.from_bus, phase), (switch.to_bus, phase)) for phase in switch.phases)

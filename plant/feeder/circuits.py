@@ -26,7 +26,6 @@ class Circuits:
         self._made: ForeseenCache[tuple[Network, frozenset[str]], Circuit] = ForeseenCache()
 
     def change_loads(self, network: Network) -> None:
-        """Go on with the same network with other loads."""
         self._network = network
 
     def of(self, closed: frozenset[str], network: Network | None = None, *, foreseen: bool = False) -> Circuit:
@@ -40,7 +39,6 @@ class Circuits:
         return self._made.get((of, closed), lambda: circuit_of(of, closed, self._loads_of(of)), foreseen=foreseen)
 
     def _loads_of(self, network: Network) -> LoadBranches:
-        """Return the load branches of a network."""
         if network not in self._loads:
             still = {used for used, _ in self._made} | {self._network}
             self._loads = {used: loads for used, loads in self._loads.items() if used in still}

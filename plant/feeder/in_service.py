@@ -47,7 +47,6 @@ class InService:
         self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, dynamics.inverters.f_nom)
 
     def has_tripped(self, i: int) -> bool:
-        """Whether an inverter is off because it tripped."""
         return bool(self._recovery.tripped.item(i))
 
     @property
@@ -130,13 +129,11 @@ class InService:
             self._tell(step, "trip", locked[0], text)
 
     def _with(self, i: int) -> NDArray[np.bool_]:
-        """Return the inverters in the same island, this one included."""
         island = self._dynamics.network.reduction.inverter_island
         same: NDArray[np.bool_] = island == island[i]
         return same
 
     def _fed(self, i: int) -> bool:
-        """Whether an inverter's island is energised."""
         reduction = self._dynamics.network.reduction
         return bool(reduction.live[reduction.inverter_island[i]])
 

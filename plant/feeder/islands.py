@@ -33,7 +33,6 @@ class Islands:
         self._reported: dict[str, str] = {}  # last reported text of each island
 
     def change_loads(self, network: Network) -> None:
-        """Go on with the same network with other loads."""
         self._network = network
 
     def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
@@ -87,7 +86,6 @@ class Islands:
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 
     def _dead_buses(self, closed: frozenset[str], live: NDArray[np.bool_]) -> list[str]:
-        """Return the buses without a live node, in the feeder's order."""
         alive = live[self._network.merge(closed).representative]
         fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]
@@ -109,7 +107,6 @@ class NeutralEvents:
         self._off: set[int] = set()
 
     def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
-        """Return the events at t (s), with these switches closed."""
         if not self._neutrals:
             return []
         earthing = set(dynamics.network.reduction.earthing)
@@ -174,8 +171,6 @@ BEYOND = 10.0  # voltage (pu) that no network has: where there is no solution, i
 
 
 class Closing(NamedTuple):
-    """A switch that has joined two live islands."""
-
     t: float
     switch: str
     angle: float  # angle between the two sides before (deg, 0 to 180)

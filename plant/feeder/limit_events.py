@@ -20,8 +20,6 @@ _UNIT = {"P_set": "kW", "V_set": "V"}
 
 @dataclass
 class _Spell:
-    """Consecutive limited set-points of one inverter."""
-
     count: int
     last: float  # time of the last one (s)
     farthest: float  # the one farthest from the held value (kW or V)
@@ -62,7 +60,6 @@ class SetPointLimits:
         return []
 
     def refused(self, name: str, t: float) -> list[PlantEvent]:
-        """Note set-points that are not finite; report them once per inverter."""
         if name in self._refused:
             return []
         self._refused.add(name)
@@ -87,7 +84,6 @@ class CurrentLimits:
         self._last = [-np.inf] * len(names)
 
     def report(self, t: float, limiting: NDArray[np.bool_]) -> list[PlantEvent]:
-        """Return the events of spells that begin at t (s), given which inverters limit."""
         events = []
         for i in np.flatnonzero(limiting).tolist():
             name, since = self._names[i], t - self._last[i]
@@ -109,8 +105,6 @@ LAW_LIMITS = {"V_min": -1, "V_max": 1}
 
 
 class _Jump(NamedTuple):
-    """A limit of a load branch at which its law jumps."""
-
     name: str  # name of its load
     branch: int
     V: float
@@ -170,7 +164,6 @@ class LoadLimits:
 
 
 def _jumps(network: Network) -> list[_Jump]:
-    """Return the limits of a network's loads at which their law jumps."""
     law = network.loads().law
     names = [part.name for part in network.feeder.load_parts if not part.is_impedance]
     found = []

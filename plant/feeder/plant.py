@@ -26,7 +26,6 @@ from gridpeers.wire.timing import time_of
 
 
 def hunting_event(name: str) -> PlantEvent:
-    """Return the event of an inverter that starts on the edge of its dead band."""
     text = (
         f"{name} has no rest at t = 0: without vars its voltage is beyond its dead band, with those of its droop it is "
         "within, so Q hunts between both; choose another db_UV_pu, db_OV_pu or V_set0_pu to avoid it"
@@ -142,7 +141,6 @@ class Plant:
     # ---------------------------------------------------------------- for agents
 
     def measure(self) -> dict[str, Reading]:
-        """Read every inverter's sensors at t = tick * T_c."""
         reduction = self._dynamics.network.reduction
         islands = zip(*self._islands.names(reduction), reduction.online.tolist(), strict=True)
         held = (self._dynamics.inverters.set_points[:, :2] * self._base).tolist()
@@ -174,7 +172,6 @@ class Plant:
 
     @property
     def switches(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return self._switches.positions
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
@@ -199,7 +196,6 @@ class Plant:
 
     @property
     def loads(self) -> dict[str, complex]:
-        """Power at nominal voltage (VA) of each load that has another one than in the feeder's tables now."""
         return self._loads.changed
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
@@ -249,12 +245,10 @@ class Plant:
     # ---------------------------------------------------------------- for the recorder
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows recorded since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Return the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
 
@@ -262,7 +256,6 @@ class Plant:
         """Do nothing: all of this plant is in this process."""
 
     def _time(self, step: int) -> float:
-        """Return the time of a step (s)."""
         return time_of(step, self._h)
 
     def _tell(self, step: int, kind: Literal["inverter", "trip"], subject: str, text: str) -> None:
@@ -286,7 +279,6 @@ class Plant:
             yield self._circuits.of(closed, network, foreseen=True)
 
     def _change_network(self, step: int) -> None:
-        """Change the loads and operate the switches of this step, all at once."""
         loads_change = self._loads.is_due(step)
         if loads_change:
             self.network, events = self._loads.apply(step)
@@ -333,7 +325,6 @@ class Plant:
         self._tell_islands(self._time(step))
 
     def _tell_islands(self, t: float) -> None:
-        """Report the islands of a network that has changed at t (s), and their neutrals."""
         closed = self._switches.closed
         self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
         self._events += self._neutrals.report(t, closed, self._dynamics)
@@ -350,7 +341,6 @@ class Plant:
         return bool(trips)
 
     def _limit(self, limit: PowerLimit) -> None:
-        """Change the available power of an inverter from the next step on."""
         self._dynamics.inverters.limit_power(self._row[limit.inverter], limit.P_max)
         text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
         self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))

@@ -31,8 +31,6 @@ _WORDS = {"OV": "overvoltage", "UV": "undervoltage", "OF": "overfrequency", "UF"
 
 
 class Tripped(NamedTuple):
-    """An inverter whose protection has tripped."""
-
     inverter: int
     function: str  # name of the function in the standard: "UV2"
     value: float  # last measured value (pu or Hz)
@@ -40,7 +38,6 @@ class Tripped(NamedTuple):
     time: float  # time beyond the setting (s): the clearing time
 
     def __str__(self) -> str:
-        """Cause of the trip, for a person."""
         unit = "Hz" if self.function[1] == "F" else "pu"
         value = f"{self.value:.2f} {unit}"
         return f"{_WORDS[self.function[:2]]} {value} for {self.time:g} s ({self.function}: {self.threshold:g} {unit})"
@@ -129,12 +126,10 @@ class Recovery:
         return bool(self.locked[i])
 
     def enter(self, i: int) -> None:
-        """Note that an inverter has returned."""
         self.tripped[i] = self.locked[i] = False
         self._served[i] = 0
 
     def forget(self, i: int) -> None:
-        """Forget an inverter's trips: its agent has connected or disconnected it."""
         self.enter(i)
         self._trips[i] = 0
 
@@ -148,7 +143,6 @@ class Recovery:
         self.unlock(i)
 
     def passed(self, i: int) -> bool:
-        """Whether a tripped inverter has waited long enough."""
         return bool(self._waited[i] >= self._need)
 
     @property
@@ -181,7 +175,6 @@ class Recovery:
 
 
 def _quantity(name: str) -> Literal["f", "low", "high"]:
-    """Return the quantity of a function."""
     if name[1] == "F":
         return "f"
     return "high" if name[0] == "O" else "low"

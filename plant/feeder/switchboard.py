@@ -17,8 +17,6 @@ _PAST = {"open": "opened", "close": "closed"}
 
 
 class Operation(NamedTuple):
-    """An operation of a switch."""
-
     switch: str
     action: str  # "open" or "close"
     synchronised: bool = False  # whether to close only in step
@@ -39,12 +37,10 @@ class Switchboard:
 
     @property
     def positions(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return {name: name in self.closed for name in self._network.switches}
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps with operations to come."""
         return self._at.keys()
 
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
@@ -56,17 +52,14 @@ class Switchboard:
         self._at.setdefault(step, []).append(Operation(known, action, synchronised))
 
     def due(self, step: int) -> tuple[Operation, ...]:
-        """Return the operations of a step."""
         return tuple(self._at.get(step, ()))
 
     def drop(self, step: int, operation: Operation) -> None:
-        """Remove an operation of a step; the others stay."""
         self._at[step].remove(operation)
         if not self._at[step]:
             del self._at[step]
 
     def switch(self, name: str) -> Switch:
-        """Return a switch by its name in the tables."""
         return self._network.switches[name]
 
     def foreseen(self) -> Iterator[frozenset[str]]:
@@ -124,7 +117,6 @@ class LoadBoard:
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps with scheduled changes to come."""
         return self._at.keys()
 
     def foreseen(self) -> Iterator[tuple[int, Network]]:
@@ -171,7 +163,6 @@ class LoadBoard:
             raise ValueError(f"load {name}: {error}") from None
 
     def _put(self, powers: dict[str, complex], name: str, S: complex) -> None:
-        """Note the power of a load, if it is another one than that of the table."""
         if self._powers.table(name) == S:
             powers.pop(name, None)
         else:

@@ -46,7 +46,6 @@ class Difference:
 
     @property
     def within(self) -> bool:
-        """Whether the two sides may be joined."""
         return self.angle <= self.limits.angle and self.f <= self.limits.f and self.V <= self.limits.V
 
     @property
@@ -167,8 +166,6 @@ class Synchronism:
 
 
 class _Pending(NamedTuple):
-    """A closing that waits for synchronism."""
-
     since: int  # step of its scheduled closing
     last: int  # step at which it gives up
 

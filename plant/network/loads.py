@@ -41,7 +41,6 @@ class LoadBranches:
         return len(self.n_from)
 
     def __add__(self, others: LoadBranches) -> LoadBranches:
-        """Return these branches and then the others."""
         pairs = {name: (getattr(self, name), getattr(others, name)) for name in self.__dataclass_fields__}
         laws = pairs.pop("law")
         return LoadBranches(law=laws[0] + laws[1], **{name: np.concatenate(pair) for name, pair in pairs.items()})
@@ -86,11 +85,9 @@ class LoadBranches:
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
 
     def branch_currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Currents through the branches (A). A branch without voltage, in a dead island, takes none."""
         return self.law.currents(self.voltages(V))
 
     def powers(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return the powers taken by the branches (VA)."""
         return np.asarray(self.voltages(V) * np.conj(self.branch_currents(V)), dtype=np.complex128)
 
     def currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:

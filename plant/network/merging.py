@@ -78,7 +78,6 @@ class Merge:
 
     @property
     def representatives(self) -> NDArray[np.int64]:
-        """Nodes that represent their groups, ascending."""
         return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
 
     def expand(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:

@@ -91,7 +91,6 @@ class Network:
         return self._index[bus, phase]
 
     def has(self, bus: str, phases: str) -> bool:
-        """Whether a bus has these phases."""
         return all((bus, phase) in self._index for phase in phases)
 
     def switch_name(self, text: str) -> str:
@@ -162,7 +161,6 @@ class Network:
         return other
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
-        """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
         return bus_islands(self.feeder, {switch.name for switch in self._closed_switches(closed)})
 
     def _without_load(self) -> NDArray[np.complex128]:
@@ -203,7 +201,6 @@ class Network:
         return ties
 
     def _assemble(self, parts: list[tuple[list[int], NDArray[np.complex128]]]) -> sp.csc_array:
-        """Add up element matrices, each given with the nodes of its rows."""
         n = len(self.nodes)
         rows = [np.repeat(nodes, len(nodes)) for nodes, _ in parts]
         columns = [np.tile(nodes, len(nodes)) for nodes, _ in parts]
@@ -297,7 +294,6 @@ class Network:
 
 
 def _chosen(feeder: Feeder, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
-    """Return the spare inverters of these names, in the table's order."""
     known = {row.name: row for row in feeder.spares}
     for name in spares:
         if name not in known:

@@ -27,8 +27,6 @@ STALL = 8  # iterations without a smaller change after which it is rounding
 
 @dataclass(frozen=True, kw_only=True)
 class PowerFlow:
-    """A solved state of a network."""
-
     V: NDArray[np.complex128]  # voltages of all nodes (V, line-to-ground); zero where the substation does not reach
     S_source: complex  # power out of the substation (VA)
     S_loads: complex  # power taken by all loads of any kind (VA)

@@ -73,13 +73,11 @@ class LivePlantNode(PlantNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         inverters = self.plant.inverters
         each = (*map(self.keys.measurement, inverters), *map(self.keys.link_request, inverters))
         return self.keys.control, self.keys.telemetry, *each
 
     def _begin(self, now: float) -> None:
-        """Begin the run."""
         raise NotImplementedError
 
     # ---------------------------------------------------------------- tokens and nameplates
@@ -119,7 +117,6 @@ class LivePlantNode(PlantNode):
         return False
 
     def _ask_again(self, now: float) -> None:
-        """Ask for the nameplates that have not come."""
         if now >= self._ask_timer.due:
             self._ask_timer.take(now)
             for name, instance in self.members.next_unmet():

@@ -58,7 +58,6 @@ class RealTimePacer:
         return news
 
     def report(self) -> Pacing:
-        """Return the percentiles of the delays so far."""
         ordered = sorted(self._delays) or [0.0]
 
         def percentile(part: float) -> float:
@@ -79,7 +78,6 @@ class RealTimePacer:
 
 
 def sentence(pacing: Pacing, period: float) -> str:
-    """Return a sentence on the pace."""
     share = 100.0 * pacing.late / max(1, pacing.steps)
     ms = 1e3
     text = (

@@ -70,12 +70,10 @@ class RealtimePlant(LivePlantNode):
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return self.phase == "over"
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages to be woken for."""
         return CLOCK_ALONE if self.phase == "running" else 1
 
     @property
@@ -86,7 +84,6 @@ class RealtimePlant(LivePlantNode):
         return min(self._deadline, self._waiting_timer.due) if self.phase == "gathering" else self._deadline
 
     def start(self, now: float) -> None:
-        """Begin to wait for the agents."""
         if self.timed is not None:
             self.timed.process("start", f"run {self.config.run}, epoch {self.config.epoch}", now)
         self._deadline = now + max(0.0, self.config.wait_for_agents)
@@ -97,7 +94,6 @@ class RealtimePlant(LivePlantNode):
         self._gather(now)
 
     def expire(self, now: float) -> None:
-        """Make the step that is due, or end the wait that is over."""
         if now < self.deadline:
             return
         if self.timed is not None:
@@ -127,7 +123,6 @@ class RealtimePlant(LivePlantNode):
     # ---------------------------------------------------------------- the end
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because something went wrong."""
         if self.phase not in ("closing", "over"):
             self.outcome = reason
             self.close(reason, now)
@@ -141,7 +136,6 @@ class RealtimePlant(LivePlantNode):
             self.recorder_feed.end()
 
     def close(self, reason: str, now: float) -> None:
-        """End the run and tell all processes."""
         for line in self._warnings.left_out():
             self._tell_warning(line)
         self._say(f"ends: {reason}. {self.pacer}")
@@ -189,7 +183,6 @@ class RealtimePlant(LivePlantNode):
         self._say(f"t = 0; speed {self.config.speed:g}")
 
     def _tell_waiting(self) -> None:
-        """Tell the agents that the plant is there, and the names of the agents that it waits for."""
         waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=self.absent)
         self._publish(self.keys.control, encode(waiting))
 
@@ -257,7 +250,6 @@ class RealtimePlant(LivePlantNode):
         return tuple(self._reporter.latest)
 
     def note_links(self, text: str) -> None:
-        """Note a command to links among the events."""
         self._note_event("link", "links", text)
 
     def _warn(self, text: str, now: float) -> None:

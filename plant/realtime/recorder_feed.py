@@ -19,8 +19,6 @@ holes: a plant grew by 35 MB in five minutes, with nothing more in use than befo
 
 
 class _Entry(NamedTuple):
-    """A message that is kept."""
-
     number: int  # number of the Telemetry that it counts to
     block: bytearray
     start: int
@@ -62,7 +60,6 @@ class KeptTelemetry:
         return True
 
     def _stored(self, number: int, payload: bytes) -> _Entry:
-        """Copy a message into a block."""
         size = len(payload)
         if self._filled + size > len(self._block):
             fits = self._spare and size <= BLOCK
@@ -90,11 +87,9 @@ class KeptTelemetry:
         return max(number, self._kept[0].number) if self._kept else number
 
     def take(self, count: int = AT_ONCE) -> list[bytes]:
-        """Take out the messages to publish again now."""
         return [self._due.popleft().payload for _ in range(min(count, len(self._due)))]
 
     def take_all(self) -> list[bytes]:
-        """Take out all of them, as the run ends."""
         return self.take(len(self._due))
 
 
@@ -140,11 +135,9 @@ class RecorderFeed:
             self.replay()
 
     def replay(self) -> None:
-        """Publish again what is due."""
         for payload in self.kept.take() if self.paced else self.kept.take_all():
             self._publish(payload)
 
     def end(self) -> None:
-        """Publish again all that is due, as the run ends."""
         self.paced = False
         self.replay()

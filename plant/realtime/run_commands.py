@@ -113,8 +113,6 @@ MOST_LOADS = 150  # most loads with another power than their table's in a status
 
 
 class RunCommands:
-    """Carry commands to a plant out."""
-
     def __init__(self, node: RealtimePlant) -> None:
         self._node = node
 
@@ -139,7 +137,6 @@ class RunCommands:
         )
 
     def follow_up(self, command: Command, now: float) -> None:
-        """Do the rest of a command once its answer is out."""
         node = self._node
         agents = node.members.nameplates
         if command.verb == "link":
@@ -150,7 +147,6 @@ class RunCommands:
             node.close("the run was ended by command", now)
 
     def _do(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
-        """Carry a command out; return the text and the data of the answer."""
         verb = command.verb
         if verb == "status":
             status = self.status()

@@ -47,7 +47,6 @@ class SilenceDetector:
         self._reported: dict[str, set[str]] = {}  # by agent, the neighbours whose silence has been an event
 
     def joined(self, name: str) -> None:
-        """Note that an agent takes part from now on."""
         self._joined[name] = self._last[name] = self._clock
 
     def heard(self, name: str, *, failed: bool = False) -> None:
@@ -57,7 +56,6 @@ class SilenceDetector:
         self._holding.discard(name)
 
     def forget(self, name: str) -> None:
-        """Note that an agent does not take part any more."""
         for known in (self._joined, self._last, self._unheard, self._reported):
             known.pop(name, None)
         self._silent.discard(name)

@@ -150,7 +150,6 @@ def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple
 
 
 def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Transformer, ...]:
-    """Read transformers.csv; impedances in percent of the rating."""
     transformers: dict[str, Transformer] = {}
     for row in CsvTable(folder, "transformers.csv", TransformerColumns, problems):
         it, name = row.columns, row.columns.transformer

@@ -29,8 +29,6 @@ def is_imported(folder: Path) -> bool:
 
 
 class BusTable:
-    """Reads buses.csv and checks references to buses."""
-
     def __init__(self, folder: Path, problems: list[str]) -> None:
         self._by_name: dict[str, Bus] = {}
         self._row_of: dict[str, CsvRow[BusColumns]] = {}
@@ -52,7 +50,6 @@ class BusTable:
         self._floating: set[str] = set()
 
     def find(self, row: CsvRow[Any], column: str = "bus") -> Bus | None:
-        """Read a reference to a bus; None, and a problem noted, if there is no such bus."""
         return self.named(row, column, getattr(row.columns, column))
 
     def named(self, row: CsvRow[Any], column: str, name: str) -> Bus | None:
@@ -102,7 +99,6 @@ class BusTable:
         return bus.name not in self._floating
 
     def row_of(self, name: str) -> CsvRow[BusColumns]:
-        """Give the table's row of a bus, to note a problem there."""
         return self._row_of[name]
 
 

@@ -39,7 +39,6 @@ class CsvRow(Generic[C]):
         self.columns = table(**values)
 
     def problem(self, text: str) -> None:
-        """Note that something is wrong with this row."""
         self.mistaken = True
         self._problems.append(f"{self._where}: {text}")
 
@@ -160,5 +159,4 @@ class CsvTable(Generic[C]):
 
 
 def required_columns(columns: type[msgspec.Struct]) -> list[str]:
-    """Return the columns that a table must have."""
     return [field.key for field in fields_of(columns) if field.required]

@@ -16,7 +16,6 @@ Matrix = tuple[tuple[complex, ...], ...]
 
 
 def read_elements(folder: Path, buses: BusTable, problems: list[str]) -> tuple[LinearElement, ...]:
-    """Read elements.csv: names, nodes and admittance matrices."""
     elements: dict[str, LinearElement] = {}
     for row in CsvTable(folder, "elements.csv", ElementColumns, problems):
         it = row.columns

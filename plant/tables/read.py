@@ -71,7 +71,6 @@ class FeederError(ValueError):
 
 
 def feeders() -> tuple[str, ...]:
-    """Names of the feeders that come with the package."""
     return tuple(sorted(path.name for path in DATA.iterdir() if path.is_dir() and path.name != "__pycache__"))
 
 
@@ -109,7 +108,6 @@ def _contents(folder: Path) -> tuple[str | bytes, ...]:
 
 
 def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
-    """Read and check all tables; arguments as of `read_feeder`, and the feeder's folder."""
     problems: list[str] = []
     _report_strange_files(folder, problems)
     buses = BusTable(folder, problems)

@@ -77,7 +77,6 @@ def read_loads(
 
 
 def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Capacitor, ...]:
-    """Read capacitors.csv: banks from phase to ground."""
     capacitors: list[Capacitor] = []
     for row in CsvTable(folder, "capacitors.csv", CapacitorColumns, problems):
         it, bus = row.columns, buses.find(row)

@@ -42,7 +42,6 @@ def write_feeder(feeder: Feeder, folder: Path) -> None:
 
 
 def _tables(feeder: Feeder) -> Iterator[Table]:
-    """Yield file, columns and rows of each table that the feeder has."""
     kV = sqrt(3.0) / 1e3
     neutrals = neutrals_of(feeder)
     yield (
@@ -99,7 +98,6 @@ def _tables(feeder: Feeder) -> Iterator[Table]:
 
 
 def _imported(feeder: Feeder) -> Iterator[Table]:
-    """Yield the tables of a feeder from another program."""
     yield (
         "elements.csv",
         columns.ElementColumns,
@@ -137,7 +135,6 @@ def _imported(feeder: Feeder) -> Iterator[Table]:
 
 
 def _own(feeder: Feeder) -> Iterator[Table]:
-    """Yield the tables of lines, transformers, regulators, capacitors and loads."""
     yield (
         "lines.csv",
         columns.LineColumns,

@@ -59,7 +59,6 @@ FOLDER = kernel_folder()  # where machine code of these sources is kept
 
 
 def is_compiled(function: str) -> bool:
-    """Whether machine code of a function is on disk."""
     return FOLDER is not None and any(FOLDER.glob(f"*.{function}-*.nbi"))
 
 
@@ -133,7 +132,6 @@ A120 = complex(-0.5, 0.5 * np.sqrt(3.0))  # a = exp(j 120 deg)
 
 @compiled
 def sat(x: float, low: float, high: float) -> float:
-    """Clip x to low..high."""
     return min(max(x, low), high)
 
 

@@ -85,7 +85,6 @@ def read_offline(units: Any, readings: NDArray[np.float64]) -> None:
 
 @compiled
 def keep_start(units: Any) -> None:
-    """Keep the present states and injections as the start of a step."""
     for k in range(units.gfm_at.size):
         units.gfm_0[k] = units.gfm_state[k]
     for k in range(units.gfl_at.size):

@@ -29,7 +29,6 @@ class BlockFactors(NamedTuple):
 
 
 def no_factors() -> BlockFactors:
-    """Return the factors of an empty matrix."""
     return BlockFactors(np.zeros(1, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 4)) for _ in range(3)))
 
 
@@ -69,7 +68,6 @@ def add_tangent(
 
 @compiled
 def subtract_product(to: Real, left: Real, right: Real) -> None:
-    """Subtract the product of two blocks from a third."""
     to[0] -= left[0] * right[0] + left[1] * right[2]
     to[1] -= left[0] * right[1] + left[1] * right[3]
     to[2] -= left[2] * right[0] + left[3] * right[2]
@@ -162,7 +160,6 @@ class SparseMaps(NamedTuple):
 
 
 def no_maps() -> SparseMaps:
-    """Return the maps of a network that is solved by dense matrices."""
     nowhere, values = np.zeros(0, np.int64), np.zeros(0)
     terminals, fixed = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128)
     none = np.zeros(0, np.complex128)
@@ -251,7 +248,6 @@ def extrapolate(maps: SparseMaps, x: Real) -> None:
 
 @compiled
 def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
-    """Note how a solution x differs from the one before, x_0 (V)."""
     increments = maps.increments
     for i in range(increments.shape[1]):
         increments[0, i], increments[1, i], increments[2, i] = increments[1, i], increments[2, i], increments[3, i]
