@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, PlantError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droop
 
 
@@ -27,20 +26,14 @@ class OperatingPoint:
     I: Complex  # noqa: E741  # the paper's symbol for current
     """Currents out of the inverters (A)."""
     V_branch: Complex  # voltages of the live load branches (V)
-    on_droop: NDArray[np.bool_]
+    on_droop: Flags
     """Inverters whose voltage is V_set - m_q q; the others are within a dead band, or at the limit of their Q."""
-    on_edge: NDArray[np.bool_]
+    on_edge: Flags
     """Inverters on the edge of a dead band: there is no rest, and Q will hunt around that of this point."""
 
 
 def equilibrium(
-    circuit: Circuit,
-    units: Inverters,
-    P: Real,
-    Q: Real,
-    V_set: Real | None,
-    *,
-    swing_voltage: Complex = PHASES,
+    circuit: Circuit, units: Inverters, P: Real, Q: Real, V_set: Real | None, *, swing_voltage: Complex = PHASES
 ) -> OperatingPoint:
     """Return the operating point of section 7.
 
@@ -94,15 +87,13 @@ def equilibrium(
     return OperatingPoint(J=J, V=V, I=I_out, V_branch=flow.V_b, on_droop=on_droop, on_edge=on_edge)
 
 
-def _swings(units: Inverters, forming: NDArray[np.int64]) -> NDArray[np.int64]:
+def _swings(units: Inverters, forming: Integers) -> Integers:
     """Return the swings among the GFM of an island: the first with three phases, else the first on each phase."""
     whole = forming[~units.single[forming]]
     return whole[:1] if whole.size else forming[np.unique(units.phase[forming], return_index=True)[1]]
 
 
-def set_equilibrium(
-    units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None
-) -> None:
+def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: Real, V_set: Real | None) -> None:
     """Set the inverters' set-points and controller states so that they rest at an operating point.
 
     `units`: the inverters; written; `online`: inverters that deliver; the others keep their states, with `P` and
@@ -126,7 +117,7 @@ def set_equilibrium(
         units.rest(i, S[i], v[i])
 
 
-def require_within_limits(units: Inverters, online: NDArray[np.bool_]) -> None:
+def require_within_limits(units: Inverters, online: Flags) -> None:
     """Raise PlantError if the start is no equilibrium: a GFM that forms an island must be within its limits."""
     for k, i in enumerate(units.gfm_at.tolist()):
         if not online[i]:

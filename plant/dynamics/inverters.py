@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.circuit import PHASES, aligned_sum
 from gridpeers.plant.dynamics.kernel import gfl as gfl_model
 from gridpeers.plant.dynamics.kernel import gfm as gfm_model
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
@@ -179,7 +179,7 @@ class Inverters:
             raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
         self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
 
-    def readings(self, online: NDArray[np.bool_]) -> Real:
+    def readings(self, online: Flags) -> Real:
         """Return f (Hz), P (W), Q (var), V (V) of the last solution, n x 4, before the first step.
 
         `online`: inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.

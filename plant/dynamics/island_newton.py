@@ -14,11 +14,10 @@ from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.threads import one_thread
 
 ITERATIONS = 40  # of Newton's method; it takes 4 to 10
@@ -126,7 +125,7 @@ def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | N
     return None
 
 
-def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: NDArray[np.float64]) -> dict[int, float]:
+def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: Real) -> dict[int, float]:
     r"""Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
 
     A power S behind an impedance Z has a solution where :math:`V^2 \geq 2 (|Z S| + Re(Z S^*))`. It is the one to which

@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Real, Reduced, SparseMaps
+from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Reduced, SparseMaps
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
 from gridpeers.plant.dynamics.threads import each_on_a_core
 
 PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
 
-Integers = NDArray[np.int64]
 
 _OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
 _OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
@@ -120,7 +119,7 @@ def _parts(net: Reduced, node_island: Integers, units: Units) -> Iterator[Part]:
         yield _part(net, islands[part_of[islands] == k], part_of == k, node_island, units)
 
 
-def _part(net: Reduced, islands: Integers, of_part: NDArray[np.bool_], node_island: Integers, units: Units) -> Part:
+def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers, units: Units) -> Part:
     """Return one part. Inverters of dead islands belong to it as those of live ones: they are off."""
     maps, f = net.sparse, net.sparse.factored
     nodes = np.flatnonzero(of_part[node_island])

@@ -10,11 +10,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Complex, Integers, Real, add_tangent
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, add_tangent
 
 MOST_NEIGHBOURS = 8
 """Neighbours up to which taking a node out makes the matrix smaller: it couples all of them with each other."""
@@ -23,7 +23,7 @@ WEAK = 1e-6
 """Part of a node's largest coupling below which its own admittance is no pivot: what is in series there cancels."""
 
 
-def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int64], sp.csc_array]:
+def eliminated(Y: sp.csr_array, keep: Flags) -> tuple[Integers, sp.csc_array]:
     """Take out nodes that need not be kept, those of fewest neighbours first.
 
     `keep`: nodes to keep: those with a load, a terminal or a link to a source. Weak ones are kept, too.
@@ -70,7 +70,7 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     return kept, reduced
 
 
-def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:
+def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> Integers:
     """Return the order of the nodes, by minimum degree, in which elimination couples few of the others.
 
     Those without an own admittance come last: elimination of the others gives them one.
@@ -115,7 +115,7 @@ class BlockPattern:
         add_tangent(f, self.first, self.second, self._across, self.a_first, self.a_second, A, B)
         return f
 
-    def _entry(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _entry(self, i: Integers, j: Integers) -> Integers:
         """Return the entries of `later` that couple these nodes."""
         n = self.start.size - 1
         owner = np.repeat(np.arange(n), np.diff(self.start))
@@ -187,7 +187,7 @@ class KeptNetwork:
     branches at them, at all unknown nodes, and at the sources.
     """
 
-    def __init__(self, circuit: Circuit, unknown: NDArray[np.int64], C: sp.csc_array, to_ground: Real) -> None:
+    def __init__(self, circuit: Circuit, unknown: Integers, C: sp.csc_array, to_ground: Real) -> None:
         n = circuit.Y.shape[0]
         Y_whole = circuit.Y + sp.diags_array(to_ground) if to_ground.any() else circuit.Y
         rows, by_node = Y_whole.tocsr()[unknown], C.tocsr()
@@ -212,7 +212,7 @@ _made: WeakKeyDictionary[Circuit, dict[tuple[bytes, ...], KeptNetwork]] = WeakKe
 
 
 def kept_network(
-    circuit: Circuit, unknown: NDArray[np.int64], branches: NDArray[np.int64], C: sp.csc_array, to_ground: Real
+    circuit: Circuit, unknown: Integers, branches: Integers, C: sp.csc_array, to_ground: Real
 ) -> KeptNetwork:
     """Return the network of these unknown nodes and live branches, which is made once for a circuit."""
     made = _made.setdefault(circuit, {})

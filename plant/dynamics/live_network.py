@@ -10,8 +10,9 @@ import numpy as np
 from gridpeers.plant.dynamics.circuit import Circuit, NoSolutionError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.island_parts import IslandParts, is_large
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import Units
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network

@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 
 from gridpeers.plant.dynamics.circuit import Circuit, NoPowerFlowError, PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.island_newton import weak_branches
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
 from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.dynamics.threads import one_thread
@@ -32,7 +32,7 @@ NEAR = 4  # rounds after which the voltages are near enough to the solution for 
 class PowerFlow:
     """Fixed point between the network and inverters of constant power."""
 
-    def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, units: Inverters, held: Flags) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
         self.reduction = reduce_network(circuit, y, units.forming, units.connected)
@@ -53,7 +53,7 @@ class PowerFlow:
             raise self._no_power_flow()
         self.net = self._linearise()
 
-    def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+    def solve(self, J: Complex, P: Real, Q: Real, frozen: Flags) -> tuple[Complex, Complex]:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, m = self.units, self.V_b.size
         J, V = J.copy(), np.empty(J.shape, complex)
@@ -120,12 +120,12 @@ class VoltVarAtRest(NamedTuple):
     m_q: Real  # pu per pu
     db_UV: Real  # dead bands below V_set (pu); 0 for a GFM, infinite without volt-var
     db_OV: Real  # the same above V_set
-    from_edge: NDArray[np.bool_]
+    from_edge: Flags
     """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
     Q_min: Real  # limits of reactive power (pu)
     Q_max: Real
 
-    def first_places(self) -> NDArray[np.int64]:
+    def first_places(self) -> Integers:
         """Return where the search begins: inside of every band at whose edges the characteristic jumps."""
         return np.where(((self.db_UV > 0.0) | (self.db_OV > 0.0)) & ~self.from_edge, INSIDE, DROOP)
 
@@ -138,7 +138,7 @@ class VoltVarAtRest(NamedTuple):
         """Return the vars within the band (pu): none, unless the limits exclude that."""
         return np.clip(np.zeros(self.m_q.size), self.Q_min, self.Q_max)
 
-    def mismatch(self, place: NDArray[np.int64], v: Real, Q: Real) -> Real:
+    def mismatch(self, place: Integers, v: Real, Q: Real) -> Real:
         """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
         low = self.V_set - v
         wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
@@ -146,7 +146,7 @@ class VoltVarAtRest(NamedTuple):
         off = np.where(place == UNDER, low - self.db_UV, off)
         return np.where(place == OVER, low + self.db_OV, off)
 
-    def next_places(self, place: NDArray[np.int64], v: Real, Q: Real, rounds: int) -> NDArray[np.int64]:
+    def next_places(self, place: Integers, v: Real, Q: Real, rounds: int) -> Integers:
         """Return where inverters belong that rest with Q at v; the same places once they are right.
 
         `place`: where they were taken to be; `v`, `Q`: voltages and reactive powers with which they rest there (pu);
@@ -188,11 +188,11 @@ class DroopPowers(NamedTuple):
     J: Complex  # Norton injections (A)
     V: Complex  # terminal voltages (V)
     Q: Real  # pu
-    on_droop: NDArray[np.bool_]  # inverters whose voltage is V_set - m_q q
-    on_edge: NDArray[np.bool_]  # inverters on the edge of a dead band
+    on_droop: Flags  # inverters whose voltage is V_set - m_q q
+    on_edge: Flags  # inverters on the edge of a dead band
 
 
-def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: NDArray[np.bool_]) -> DroopPowers:
+def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags) -> DroopPowers:
     """Find the Q that each characteristic gives at its terminal's voltage.
 
     `J`, `Q`: first guesses of the injections (A) and reactive powers (pu); `P`, `V_set`: real powers and voltage
@@ -223,14 +223,7 @@ def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, s
 
 
 def _at_places(
-    flow: PowerFlow,
-    J: Complex,
-    P: Real,
-    Q: Real,
-    at_rest: VoltVarAtRest,
-    place: NDArray[np.int64],
-    free: NDArray[np.int64],
-    swing: NDArray[np.bool_],
+    flow: PowerFlow, J: Complex, P: Real, Q: Real, at_rest: VoltVarAtRest, place: Integers, free: Integers, swing: Flags
 ) -> tuple[Complex, Complex, Real]:
     """Find the Q at which the free inverters rest at these places of their characteristics."""
     if not free.size:  # swings alone: they hold their voltage, and nothing is left to find

@@ -19,21 +19,13 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit, LoadLaw
 from gridpeers.plant.dynamics.island_newton import ROUNDING, DenseIsland, solve_island
 from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern, kept_network
-from gridpeers.plant.dynamics.kernel.network_arrays import (
-    COPY,
-    Complex,
-    Real,
-    Reduced,
-    SparseMaps,
-    factorise_blocks,
-    solve_blocks,
-)
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks, solve_blocks
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.dynamics.threads import one_thread
 
@@ -42,7 +34,7 @@ class DenseReduction(SwitchState):
     """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation."""
 
     @one_thread()
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         super().__init__(circuit, y_f, forming, online)
         unknown, place, G, Y, C, held = self.unknown, self.place, self.terminals, self.Y, self.C, self.held
         C_U = C.tocsr()[unknown].toarray()
@@ -151,7 +143,7 @@ def _stack(V: Complex) -> Real:
 class SparseReduction(SwitchState):
     """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers."""
 
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         super().__init__(circuit, y_f, forming, online)
         self._kept = kept = kept_network(circuit, self.unknown, self.branches, self.C, self.to_ground)
         self._at, self._whole_at = (
@@ -191,7 +183,7 @@ class SparseReduction(SwitchState):
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((4, 2 * V_b.size)),
                 rate=np.array([1.0, 1.0 / np.min(np.abs(V_b), initial=np.inf)]),
-            ),
+            )
         )
 
     def _without_unknowns(self, net: Reduced, from_sources: Complex, source_voltage: Complex) -> Reduced:
@@ -249,7 +241,7 @@ class SparseReduction(SwitchState):
         V[self.circuit.sources] = source_voltage
         return V
 
-    def _injected(self, J: Complex, at: NDArray[np.int64], size: int) -> Complex:
+    def _injected(self, J: Complex, at: Integers, size: int) -> Complex:
         """Currents (A) that the inverters inject at these positions into so many nodes."""
         right = np.zeros(size, complex)
         feeding = (at >= 0) & self._feeds[:, None]
@@ -307,7 +299,7 @@ Reduction = DenseReduction | SparseReduction
 MOST_DENSE = 30  # load branches up to which dense matrices are faster: their cost grows with the square of it
 
 
-def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
+def reduce_network(circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> Reduction:
     """Return a switch state as it is solved; arguments as for `gridpeers.plant.dynamics.switch_state.SwitchState`.
 
     Never dense with a neutral: where nothing earths it, the impedance of its insulation is in each entry, and what

@@ -12,8 +12,8 @@ from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
 from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
 from gridpeers.plant.dynamics.inverters import Inverter, Inverters
 from gridpeers.plant.dynamics.island_parts import is_large
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island

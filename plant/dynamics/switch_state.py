@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 
 FLOATING = 1e-12
 """Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it
@@ -40,7 +40,7 @@ class SwitchState:
     neutral, because nothing else does in an island of theirs (IEC 60364-5-551).
     """
 
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         self.circuit = circuit
         n_inv = circuit.terminals.shape[0]
         n = circuit.Y.shape[0]
@@ -98,7 +98,7 @@ class SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
         return self
 
-    def _earthing(self, formers: NDArray[np.int64], no_earth: sp.csr_array) -> Iterator[int]:
+    def _earthing(self, formers: Integers, no_earth: sp.csr_array) -> Iterator[int]:
         """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
 
         A filter of `no_earth` earths nothing: it is that of a GFL, which injects its current whatever the voltage is.

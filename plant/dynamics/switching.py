@@ -6,10 +6,10 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.dynamics.live_network import LiveNetwork
 
 
@@ -53,7 +53,7 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Tr
             network.change(circuit)
 
 
-def _solve_without(away: NDArray[np.bool_], units: Inverters, network: LiveNetwork) -> None:
+def _solve_without(away: Flags, units: Inverters, network: LiveNetwork) -> None:
     """Find the voltages at the open terminals of inverters that are about to return.
 
     Behind its filter an inverter is at zero current where its internal voltage is that of its open terminal, in each

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Circuit, PlantError
+from gridpeers.plant.dynamics.kernel.compiled import Integers
 from gridpeers.plant.dynamics.live_network import ForeseenCache
 from gridpeers.plant.equipment.equipment import PHASES
 from gridpeers.plant.network import Network
@@ -81,14 +81,14 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
     )
 
 
-def _neutral_nodes(network: Network, merge: Merge, reference: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _neutral_nodes(network: Network, merge: Merge, reference: Integers | None) -> Integers:
     """Return the nodes of neutral conductors whose voltages count from earth, each once."""
     raw = [k for k, (bus, at) in enumerate(network.nodes) if at not in PHASES or at == network.neutrals.get(bus)]
     nodes = np.unique(merge.representative[np.array(raw, np.int64)])
     return nodes if reference is None else nodes[reference[nodes] < 0]
 
 
-def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDArray[np.int64]) -> NDArray[np.int64]:
+def _references(network: Network, merge: Merge, on: LoadBranches, terminals: Integers) -> Integers:
     """Return the node from which each node's voltage counts: the neutral of an inverter there, or -1.
 
     A node between which and a terminal a load stands counts from the same neutral, where it can: the load is then
@@ -116,7 +116,7 @@ def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDA
         reference[other[follows]] = reference[one[follows]]
 
 
-def _referred(Y: sp.csc_array, C: sp.csc_array, reference: NDArray[np.int64]) -> tuple[sp.csc_array, sp.csc_array]:
+def _referred(Y: sp.csc_array, C: sp.csc_array, reference: Integers) -> tuple[sp.csc_array, sp.csc_array]:
     """Return admittances and incidence for voltages that count from these nodes; see `Circuit`."""
     n = reference.size
     at = np.flatnonzero(reference >= 0)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Real
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays
 from gridpeers.plant.plant_config import Protection
 
@@ -31,7 +31,7 @@ class InService:
         self,
         settings: Protection,
         names: tuple[str, ...],
-        V_nom: NDArray[np.float64],
+        V_nom: Real,
         dynamics: Dynamics,
         connected: list[bool],
         tell: Tell,
@@ -84,7 +84,7 @@ class InService:
             self._tell(step, "inverter", name, f"{name} connected, at no load")
             self._settle(step, [i])
 
-    def watch(self, step: int, out: NDArray[np.float64]) -> None:
+    def watch(self, step: int, out: Real) -> None:
         """Trip inverters beyond their settings after these steps, and bring back those that may return.
 
         `step`: present step of the plant; changes act from the next step on; `out`: readings of the steps since the
@@ -128,9 +128,9 @@ class InService:
             text = f"{', '.join(locked)}: tripped {ATTEMPTS} times, off until the agent joins again, or a GFM joins"
             self._tell(step, "trip", locked[0], text)
 
-    def _with(self, i: int) -> NDArray[np.bool_]:
+    def _with(self, i: int) -> Flags:
         island = self._dynamics.network.reduction.inverter_island
-        same: NDArray[np.bool_] = island == island[i]
+        same: Flags = island == island[i]
         return same
 
     def _fed(self, i: int) -> bool:

@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.known_names import SUBSTATION
@@ -85,7 +85,7 @@ class Islands:
         text += f", {', '.join(idle)} idle" if idle else ""
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 
-    def _dead_buses(self, closed: frozenset[str], live: NDArray[np.bool_]) -> list[str]:
+    def _dead_buses(self, closed: frozenset[str], live: Flags) -> list[str]:
         alive = live[self._network.merge(closed).representative]
         fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]

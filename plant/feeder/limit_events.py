@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.solve import COLUMNS, limited_admittance
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
@@ -83,7 +83,7 @@ class CurrentLimits:
         self._names, self._I_max = names, I_max
         self._last = [-np.inf] * len(names)
 
-    def report(self, t: float, limiting: NDArray[np.bool_]) -> list[PlantEvent]:
+    def report(self, t: float, limiting: Flags) -> list[PlantEvent]:
         events = []
         for i in np.flatnonzero(limiting).tolist():
             name, since = self._names[i], t - self._last[i]
@@ -118,7 +118,7 @@ class LoadLimits:
     `V`: voltages across its load branches at the start (V).
     """
 
-    def __init__(self, network: Network, V: NDArray[np.complex128]) -> None:
+    def __init__(self, network: Network, V: Complex) -> None:
         self._jumps = _jumps(network)
         self.any = bool(self._jumps)  # whether a load has such a limit
         self._branches = np.array([jump.branch for jump in self._jumps], np.int64)
@@ -127,7 +127,7 @@ class LoadLimits:
         self._beyond = self._are_beyond(np.abs(V[self._branches]))
         self._last: dict[str, float] = {}
 
-    def report(self, t: float, V: NDArray[np.complex128]) -> list[PlantEvent]:
+    def report(self, t: float, V: Complex) -> list[PlantEvent]:
         """Return events for the loads that crossed a limit since the last call, at these voltages (V) of all branches.
 
         There is one for each limit and direction. A load without voltage stays as it was.
@@ -144,7 +144,7 @@ class LoadLimits:
             for event in self._events(t, limit, beyond=beyond, jumps=jumps)
         ]
 
-    def _are_beyond(self, magnitude: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _are_beyond(self, magnitude: Real) -> Flags:
         return np.asarray(self._side * (magnitude - self._V) > 0.0)
 
     def _events(self, t: float, limit: str, *, beyond: bool, jumps: list[_Jump]) -> list[PlantEvent]:

@@ -11,13 +11,10 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Real
 from gridpeers.plant.known_names import F_BASE, defaults
 from gridpeers.plant.plant_config import Protection
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
 
 V_ENTER = (0.917, 1.05)  # voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4
 F_ENTER = (59.5, 60.1)  # the same for the frequency (Hz at 60 Hz)
@@ -72,7 +69,7 @@ class Relays:
         """Number of steps within which no function can trip."""
         return int(np.min(self._need - self._count, initial=2**31)) if self._counting else self._shortest
 
-    def watch(self, f: Floats, V_low: Floats, V_high: Floats, on: Flags) -> list[Tripped]:
+    def watch(self, f: Real, V_low: Real, V_high: Real, on: Flags) -> list[Tripped]:
         """Take the readings of the steps since the last call, at most `quiet` of them.
 
         `f`, `V_low`, `V_high`: frequency (Hz), and voltage of the lowest and of the highest phase (pu): steps x
@@ -153,7 +150,7 @@ class Recovery:
         waits = (self._need - self._waited)[self.tripped & ~self.locked]
         return int(np.min(waits[waits > 0], initial=2**31))
 
-    def watch(self, f: Floats, V_low: Floats, V_high: Floats, dead: Flags) -> None:
+    def watch(self, f: Real, V_low: Real, V_high: Real, dead: Flags) -> None:
         """Take the readings of the terminals since the last call.
 
         `f`, `V_low`, `V_high`: frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu):

@@ -13,9 +13,9 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.feeder.islands import Closing
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.known_names import F_BASE
@@ -148,7 +148,7 @@ class Synchronism:
             limits=limits_for(min(rated), self._check, network.feeder.f_nom),
         )
 
-    def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:
+    def _live_end(self, bus: str, phases: str, live: Flags, closed: frozenset[str]) -> str:
         """Return the bus if it is live, else a live bus that these closed switches join to it; "" if there is none."""
         network = self._network
         island = next(buses for buses in network.islands(closed) if bus in buses)

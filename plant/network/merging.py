@@ -6,15 +6,15 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
 from gridpeers.plant.equipment import Line, LineConfig, Transformer
 
 DELTA = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 """Voltages across A-B, B-C, C-A from those of A, B, C."""
 
 
-def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArray[np.complex128]:
+def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> Complex:
     r"""Return the nodal admittance of a line (S), a pi of series impedance and halves of the shunt capacitance.
 
     .. math:: Y = \begin{pmatrix} z^{-1} + y/2 & -z^{-1} \\ -z^{-1} & z^{-1} + y/2 \end{pmatrix}
@@ -34,7 +34,7 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
     return Y
 
 
-def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> NDArray[np.complex128]:
+def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> Complex:
     """Return the nodal admittance of a three-phase transformer (S) at its nominal ratio.
 
     A delta-delta transformer passes no zero sequence, so the mean of the three voltages at `to_bus` is undetermined,
@@ -72,19 +72,19 @@ class Merge:
     1 for representatives.
     """
 
-    def __init__(self, representative: NDArray[np.int64], ratio: NDArray[np.float64]) -> None:
+    def __init__(self, representative: Integers, ratio: Real) -> None:
         self.representative = representative
         self.ratio = ratio
 
     @property
-    def representatives(self) -> NDArray[np.int64]:
+    def representatives(self) -> Integers:
         return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
 
-    def expand(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def expand(self, V: Complex) -> Complex:
         """Return every node's voltage (V) from the voltages at the representatives (the other entries are unused)."""
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
 
-    def gather(self, current: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def gather(self, current: Complex) -> Complex:
         """Sum the currents of all nodes (A) at the representatives; the other entries become zero."""
         gathered = np.zeros(len(current), dtype=np.complex128)
         np.add.at(gathered, self.representative, self.ratio * current)

@@ -11,10 +11,10 @@ from math import pi, sqrt
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Switch
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name
 from gridpeers.plant.equipment.imported_equipment import LoadPart
@@ -57,8 +57,8 @@ class Network:
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
         self._index = {node: i for i, node in enumerate(self.nodes)}
-        self.V_nom: NDArray[np.float64] = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
-        self.nominal: NDArray[np.complex128] = np.array(
+        self.V_nom: Real = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
+        self.nominal: Complex = np.array(
             [cmath.rect(V, ANGLE.get(phase, 0.0)) for V, (_, phase) in zip(self.V_nom, self.nodes, strict=True)],
             dtype=np.complex128,
         )
@@ -66,11 +66,11 @@ class Network:
         self.closed0 = frozenset(switch.name for switch in feeder.switches if switch.closed)
         self.inverters: tuple[InverterRow, ...] = feeder.inverters + _chosen(feeder, tuple(spares))
         source = feeder.source
-        self.source_nodes: NDArray[np.int64] = np.array(
+        self.source_nodes: Integers = np.array(
             [self.index(source.bus, phase) for phase in PHASES] if source else [], dtype=np.int64
         )
         turned = cmath.rect(source.V_pu, source.angle) if source else 1.0
-        self.source_voltage: NDArray[np.complex128] = self.nominal[self.source_nodes] * turned
+        self.source_voltage: Complex = self.nominal[self.source_nodes] * turned
         self.Y_branches = self._branches()
         self.Y_capacitors = self._capacitors()
         self.Y_loads = self._impedance_loads()
@@ -163,7 +163,7 @@ class Network:
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
         return bus_islands(self.feeder, {switch.name for switch in self._closed_switches(closed)})
 
-    def _without_load(self) -> NDArray[np.complex128]:
+    def _without_load(self) -> Complex:
         """Phasors (V) with all switches closed and no load: what transformers of any connection make of the source."""
         merge = merge_nodes(self._node_names(), self._ties(frozenset(self.switches)), self.source_nodes.tolist())
         T = merge.matrix()
@@ -200,7 +200,7 @@ class Network:
         ]
         return ties
 
-    def _assemble(self, parts: list[tuple[list[int], NDArray[np.complex128]]]) -> sp.csc_array:
+    def _assemble(self, parts: list[tuple[list[int], Complex]]) -> sp.csc_array:
         n = len(self.nodes)
         rows = [np.repeat(nodes, len(nodes)) for nodes, _ in parts]
         columns = [np.tile(nodes, len(nodes)) for nodes, _ in parts]

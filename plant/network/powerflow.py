@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
 from gridpeers.plant.dynamics.island_newton import weak_branches
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.network import Network
 
-Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+Injection = Callable[[Complex], Complex]
 """Function from the voltages of all nodes (V) to the currents fed into them (A)."""
 
 MOST_ITERATIONS = 200
@@ -27,7 +27,7 @@ STALL = 8  # iterations without a smaller change after which it is rounding
 
 @dataclass(frozen=True, kw_only=True)
 class PowerFlow:
-    V: NDArray[np.complex128]  # voltages of all nodes (V, line-to-ground); zero where the substation does not reach
+    V: Complex  # voltages of all nodes (V, line-to-ground); zero where the substation does not reach
     S_source: complex  # power out of the substation (VA)
     S_loads: complex  # power taken by all loads of any kind (VA)
     S_losses: complex  # power taken by lines and transformers (VA); the imaginary part includes line charging
@@ -40,10 +40,10 @@ def solve_power_flow(
     closed: frozenset[str],
     loads: LoadBranches | None = None,
     *,
-    shunt: NDArray[np.complex128] | None = None,
+    shunt: Complex | None = None,
     injection: Injection | None = None,
     tolerance: float = 1e-10,
-    start: NDArray[np.complex128] | None = None,
+    start: Complex | None = None,
 ) -> PowerFlow:
     r"""Solve the nodes that the substation reaches, by a fixed point.
 
@@ -75,7 +75,7 @@ def solve_power_flow(
     solve = factorized(sp.csc_matrix(Y[unknown][:, unknown]))
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
 
-    def rounding(V: NDArray[np.complex128]) -> float:
+    def rounding(V: Complex) -> float:
         """Return the change (pu) that rounding of the network's currents can make."""
         lost = np.finfo(float).eps * (abs(Y[unknown][:, unknown]) @ np.abs(V))
         return float(np.max(np.abs(solve(lost.astype(complex))) / network.V_nom[unknown], initial=0.0))
@@ -113,7 +113,7 @@ def solve_power_flow(
     )
 
 
-def _reached(Y: sp.csc_array, source: NDArray[np.int64], loads: LoadBranches) -> NDArray[np.int64]:
+def _reached(Y: sp.csc_array, source: Integers, loads: LoadBranches) -> Integers:
     """Nodes connected to the source through the matrix or through loads (a neutral), without the source's own."""
     between = np.flatnonzero(loads.n_to >= 0)
     ends = (loads.n_from[between], loads.n_to[between])
@@ -126,10 +126,10 @@ def _reached(Y: sp.csc_array, source: NDArray[np.int64], loads: LoadBranches) ->
 
 def _balance(
     network: Network,
-    V: NDArray[np.complex128],
+    V: Complex,
     loads: LoadBranches,
     injection: Injection | None,
-    shunt: NDArray[np.complex128] | None,
+    shunt: Complex | None,
     iterations: int,
 ) -> PowerFlow:
     S_loads = complex(loads.powers(V).sum() + V @ np.conj(network.Y_loads @ V))

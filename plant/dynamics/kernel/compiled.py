@@ -23,6 +23,11 @@ from numpy.typing import NDArray
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
 _HERE = Path(__file__).parent
 
 
@@ -159,7 +164,7 @@ def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
 
 
 @compiled
-def multiply_add(AT: NDArray[np.float64], x: NDArray[np.float64], sign: float, y: NDArray[np.float64]) -> None:
+def multiply_add(AT: Real, x: Real, sign: float, y: Real) -> None:
     """Add sign * A x to y, A given transposed, in an order that depends on nothing but the sizes.
 
     A BLAS call may sum in another order with another number of threads or alignment; equal bytes across

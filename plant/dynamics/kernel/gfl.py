@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat, unit_phasor
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat, unit_phasor
 from gridpeers.plant.plant_config import GflParameters, Method
 
 PARAMETERS = np.dtype(
@@ -125,8 +125,8 @@ def pack(
 def settle(
     g: np.void,
     state: np.void,
-    V: NDArray[np.complex128],
-    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    V: Complex,
+    I: Complex,  # noqa: E741  # the paper's symbol
     S: complex,
     v: float,
 ) -> None:

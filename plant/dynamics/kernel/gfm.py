@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat
 from gridpeers.plant.plant_config import GfmParameters
 
 PARAMETERS = np.dtype(
@@ -100,8 +100,8 @@ def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> No
 def measure_positive_sequence(
     g: Any,
     i: int,
-    V: NDArray[np.complex128],
-    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    V: Complex,
+    I: Complex,  # noqa: E741  # the paper's symbol
 ) -> tuple[float, float, float]:
     """Return P, Q and V (pu) of inverter i's positive sequence, from its V (V) and I out of it (A); section 3.8."""
     V_1 = (V[i, 0] + A120 * V[i, 1] + A120.conjugate() * V[i, 2]) / 3.0

@@ -10,12 +10,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled
-
-Integers = NDArray[np.int64]
-Real = NDArray[np.float64]
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled
 
 
 class BlockFactors(NamedTuple):
@@ -40,8 +36,8 @@ def add_tangent(
     across: Integers,
     a_first: Real,
     a_second: Real,
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
+    A: Complex,
+    B: Complex,
 ) -> None:
     """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
 
@@ -147,11 +143,11 @@ class SparseMaps(NamedTuple):
     second: Integers  # the same at its end, or -1: ground, or a source
     a_first: Real  # ratio with which the first node's voltage counts in the branch's
     a_second: Real  # the same for the second
-    from_sources: NDArray[np.complex128]  # part of each branch's voltage that the ideal sources give (V)
+    from_sources: Complex  # part of each branch's voltage that the ideal sources give (V)
     terminals: Integers
     """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
-    fixed: NDArray[np.complex128]  # voltages (V) of the terminals that have no position: a source's, or 0
-    feeds: NDArray[np.bool_]  # which inverters inject
+    fixed: Complex  # voltages (V) of the terminals that have no position: a source's, or 0
+    feeds: Flags  # which inverters inject
     scratch: Real  # room for the solution and its right-hand side
     increments: Real  # how the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last
     rate: Real
@@ -165,19 +161,7 @@ def no_maps() -> SparseMaps:
     none = np.zeros(0, np.complex128)
     held, increments = np.zeros(0, np.bool_), np.zeros((4, 0))
     return SparseMaps(
-        no_factors(),
-        values,
-        nowhere,
-        nowhere,
-        values,
-        values,
-        none,
-        terminals,
-        fixed,
-        held,
-        values,
-        increments,
-        values,
+        no_factors(), values, nowhere, nowhere, values, values, none, terminals, fixed, held, values, increments, values
     )
 
 
@@ -206,15 +190,7 @@ def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
 
 
 @compiled
-def draw_remainders(
-    maps: SparseMaps,
-    I_b: NDArray[np.complex128],
-    i_c: NDArray[np.complex128],
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
-    x: Real,
-    right: Real,
-) -> None:
+def draw_remainders(maps: SparseMaps, I_b: Complex, i_c: Complex, A: Complex, B: Complex, x: Real, right: Real) -> None:
     """Take what the branches draw (A) beyond the loads' tangent from the nodes at their ends.
 
     `I_b`: currents of the branches (A) at x; `i_c`, `A`, `B`: the tangent; see
@@ -254,8 +230,6 @@ def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
         increments[3, i] = x[i] - x_0[i]
 
 
-Complex = NDArray[np.complex128]
-
 NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), np.zeros(0)
 """In place of the dense matrices of a network that is solved by sparse factors."""
 
@@ -268,14 +242,14 @@ class Reduced(NamedTuple):
 
     S: Complex  # constant power of the live branches (VA)
     I0: Complex  # constant current of the live branches (A)
-    limited_at: NDArray[np.int64]  # live branches with the law of a `LoadPart`
+    limited_at: Integers  # live branches with the law of a `LoadPart`
     law: Real  # their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`
     i_c: Complex  # tangent of the load law, constant part (A)
     A: Complex  # tangent, factor of V_b (S)
     B: Complex  # tangent, factor of V_b^* (S)
-    branch_island: NDArray[np.int64]  # island of each live branch
-    inverter_island: NDArray[np.int64]  # island of each inverter
-    leader: NDArray[np.int64]
+    branch_island: Integers  # island of each live branch
+    inverter_island: Integers  # island of each inverter
+    leader: Integers
     """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
     theta_lin: Real  # that inverter's angle at the point of linearisation (rad)
     PT: Real = NO_MATRIX  # J to x, (6 n_inv) x (2 m)

@@ -13,9 +13,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real, compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
@@ -31,36 +30,30 @@ MAX_ROUNDS = 60
 class Slopes(NamedTuple):
     """States and slopes of all inverters as tables of numbers, a row each: the memory of the records in `Units`."""
 
-    gfm: NDArray[np.float64]  # states
-    gfm_0: NDArray[np.float64]  # states at the start of the step
-    gfm_d: NDArray[np.float64]  # slopes of the last pass; 0 for an output
-    gfm_d0: NDArray[np.float64]  # slopes at the start of the step
-    gfl: NDArray[np.float64]  # the same for the GFL
-    gfl_0: NDArray[np.float64]
-    gfl_d: NDArray[np.float64]
-    gfl_d0: NDArray[np.float64]
+    gfm: Real  # states
+    gfm_0: Real  # states at the start of the step
+    gfm_d: Real  # slopes of the last pass; 0 for an output
+    gfm_d0: Real  # slopes at the start of the step
+    gfl: Real  # the same for the GFL
+    gfl_0: Real
+    gfl_d: Real
+    gfl_d0: Real
 
 
 class FeedForward(NamedTuple):
     """How each inverter's current depends at once on the terminal's voltage and on itself."""
 
-    y: NDArray[np.complex128]
+    y: Complex
     """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
     itself, or its internal voltage is a state and the admittance is part of the network."""
-    gain: NDArray[np.complex128]
+    gain: Complex
     """1 / (1 - a), where the current after a pass changes by a times what the current before it changes."""
-    I_b: NDArray[np.float64]  # rated currents (A)
+    I_b: Real  # rated currents (A)
     V_b: float  # highest nominal voltage (V)
 
 
 @compiled
-def take_round(
-    units: Any,
-    forward: Any,
-    used: NDArray[np.complex128],
-    change: NDArray[np.complex128],
-    readings: NDArray[np.float64],
-) -> float:
+def take_round(units: Any, forward: Any, used: Complex, change: Complex, readings: Real) -> float:
     """Write slopes and injections that belong to the present voltages; returns a current's largest change (pu).
 
     `units`: `Units` whose states at the start of the step are the present ones; `used`: injections (A) of the network
@@ -83,12 +76,12 @@ def solve_together(
     net: Any,
     units: Any,
     forward: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
+    rotation: Complex,
+    x: Real,
+    I_b: Complex,
     tolerance: float,
-    work: NDArray[np.float64],
-    readings: NDArray[np.float64],
+    work: Real,
+    readings: Real,
 ) -> int:
     """Solve network and inverters at the present states; returns the iterations, or -1.
 
@@ -147,8 +140,8 @@ def run_second_order_steps(
     present: Any,
     slopes: Any,
     forward: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
+    x: Real,
+    out: Real,
 ) -> int:
     """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, multiply_add
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, Flags, Integers, Real, compiled, multiply_add
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, branch_voltages, draw_remainders, solve_blocks
 
 COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
@@ -35,7 +34,7 @@ def power(m: float, n: float) -> float:
 
 
 @compiled
-def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
+def limited_admittance(row: Real, V: float) -> tuple[complex, complex]:
     """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
 
     `V`: magnitude of the voltage across the load (V).
@@ -68,9 +67,7 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
 
 
 @compiled
-def limited_currents(
-    at: NDArray[np.int64], law: NDArray[np.float64], x: NDArray[np.float64], I_b: NDArray[np.complex128]
-) -> None:
+def limited_currents(at: Integers, law: Real, x: Real, I_b: Complex) -> None:
     """Write the currents (A) of the branches `at`, one for each row of `law`, at x = [Re V_b; Im V_b]."""
     m = I_b.size
     for k in range(at.size):
@@ -80,13 +77,7 @@ def limited_currents(
 
 
 @compiled
-def limited_tangents(
-    at: NDArray[np.int64],
-    law: NDArray[np.float64],
-    V: NDArray[np.complex128],
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
-) -> None:
+def limited_tangents(at: Integers, law: Real, V: Complex, A: Complex, B: Complex) -> None:
     """Write the factors (S) by which the branches' currents follow their voltages (V) and these conjugate."""
     for k in range(at.size):
         b = at[k]
@@ -105,14 +96,7 @@ NOISE = 100.0
 
 
 @compiled
-def load_currents(
-    S: NDArray[np.complex128],
-    I0: NDArray[np.complex128],
-    limited_at: NDArray[np.int64],
-    law: NDArray[np.float64],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-) -> None:
+def load_currents(S: Complex, I0: Complex, limited_at: Integers, law: Real, x: Real, I_b: Complex) -> None:
     """Write the branch currents (A) of all loads at x = [Re V_b; Im V_b]."""
     m = S.size
     if limited_at.size < m:
@@ -134,15 +118,7 @@ def remainder(current: complex, V_b: complex, i_c: complex, A: complex, B: compl
 
 
 @compiled
-def solve_sparse(
-    net: Any,
-    J: NDArray[np.complex128],
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    tolerance: float,
-) -> int:
+def solve_sparse(net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float) -> int:
     """Solve as `solve_network` does, with the factors of a sparse matrix."""
     maps = net.sparse
     n, u = J.shape[0], maps.constant.size
@@ -190,14 +166,7 @@ def solve_sparse(
 
 @compiled
 def solve_network(
-    net: Any,
-    J: NDArray[np.complex128],
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
+    net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float, work: Real
 ) -> int:
     """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
@@ -276,15 +245,15 @@ NO_NETWORK = -1  # result of `settle_powers` where the network has no solution a
 def settle_powers(
     most: int,
     net: Any,
-    J: NDArray[np.complex128],
-    S: NDArray[np.complex128],
-    y: NDArray[np.complex128],
-    rated: NDArray[np.float64],
-    delivers: NDArray[np.bool_],
-    balanced: NDArray[np.bool_],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
+    J: Complex,
+    S: Complex,
+    y: Complex,
+    rated: Real,
+    delivers: Flags,
+    balanced: Flags,
+    x: Real,
+    I_b: Complex,
+    V: Complex,
     tolerance: float,
 ) -> tuple[int, float]:
     """Find the injections with which every inverter delivers its power; return the rounds taken, and the last change.

@@ -13,9 +13,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled, unlocked
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled, unlocked
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.solve import solve_network
@@ -25,14 +24,7 @@ MAX_LIMITING = 2000
 
 
 @compiled
-def limit_currents(
-    gfm: Any,
-    gfm_at: NDArray[np.int64],
-    online: NDArray[np.bool_],
-    J: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    limiting: NDArray[np.bool_],
-) -> float:
+def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Complex, limiting: Flags) -> float:
     """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V).
 
     `gfm`, `gfm_at`, `online`, `J`, `V`, `limiting`: as in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is
@@ -56,15 +48,7 @@ def limit_currents(
 
 
 @compiled
-def solve_on(
-    net: Any,
-    units: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
-) -> int:
+def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real) -> int:
     """Solve again and again until no phase is beyond its limit; return the iterations, or -1 as `solve_network`.
 
     `units`: a `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the
@@ -84,13 +68,7 @@ def solve_on(
 
 @compiled
 def solve_within_limits(
-    net: Any,
-    units: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
+    net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real
 ) -> int:
     """Solve the network with every phase within its limit; arguments and result as of `solve_on`.
 
@@ -106,16 +84,7 @@ FAILURES = 3
 
 
 @compiled
-def run_steps(
-    begin: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    net: Any,
-    units: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> int:
+def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real) -> int:
     """Advance to the end of `steps` steps; returns the network iterations, or -1 - (FAILURES k + what) for step k.
 
     A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with
@@ -164,14 +133,7 @@ def run_steps(
 
 @unlocked
 def run_steps_unlocked(
-    begin: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    net: Any,
-    units: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
+    begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real
 ) -> int:
     """Do the same without Python's lock, for networks so large that it is worth handing it back and forth."""
     return run_steps(begin, steps, h, tolerance, net, units, x, out)

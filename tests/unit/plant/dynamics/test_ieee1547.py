@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.kernel import gfl
-from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.kernel.compiled import Real
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, S_B, V_B, on_stiff_bus
 
 OPEN_LOOP = 5.0

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, reduction, threads
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.kernel.compiled import Real
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5

@@ -9,7 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.island_newton import DenseIsland, solve_island
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex
+from gridpeers.plant.dynamics.kernel.compiled import Complex
 from gridpeers.plant.dynamics.reduction import DenseReduction, SparseIsland, SparseReduction
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.network import Network, solve_power_flow

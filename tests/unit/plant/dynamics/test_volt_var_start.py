@@ -11,7 +11,7 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
-from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.kernel.compiled import Real
 from gridpeers.plant.dynamics.power_flow_at_rest import DROOP, INSIDE, MOST_ROUNDS, OVER, UNDER, VoltVarAtRest
 from gridpeers.plant.plant_config import GflParameters
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, Z_B, circuit, inverter
