@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
-from typing import Generic, TypeVar
+from collections.abc import Callable, Hashable
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,52 +17,21 @@ from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
 
-ROOM = 64  # values that are foreseen that are kept: a factored network of 123 nodes has 1 MB
-
-OTHERS = 8
-"""Values that are not foreseen that are kept: a person who switches to and fro needs a few. With 64 a plant grew by
-10 MB in an hour in which loads were set to ever new powers."""
+KEPT = 32
+"""Circuits, and their factors, that are kept: each event of a schedule has one, and a person who switches to and fro a
+few. A factored network of 123 nodes has 1 MB."""
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-class ForeseenCache(Generic[K, V]):
-    """Values by key; of more than `OTHERS` that are not foreseen the one goes that was not asked for for longest.
-
-    The first `ROOM` values that are foreseen stay. Further ones, as of a schedule with hundreds of events, count as
-    others: none may keep an unbounded part of the memory.
-
-    >>> cache = ForeseenCache()
-    >>> cache.get("event", lambda: [1], foreseen=True)
-    [1]
-    >>> for number in range(OTHERS + 1):
-    ...     kept = cache.get(number, lambda: [2])
-    >>> "event" in cache, 0 in cache, 1 in cache
-    (True, False, True)
-    """
-
-    def __init__(self) -> None:
-        self._foreseen: dict[K, V] = {}
-        self._others: dict[K, V] = {}
-
-    def __iter__(self) -> Iterator[K]:
-        yield from self._foreseen
-        yield from self._others
-
-    def get(self, key: K, make: Callable[[], V], *, foreseen: bool = False) -> V:
-        """Return the value of a key; make it if it is not there.
-
-        `foreseen`: whether an event to come needs it, so that it stays.
-        """
-        if key in self._foreseen:
-            return self._foreseen[key]
-        stays = foreseen and len(self._foreseen) < ROOM
-        value = self._others.pop(key) if key in self._others else make()
-        if not stays and len(self._others) == OTHERS:
-            del self._others[next(iter(self._others))]
-        (self._foreseen if stays else self._others)[key] = value
-        return value
+def recent(kept: dict[K, V], key: K, make: Callable[[], V]) -> V:
+    """Return the value of a key, made if it is not there; of more than `KEPT` the one used longest ago goes."""
+    value = kept.pop(key) if key in kept else make()
+    if len(kept) == KEPT:
+        del kept[next(iter(kept))]
+    kept[key] = value
+    return value
 
 
 TOLERANCE = 1e-11
@@ -86,8 +55,8 @@ class LiveNetwork:
 
     def __init__(self, circuit: Circuit, inverters: Inverters) -> None:
         self._inverters = inverters
-        self._reductions: ForeseenCache[tuple[Circuit, bytes], Reduction] = ForeseenCache()
-        self._unsourced: ForeseenCache[Circuit, Circuit] = ForeseenCache()
+        self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
+        self._unsourced: dict[Circuit, Circuit] = {}
         self.substation_on = True
         """Whether the ideal sources are connected; `gridpeers.plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
@@ -101,16 +70,13 @@ class LiveNetwork:
     def source_voltage(self) -> Complex:
         return self.reduction.circuit.source_voltage
 
-    def reduced(self, circuit: Circuit, *, foreseen: bool = False) -> Reduction:
-        """Factor a circuit, once; call it ahead of a scheduled event (`foreseen`) to save this work in its step."""
+    def reduced(self, circuit: Circuit) -> Reduction:
+        """Factor a circuit, once; call it ahead of a scheduled event to save this work in its step."""
         units = self._inverters
         if not self.substation_on:
-            circuit = self._unsourced.get(circuit, circuit.without_source, foreseen=foreseen)
-        return self._reductions.get(
-            (circuit, units.connected.tobytes()),
-            lambda: reduce_network(circuit, units.y_f, units.forming, units.connected),
-            foreseen=foreseen,
-        )
+            circuit = recent(self._unsourced, circuit, circuit.without_source)
+        key = circuit, units.connected.tobytes()
+        return recent(self._reductions, key, lambda: reduce_network(circuit, units.y_f, units.forming, units.connected))
 
     def change(self, circuit: Circuit) -> None:
         """Take another circuit, or the same with other connected inverters; call `solve` next."""

@@ -7,7 +7,7 @@ import scipy.sparse as sp
 
 from gridpeers.plant.dynamics import Circuit, PlantError
 from gridpeers.plant.dynamics.kernel.compiled import Integers
-from gridpeers.plant.dynamics.live_network import ForeseenCache
+from gridpeers.plant.dynamics.live_network import recent
 from gridpeers.plant.equipment.equipment import PHASES
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches
@@ -17,33 +17,24 @@ ROUNDING = 1e-14  # size of a sum of admittances relative to its terms below whi
 
 
 class Circuits:
-    """A feeder's circuits, each made at the first call for its switches and loads, and kept as in `ForeseenCache`."""
+    """A feeder's circuits, each made at the first call for its switches and loads, and kept for a while."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._loads = {network: network.loads()}
-        """Load branches of each network of which circuits are kept: one for each state of the loads."""
-        self._made: ForeseenCache[tuple[Network, frozenset[str]], Circuit] = ForeseenCache()
+        self._loads: dict[Network, LoadBranches] = {}  # of each network, one for each state of the loads
+        self._made: dict[tuple[Network, frozenset[str]], Circuit] = {}
 
     def change_loads(self, network: Network) -> None:
         self._network = network
 
-    def of(self, closed: frozenset[str], network: Network | None = None, *, foreseen: bool = False) -> Circuit:
+    def of(self, closed: frozenset[str], network: Network | None = None) -> Circuit:
         """Return the circuit with these switches closed, with the present loads or with those of another network.
-
-        One that is `foreseen`, for an event to come, stays.
 
         PlantError if ideal devices tie an inverter to another: their sharing would be undetermined.
         """
         of = self._network if network is None else network
-        return self._made.get((of, closed), lambda: circuit_of(of, closed, self._loads_of(of)), foreseen=foreseen)
-
-    def _loads_of(self, network: Network) -> LoadBranches:
-        if network not in self._loads:
-            still = {used for used, _ in self._made} | {self._network}
-            self._loads = {used: loads for used, loads in self._loads.items() if used in still}
-            self._loads[network] = network.loads()
-        return self._loads[network]
+        loads = recent(self._loads, of, of.loads)
+        return recent(self._made, (of, closed), lambda: circuit_of(of, closed, loads))
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:

@@ -12,7 +12,7 @@ import numpy as np
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter, PlantError
 from gridpeers.plant.dynamics.circuit import NoPowerFlowError
 from gridpeers.plant.dynamics.equilibrium import require_within_limits
-from gridpeers.plant.dynamics.live_network import ROOM
+from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.in_service import InService
 from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
@@ -131,8 +131,8 @@ class Plant:
         self._events += self._neutrals.report(0.0, self._switches.closed, self._dynamics)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # the first scheduled networks are factored now: in wall-clock time an event must not be late
-        for circuit in islice(self._foreseen(), ROOM):
-            self._dynamics.network.reduced(circuit, foreseen=True)
+        for circuit in islice(self._foreseen(), KEPT - 1):
+            self._dynamics.network.reduced(circuit)
 
     def load_step(self) -> None:
         """Compile or load the inner loop now; else the first `advance` does, which takes seconds in its first use."""
@@ -276,7 +276,7 @@ class Plant:
         loaded = dict(self._loads.foreseen())
         for step in sorted({*switched, *loaded}):
             closed, network = switched.get(step, closed), loaded.get(step, network)
-            yield self._circuits.of(closed, network, foreseen=True)
+            yield self._circuits.of(closed, network)
 
     def _change_network(self, step: int) -> None:
         loads_change = self._loads.is_due(step)

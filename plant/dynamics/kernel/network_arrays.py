@@ -24,10 +24,6 @@ class BlockFactors(NamedTuple):
     U: Real  # blocks above it, [node, later], by rows
 
 
-def no_factors() -> BlockFactors:
-    return BlockFactors(np.zeros(1, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 4)) for _ in range(3)))
-
-
 @compiled
 def add_tangent(
     f: BlockFactors,
@@ -155,17 +151,14 @@ class SparseMaps(NamedTuple):
     change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
 
 
-def no_maps() -> SparseMaps:
-    nowhere, values = np.zeros(0, np.int64), np.zeros(0)
-    terminals, fixed = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128)
-    none = np.zeros(0, np.complex128)
-    held, increments = np.zeros(0, np.bool_), np.zeros((4, 0))
-    return SparseMaps(
-        no_factors(), values, nowhere, nowhere, values, values, none, terminals, fixed, held, values, increments, values
-    )
+_NOTHING, _NOWHERE, _NO_PHASOR = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.complex128)
 
-
-NO_MAPS = no_maps()
+NO_MAPS = SparseMaps(
+    BlockFactors(np.zeros(1, np.int64), _NOWHERE, *(np.zeros((0, 4)) for _ in range(3))),
+    *(_NOTHING, _NOWHERE, _NOWHERE, _NOTHING, _NOTHING, _NO_PHASOR),
+    *(np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128), np.zeros(0, np.bool_)),
+    *(_NOTHING, np.zeros((4, 0)), _NOTHING),
+)
 
 
 @compiled
@@ -230,7 +223,7 @@ def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
         increments[3, i] = x[i] - x_0[i]
 
 
-NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), np.zeros(0)
+NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), _NOTHING
 """In place of the dense matrices of a network that is solved by sparse factors."""
 
 

@@ -10,11 +10,12 @@ its next pass gives the unlimited injection again.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled, unlocked
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.solve import solve_network
@@ -131,7 +132,7 @@ def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, unit
     return total
 
 
-@unlocked
+@partial(compiled, nogil=True)
 def run_steps_unlocked(
     begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real
 ) -> int:
