@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment.equipment import Feeder
+from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.plausible import Plausible
 from gridpeers.wire.wording import first_of, suggestion

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from gridpeers.plant.equipment.equipment import PHASES, Bus, Feeder, Switch
+from gridpeers.plant.equipment import PHASES, Bus, Feeder, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.wire.wording import first_of
 

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from gridpeers.plant.dynamics import Circuit, PlantError
 from gridpeers.plant.dynamics.kernel.compiled import Integers
 from gridpeers.plant.dynamics.live_network import recent
-from gridpeers.plant.equipment.equipment import PHASES
+from gridpeers.plant.equipment import PHASES
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.merging import Merge
