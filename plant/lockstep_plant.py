@@ -27,7 +27,7 @@ from typing import Literal
 
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
-from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode
+from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode, TickActions
 from gridpeers.plant.telemetry_reporter import UnacknowledgedTelemetry, measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
@@ -68,7 +68,7 @@ class LockstepPlant(PlantNode):
         self.reproducible = True
         self.phase: Phase = "gathering"
         self._plant = plant
-        joiners = self._schedule.joiners.difference(config.agents)
+        joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
         """All agents that may ever take part, in the order of the inverters."""
         self._roster: tuple[str, ...] = ()  # agents of the last roster sent
@@ -298,7 +298,7 @@ class LockstepPlant(PlantNode):
 
     def _let_leave_and_join(self, now: float) -> None:
         """Perform the scheduled leaves and deaths of this tick, and start to wait for its newcomers."""
-        leave, join, die = self._schedule.take(self.tick)
+        leave, join, die = self._schedule.pop(self.tick, TickActions())
         when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:
             self._dismiss(name, f"{name} leaves {when}")

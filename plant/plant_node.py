@@ -30,34 +30,24 @@ class TickActions(NamedTuple):
     die: tuple[str, ...] = ()  # inverters whose agents die
 
 
-class AgentSchedule:
-    """Scheduled joins, leaves and deaths of a run, by tick.
+def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, TickActions]:
+    """Return the scheduled joins, leaves and deaths of a run, by tick.
 
     ValueError if an action names no inverter of the plant, or its time is no tick after 0.
     """
-
-    def __init__(self, config: PlantConfig, inverters: tuple[str, ...]) -> None:
-        self._at: dict[int, TickActions] = {}
-        for action in config.schedule:
-            if action.inverter not in inverters:
-                raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
-            tick = round(action.t / config.T_c)
-            if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
-                raise ValueError(
-                    f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
-                    f"{config.T_c:g} s, got {action.t:g} s"
-                )
-            actions = self._at.get(tick, TickActions())
-            names = (*getattr(actions, action.action), action.inverter)
-            self._at[tick] = actions._replace(**{action.action: names})
-
-    @property
-    def joiners(self) -> frozenset[str]:
-        return frozenset(name for actions in self._at.values() for name in actions.join)
-
-    def take(self, tick: int) -> TickActions:
-        """Return the actions of a tick, and forget them."""
-        return self._at.pop(tick, TickActions())
+    at: dict[int, TickActions] = {}
+    for action in config.schedule:
+        if action.inverter not in inverters:
+            raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
+        tick = round(action.t / config.T_c)
+        if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
+            raise ValueError(
+                f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
+                f"{config.T_c:g} s, got {action.t:g} s"
+            )
+        actions = at.get(tick, TickActions())
+        at[tick] = actions._replace(**{action.action: (*getattr(actions, action.action), action.inverter)})
+    return at
 
 
 CLOSING = 2.0  # longest wait (s) for the other nodes to close
@@ -88,7 +78,7 @@ class PlantNode(Node):
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
         """Present tokens of agents and recorders that take part; while it closes, also of agents told to stop."""
-        self._schedule = AgentSchedule(config, plant.inverters)
+        self._schedule = agent_schedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
             self.journal = JournalBuffer()

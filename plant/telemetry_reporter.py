@@ -9,7 +9,7 @@ from typing import get_type_hints
 
 from msgspec.structs import replace
 
-from gridpeers.plant.plant_interface import PlantLike, ReadingLike
+from gridpeers.plant.plant_interface import PlantLike, Reading
 from gridpeers.wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.wording import printable
 
@@ -17,7 +17,7 @@ _NUMBER_BYTES = 9  # bytes of one float in msgpack
 
 
 def measurement_of(
-    name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] | None = None
+    name: str, reading: Reading, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] | None = None
 ) -> Measurement:
     """Return the measurement of one inverter (t in s) from its reading, within the range of a sensor.
 
@@ -134,6 +134,11 @@ WINDOW = 1_000_000
 without its reader, so Zenoh has no reason to close it."""
 
 
+def count_last(kept: deque[tuple[int, bytes]], number: int) -> int:
+    """Return how many of the last messages count to the Telemetry of this number."""
+    return sum(1 for _ in takewhile(lambda message: message[0] == number, reversed(kept)))
+
+
 class UnacknowledgedTelemetry:
     """Messages for the recorders that a run waits for; without any, nothing is kept.
 
@@ -171,7 +176,7 @@ class UnacknowledgedTelemetry:
 
     def others(self, number: int) -> int:
         """Return the number of messages that count to a Telemetry that is yet to be kept."""
-        return sum(1 for _ in takewhile(lambda kept: kept[0] == number, reversed(self._kept)))
+        return count_last(self._kept, number)
 
     @property
     def is_full(self) -> bool:

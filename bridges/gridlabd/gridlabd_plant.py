@@ -19,11 +19,11 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.limit_events import SetPointLimits
-from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of

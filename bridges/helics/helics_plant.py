@@ -14,9 +14,8 @@ from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
 from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.bridges.helics.topics import ACT, SENSORS, Value, number
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant, ReadingLike
+from gridpeers.plant.plant_interface import LivePlant, Reading
 from gridpeers.wire.bounds import NAME
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LoadSetting, PlantEvent
@@ -231,7 +230,7 @@ class BridgedPlant:
             plant.close()
             raise
 
-    def measure(self) -> Mapping[str, ReadingLike]:
+    def measure(self) -> Mapping[str, Reading]:
         """Read all sensors now."""
         return self._plant.measure()
 
@@ -309,7 +308,7 @@ class BridgedPlant:
             values |= {topic.key: value for topic, value in zip(keys, columns, strict=True)}
         return values
 
-    def _measured(self, readings: Mapping[str, ReadingLike]) -> dict[str, Value]:
+    def _measured(self, readings: Mapping[str, Reading]) -> dict[str, Value]:
         """Return the readings as values, flags and names only if they have changed."""
         values: dict[str, Value] = {}
         for name, r in readings.items():

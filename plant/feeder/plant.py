@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 from math import isfinite
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
 from gridpeers.plant.feeder.synchronism import Closings, Difference, Synchronism
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 
@@ -50,20 +51,6 @@ def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inve
         )
         for unit in network.inverters
     )
-
-
-class Reading(NamedTuple):
-    """Sensor readings of one inverter."""
-
-    P: float  # real power out (W)
-    Q: float  # reactive power out (var)
-    V: float  # mean terminal voltage (V, line-to-neutral)
-    f: float
-    P_set: float  # set-point held (W)
-    V_set: float  # set-point held (V)
-    grid_connected: bool  # whether the substation feeds its island
-    island: str
-    """"grid", or the name of the first inverter in its island; `OFF` for one that is off the network or idle."""
 
 
 class Plant:

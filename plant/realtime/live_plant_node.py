@@ -13,7 +13,7 @@ from typing import Literal
 
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
-from gridpeers.plant.plant_node import STAYS, PlantNode
+from gridpeers.plant.plant_node import STAYS, PlantNode, TickActions
 from gridpeers.plant.realtime.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
@@ -200,7 +200,7 @@ class LivePlantNode(PlantNode):
 
     def _let_leave_and_join(self) -> None:
         """Ask the agents that leave at this tick by the scenario to do so, and report those that are to be started."""
-        leave, join, _ = self._schedule.take(self.tick)  # in real time an agent dies as a process
+        leave, join, _ = self._schedule.pop(self.tick, TickActions())  # in real time an agent dies as a process
         for name in leave:
             instance = self.members.instance(name)
             if instance:

@@ -5,11 +5,12 @@ from typing import Any
 
 import pytest
 
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.telemetry_reporter import Reporter, measurement_of
 from gridpeers.wire.codec import RejectedError, decode, encode
 from gridpeers.wire.messages import Measurement, PlantEvent
 from tests.toy.toy_configs import toy_configs
-from tests.toy.toy_plant import Reading, ToyPlant
+from tests.toy.toy_plant import ToyPlant
 
 CALM = Reading(5e4, 1e3, 277.0, 60.0, 5e4, 277.0, False, "inv1")
 
