@@ -244,8 +244,8 @@ TABLES: dict[str, type[msgspec.Struct]] = {
 }
 """Tables of a feeder by their files, beside its load sets."""
 
-LOAD_SETS = ("loads_", "load_parts_")
-"""How the files of a load set begin."""
+LOAD_SETS: dict[str, type[msgspec.Struct]] = {"loads_": LoadColumns, "load_parts_": LoadPartColumns}
+"""Tables of a load set, by the beginnings of their files."""
 
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:

@@ -188,5 +188,5 @@ def _folder(feeder: str) -> Path:
 
 def _report_strange_files(folder: Path, problems: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
-        if path.name not in TABLES and not path.name.startswith(LOAD_SETS):
+        if path.name not in TABLES and not path.name.startswith(tuple(LOAD_SETS)):
             problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, TABLES, 'tables')}")
