@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
@@ -41,6 +41,12 @@ class CsvRow(Generic[C]):
     def problem(self, text: str) -> None:
         self.mistaken = True
         self._problems.append(f"{self._where}: {text}")
+
+    def is_new(self, what: str, name: str, known: Container[str]) -> bool:
+        """Note a problem if there is one of this name already; return whether there is none."""
+        if name in known:
+            self.problem(f'{what} "{name}": there is one of this name already; names must differ')
+        return name not in known
 
     def require(self, column: str, plausible: Plausible) -> bool:
         """Note a number that is not plausible, beside what its column asks of it; return whether it is."""

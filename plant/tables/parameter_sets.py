@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gridpeers.plant.equipment.inverter_parameters import InverterParameters, OwnParameters, foreign, with_published
-from gridpeers.plant.tables.csv_table import CsvTable
+from gridpeers.plant.tables.buses import BusTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import contradictions, fields_of
@@ -16,13 +15,13 @@ from gridpeers.wire.wording import suggestion
 FILE = "inverter_parameters.csv"  # name of the file; a feeder without it has no such sets
 
 
-def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParameters] | None:
+def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
     """Read inverter_parameters.csv, or return None if it is unreadable.
 
     Which inverter has a set decides whether it can have its parameters: `gridpeers.plant.tables.shunts` asks.
     """
     values: dict[str, dict[str, float | bool | str]] = {}
-    table = CsvTable(folder, FILE, ParameterColumns, problems)
+    table = buses.table(FILE, ParameterColumns)
     for row in table:
         it = row.columns
         before = values.setdefault(it.set, {})
@@ -37,7 +36,7 @@ def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParam
             before[it.key] = value
     sets = {name: read_table(OwnParameters, own)[0] for name, own in values.items()}
     for name, own in sets.items():
-        problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
+        buses.problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
     return sets if table.readable else None
 
 
