@@ -327,14 +327,7 @@ class LockstepPlant(PlantNode):
         self._note_event("roster", name, text)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
-        if self.outcome:
-            return
-        try:
-            self._plant.connect(name, on)
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(f"plant at t = {self.t:g} s: {error}", now)
-        else:
+        if not self.outcome and self._operate(lambda: self._plant.connect(name, on), now):
             self._reporter.collect()
 
     # ---------------------------------------------------------------- ticks
@@ -409,7 +402,12 @@ class LockstepPlant(PlantNode):
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         others = self._unacknowledged.others(self._reporter.seq)
-        self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents, others=others)
+        sound, awaited = self.reproducible, missing_agents
+        self._send_all(
+            self._reporter.report(
+                self.t, final=final, outcome=self.outcome, reproducible=sound, awaited=awaited, others=others
+            )
+        )
 
     def _close(self, reason: str, now: float) -> None:
         if self._tick_traffic is not None:

@@ -18,7 +18,7 @@ from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.links import Links, arrived
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, PlantEvent, State, Stop, Telemetry
 from gridpeers.wire.node import Node
 from gridpeers.wire.timing import ticks_until, time_of
 from gridpeers.wire.wording import printable
@@ -234,26 +234,7 @@ class PlantNode(Node):
         """Send telemetry, with the names of agents to start."""
         raise NotImplementedError
 
-    def _telemetry(
-        self,
-        *,
-        final: bool,
-        reproducible: bool,
-        missing_agents: tuple[str, ...] = (),
-        pacing: Pacing | None = None,
-        impaired: tuple[str, ...] = (),
-        others: int = 0,
-    ) -> None:
-        messages = self._reporter.report(
-            self.t,
-            final=final,
-            outcome=self.outcome,
-            reproducible=reproducible,
-            pacing=pacing,
-            awaited=missing_agents,
-            impaired=impaired,
-            others=others,
-        )
+    def _send_all(self, messages: Iterable[Telemetry]) -> None:
         for message in messages:
             self._send(message)
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Hashable, Iterable, Iterator
+from typing import TypeVar
 
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
 from gridpeers.wire.wording import suggestion
@@ -28,23 +29,30 @@ def switch_name(feeder: Feeder, text: str) -> str:
 
 def bus_islands(feeder: Feeder, closed: Collection[str]) -> tuple[frozenset[str], ...]:
     """Return the sets of buses joined by branches and these closed switches, in the order of their first buses."""
-    above = {bus.name: bus.name for bus in feeder.buses}
+    joined = [(one, other) for one, other, _ in feeder.branches()]
+    joined += [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.name in closed]
+    return connected((bus.name for bus in feeder.buses), joined)
 
-    def root(bus: str) -> str:
-        while above[bus] != bus:
-            above[bus] = above[above[bus]]
-            bus = above[bus]
-        return bus
 
-    for one, other, _ in feeder.branches():
+T = TypeVar("T", bound=Hashable)
+
+
+def connected(things: Iterable[T], joined: Iterable[tuple[T, T]]) -> tuple[frozenset[T], ...]:
+    """Return the sets of things that pairs join, directly or through others, in the order of their first things."""
+    above = {thing: thing for thing in things}
+
+    def root(thing: T) -> T:
+        while above[thing] != thing:
+            above[thing] = above[above[thing]]
+            thing = above[thing]
+        return thing
+
+    for one, other in joined:
         above[root(one)] = root(other)
-    for switch in feeder.switches:
-        if switch.name in closed:
-            above[root(switch.from_bus)] = root(switch.to_bus)
-    members: dict[str, list[str]] = {}
-    for bus in above:
-        members.setdefault(root(bus), []).append(bus)
-    return tuple(frozenset(buses) for buses in members.values())
+    members: dict[T, list[T]] = {}
+    for thing in above:
+        members.setdefault(root(thing), []).append(thing)
+    return tuple(frozenset(group) for group in members.values())
 
 
 def islands_after(feeder: Feeder, operations: Iterable[SwitchOperations]) -> Iterator[tuple[frozenset[str], ...]]:
@@ -99,24 +107,11 @@ class Connectivity:
         `whole`: buses whose three phases count as one, because their source feeds all of them; `tied`: further pairs of
         nodes that count as connected.
         """
-        above = {node: node for node in self.nodes}
-
-        def root(node: Node) -> Node:
-            while above[node] != node:
-                above[node] = above[above[node]]
-                node = above[node]
-            return node
-
         joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES), *tied]
         for switch in self._feeder.switches:
             if closed is None or switch.name in closed:
                 joined += [((switch.from_bus, p), (switch.to_bus, p)) for p in switch.phases]
-        for one, other in joined:
-            above[root(one)] = root(other)
-        parts: dict[Node, list[Node]] = {}
-        for node in self.nodes:
-            parts.setdefault(root(node), []).append(node)
-        return tuple(frozenset(nodes) for nodes in parts.values())
+        return connected(self.nodes, joined)
 
     def fed(
         self, closed: Collection[str], forming: Iterable[InverterRow]

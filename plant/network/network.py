@@ -15,7 +15,7 @@ from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
-from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Switch
+from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Regulator, Switch
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.named_loads import named_loads
@@ -161,7 +161,7 @@ class Network:
         return other
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
-        return bus_islands(self.feeder, {switch.name for switch in self._closed_switches(closed)})
+        return bus_islands(self.feeder, closed)
 
     def _without_load(self) -> Complex:
         """Phasors (V) with all switches closed and no load: what transformers of any connection make of the source."""
@@ -180,25 +180,19 @@ class Network:
     def _node_names(self) -> list[str]:
         return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]
 
-    def _closed_switches(self, closed: frozenset[str]) -> Iterable[Switch]:
-        for name in closed:
-            if name not in self.switches:
-                raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
-        return [switch for name, switch in self.switches.items() if name in closed]
-
     def _ties(self, closed: frozenset[str]) -> list[tuple[int, int, float]]:
-        devices = [(switch, 1.0) for switch in self._closed_switches(closed)]
-        ties = [
-            (self.index(switch.from_bus, phase), self.index(switch.to_bus, phase), ratio)
-            for switch, ratio in devices
-            for phase in switch.phases
+        """Return the pairs of nodes that closed switches and regulators tie, with their ratios."""
+        for name in closed - self.switches.keys():
+            raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
+        devices: list[tuple[Switch | Regulator, float]] = [
+            (switch, 1.0) for name, switch in self.switches.items() if name in closed
         ]
-        ties += [
-            (self.index(regulator.from_bus, phase), self.index(regulator.to_bus, phase), regulator.ratio)
-            for regulator in self.feeder.regulators
-            for phase in regulator.phases
+        devices += [(regulator, regulator.ratio) for regulator in self.feeder.regulators]
+        return [
+            (self.index(device.from_bus, phase), self.index(device.to_bus, phase), ratio)
+            for device, ratio in devices
+            for phase in device.phases
         ]
-        return ties
 
     def _assemble(self, parts: list[tuple[list[int], Complex]]) -> sp.csc_array:
         n = len(self.nodes)

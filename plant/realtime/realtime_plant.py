@@ -263,11 +263,15 @@ class RealtimePlant(LivePlantNode):
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
-        self._telemetry(
-            final=final,
-            reproducible=False,
-            missing_agents=missing_agents,
-            pacing=self.pacer.report(),
-            impaired=self.link_commands.impaired(self.t),
-            others=self.recorder_feed.kept.others(self._reporter.seq),
+        self._send_all(
+            self._reporter.report(
+                self.t,
+                final=final,
+                outcome=self.outcome,
+                reproducible=False,
+                pacing=self.pacer.report(),
+                awaited=missing_agents,
+                impaired=self.link_commands.impaired(self.t),
+                others=self.recorder_feed.kept.others(self._reporter.seq),
+            )
         )
