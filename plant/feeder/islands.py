@@ -109,31 +109,18 @@ class NeutralEvents:
     def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
         if not self._neutrals:
             return []
-        earthing = set(dynamics.network.reduction.earthing)
-        rows = [self._network.inverters[i] for i in sorted(earthing - self._earthing)]
-        self._earthing = earthing
-        events = [
-            PlantEvent(
-                t=t,
-                kind="island",
-                subject=row.name,
-                text=f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does",
+        earthing, tied = set(dynamics.network.reduction.earthing), set(self._tied_alone(closed, dynamics))
+        events = []
+        for row in (self._network.inverters[i] for i in sorted(earthing - self._earthing)):
+            text = f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does"
+            events.append(PlantEvent(t=t, kind="island", subject=row.name, text=text))
+        for row in (self._network.inverters[i] for i in sorted(tied - self._tied)):
+            text = (
+                f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
+                "the switch open the neutral, too"
             )
-            for row in rows
-        ]
-        tied = set(self._tied_alone(closed, dynamics))
-        rows = [self._network.inverters[i] for i in sorted(tied - self._tied)]
-        self._tied = tied
-        events += [
-            PlantEvent(
-                t=t,
-                kind="warning",
-                subject=row.name,
-                text=f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
-                "the switch open the neutral, too",
-            )
-            for row in rows
-        ]
+            events.append(PlantEvent(t=t, kind="warning", subject=row.name, text=text))
+        self._earthing, self._tied = earthing, tied
         V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
         off = set(np.flatnonzero(V > TOUCHABLE).tolist())
         new, self._off = off - self._off, off

@@ -15,6 +15,12 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat, unit_phasor
 from gridpeers.plant.plant_config import GflParameters, Method
 
+_NUMBERS = (
+    *("X_f", "k_pPLL", "k_iPLL", "k_pc", "k_ic", "F_current", "T_if", "T_ff", "T_pf"),
+    *("T_vf", "T_qf", "db_UF", "db_OF", "db_UV", "db_OV", "P_max", "P_min", "S_max"),
+    *("Q_max", "Q_min", "i_max"),
+)  # of `GflParameters`, as they are
+
 PARAMETERS = np.dtype(
     [
         ("S_b", "f8"),  # VA, three phases
@@ -31,27 +37,7 @@ PARAMETERS = np.dtype(
         ("volt_var", "b1"),
         ("R_p", "f8"),  # pu frequency per pu
         ("R_q", "f8"),  # pu voltage per pu
-        ("X_f", "f8"),
-        ("k_pPLL", "f8"),
-        ("k_iPLL", "f8"),
-        ("k_pc", "f8"),
-        ("k_ic", "f8"),
-        ("F_current", "f8"),
-        ("T_if", "f8"),
-        ("T_ff", "f8"),
-        ("T_pf", "f8"),
-        ("T_vf", "f8"),
-        ("T_qf", "f8"),
-        ("db_UF", "f8"),
-        ("db_OF", "f8"),
-        ("db_UV", "f8"),
-        ("db_OV", "f8"),
-        ("P_max", "f8"),
-        ("P_min", "f8"),
-        ("S_max", "f8"),
-        ("Q_max", "f8"),
-        ("Q_min", "f8"),
-        ("i_max", "f8"),
+        *((name, "f8") for name in _NUMBERS),
     ],
     align=True,
 )
@@ -117,7 +103,7 @@ def pack(
     record["y_e"] = y
     record["y_f"] = 0.0 if par.model == "current_source" or method == "second-order" else y
     record["R_p"], record["R_q"] = m_p, m_q
-    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[14:]):  # type: ignore[index]  # as in gfm
+    for name in ("frequency_watt", "volt_var", *_NUMBERS):
         record[name] = getattr(par, name)
     return record
 

@@ -14,6 +14,11 @@ from numpy.typing import NDArray
 from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat
 from gridpeers.plant.plant_config import GfmParameters
 
+_NUMBERS = (
+    *("T_p", "T_q", "T_v", "P_max", "P_min", "k_pp", "k_ip", "w_lim", "Q_max"),
+    *("Q_min", "k_pq", "k_iq", "V_lim", "k_pv", "k_iv", "E_min", "E_max"),
+)  # of `GfmParameters`, as they are
+
 PARAMETERS = np.dtype(
     [
         ("S_b", "f8"),  # VA, three phases
@@ -24,23 +29,7 @@ PARAMETERS = np.dtype(
         ("m_q", "f8"),  # pu per pu
         ("positive_sequence", "b1"),  # measurements of REGFM_A1, section 3.8
         ("voltage_control", "b1"),
-        ("T_p", "f8"),
-        ("T_q", "f8"),
-        ("T_v", "f8"),
-        ("P_max", "f8"),
-        ("P_min", "f8"),
-        ("k_pp", "f8"),
-        ("k_ip", "f8"),
-        ("w_lim", "f8"),
-        ("Q_max", "f8"),
-        ("Q_min", "f8"),
-        ("k_pq", "f8"),
-        ("k_iq", "f8"),
-        ("V_lim", "f8"),
-        ("k_pv", "f8"),
-        ("k_iv", "f8"),
-        ("E_min", "f8"),
-        ("E_max", "f8"),
+        *((name, "f8") for name in _NUMBERS),
     ],
     align=True,
 )
@@ -78,7 +67,7 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
     record["m_p"], record["m_q"] = m_p * (2.0 * np.pi * f_nom), m_q
     record["I_limit"] = par.I_max * S_b / (3.0 * V_b)
     record["positive_sequence"], record["voltage_control"] = par.model == "regfm_a1", par.voltage_control
-    for name in PARAMETERS.names[8:]:  # type: ignore[index]  # a structured dtype has names
+    for name in _NUMBERS:
         record[name] = getattr(par, name)
     return record
 
