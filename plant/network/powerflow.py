@@ -38,7 +38,6 @@ class PowerFlow:
 def solve_power_flow(
     network: Network,
     closed: frozenset[str],
-    loads: LoadBranches | None = None,
     *,
     shunt: Complex | None = None,
     injection: Injection | None = None,
@@ -50,7 +49,6 @@ def solve_power_flow(
     .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
 
     `network`: the network; it must have a source;
-    `loads`: loads of constant power and current; by default the network's own;
     `shunt`: admittances to ground added at the nodes (S): filters of inverters;
     `injection`: currents fed into the nodes (A) from their voltages (V), in addition;
     `tolerance`: largest change of any voltage in the last iteration (pu);
@@ -65,7 +63,7 @@ def solve_power_flow(
     Y = network.admittance(closed)
     if shunt is not None:
         Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
-    own = loads if loads is not None else network.loads()
+    own = network.loads()
     without_loads = Y
     linear = own.nominal_admittance(len(network.nodes))
     if linear.nnz:  # without the loads' linear part the fixed point diverges where a phase is missing
