@@ -142,7 +142,9 @@ class LockstepPlant(PlantNode):
                 self._barrier.deadline = now + CLOSING
                 if self._unacknowledged.is_empty:
                     self._be_over()
-            elif self.phase in ("gathering", "joining") and self._recorder_is_silent(now):
+            elif self.phase in ("gathering", "joining") and any(
+                now > at + SILENT for at in self._recorders_at.values()
+            ):
                 self._barrier.renew(now)
             elif missing := self.missing_messages():  # else the last awaited message has just arrived
                 self.abort(self._barrier.complaint(missing, now), now)
@@ -256,10 +258,6 @@ class LockstepPlant(PlantNode):
             for kept in again:
                 self._publish_aside(self.keys.telemetry, kept)
         self._close_if_alone()
-
-    def _recorder_is_silent(self, now: float) -> bool:
-        """Whether a recorder that the run waits for has not spoken for `SILENT`."""
-        return any(now > at + SILENT for at in self._recorders_at.values())
 
     def _publish(self, key: str, payload: bytes) -> None:
         if key == self.keys.telemetry:

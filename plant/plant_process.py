@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gc
 import logging
-import sys
 from collections.abc import Callable
+from functools import partial
 from time import monotonic
 
 import msgspec
@@ -32,9 +32,7 @@ def build(config: PlantConfig) -> LivePlant:
     return start_plant(config)
 
 
-def print_word(word: str) -> None:
-    sys.stdout.write(word + "\n")
-    sys.stdout.flush()
+print_word = partial(print, flush=True)  # at once, for the parent process
 
 
 def run_plant(

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.circuit import PHASES, aligned_sum
+from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.kernel import gfl as gfl_model
 from gridpeers.plant.dynamics.kernel import gfm as gfm_model
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
@@ -124,10 +124,6 @@ class Inverters:
         theta = np.zeros(len(self))
         theta[self.gfm_at] = self.gfm_state["theta"]
         return theta
-
-    def nominal_angle(self) -> Real:
-        """Return the angle of every first terminal in the balanced set (rad): 0, or that of a single phase."""
-        return np.asarray(np.angle(PHASES)[self.phase])
 
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
         """Return the powers and voltages (pu) that the controllers measure (sections 3.2, 3.8).

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from gridpeers.plant.dynamics.circuit import Circuit, NoSolutionError
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.island_parts import IslandParts, is_large
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
@@ -186,7 +186,7 @@ class LiveNetwork:
 
     def _island_angle(self) -> Real:
         """Return the angle (rad) of each branch's island frame; 0 where the island has a source or no GFM."""
-        theta = self._inverters.theta() - self._inverters.nominal_angle()
+        theta = self._inverters.theta() - np.angle(PHASES)[self._inverters.phase]
         angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
         C = self.circuit.C.tocsc()
         first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)

@@ -121,7 +121,8 @@ class Dynamics:
                     continue
                 except NoSolutionError as error:
                     islands = set(error.islands)
-            self._return()
+            units = self.inverters  # go back to the start of the step that failed
+            units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
             network.note()
             self.deenergise(sorted(islands), step)
             begin, renewed = 2 * step, -1
@@ -179,11 +180,6 @@ class Dynamics:
             network.x,
             out,
         )
-
-    def _return(self) -> None:
-        """Go back to the start of the step that failed."""
-        units = self.inverters
-        units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
 
     def voltages(self) -> Complex:
         """Return the voltages to earth of all nodes (V); 0 in dead islands and at nodes without any admittance."""

@@ -8,7 +8,7 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder, InverterRow, Line, Switch
+from gridpeers.plant.equipment import Feeder, InverterRow, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.plant.plant_config import FeederChanges
@@ -111,7 +111,11 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
     fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")
     rows = {name: [row for k in range(1, copies + 1) for row in _copied(getattr(feeder, name), k)] for name in fields}
-    elements = [element for k in range(1, copies + 1) for element in _copied_elements(feeder, k)]
+    elements = [
+        replace(it, name=copy_name(it.name, k), nodes=tuple((copy_name(bus, k), phase) for bus, phase in it.nodes))
+        for k in range(1, copies + 1)
+        for it in feeder.elements
+    ]
     parts = [part for k in range(1, copies + 1) for part in _copied(feeder.load_parts, k)]
     source = feeder.source.bus
     width = max(each.x for each in feeder.buses) - min(each.x for each in feeder.buses)
@@ -125,7 +129,9 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         rows["buses"].append(replace(place, name=between, phases="ABC"))
         rows["switches"].append(_tie_switch(here, between, between))
         if feeder.lines:
-            rows["lines"].append(_tie_line(feeder, between, there))
+            of_three = next(line for line in feeder.lines if line.phases == "ABC")
+            ends = {"name": between, "from_bus": between, "to_bus": there}
+            rows["lines"].append(replace(of_three, **ends, length=TIE_LENGTH))
         else:
             elements.append(_tie_element(feeder, bus.V_nom, between, there))
     return replace(
@@ -148,19 +154,8 @@ def _copied(rows: tuple[Row, ...], k: int) -> Iterator[Row]:
         yield replace(row, **changed)
 
 
-def _copied_elements(feeder: Feeder, k: int) -> Iterator[LinearElement]:
-    for element in feeder.elements:
-        nodes = tuple((copy_name(bus, k), phase) for bus, phase in element.nodes)
-        yield replace(element, name=copy_name(element.name, k), nodes=nodes)
-
-
 def _tie_switch(one: str, other: str, alias: str) -> Switch:
     return Switch(name=f"{one}-{other}", alias=alias, from_bus=one, to_bus=other, phases="ABC", closed=True)
-
-
-def _tie_line(feeder: Feeder, one: str, other: str) -> Line:
-    kind = next(line for line in feeder.lines if line.phases == "ABC")
-    return Line(name=one, from_bus=one, to_bus=other, phases="ABC", config=kind.config, length=TIE_LENGTH)
 
 
 def _tie_element(feeder: Feeder, V_nom: float, one: str, other: str) -> LinearElement:

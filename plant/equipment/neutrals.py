@@ -78,7 +78,8 @@ def neutrals_by_bus(
             node = part.bus, next((end for end in part.ends if end not in PHASES), part.ends[1])
             weight[node] = weight.get(node, 0.0) + abs(part.S)
     along: dict[Node, list[Node]] = {}
-    for one, other in (*_conductors(elements), *_poles(switches)):
+    poles = (((it.from_bus, phase), (it.to_bus, phase)) for it in switches for phase in it.phases)
+    for one, other in (*_conductors(elements), *poles):
         along.setdefault(one, []).append(other)
         along.setdefault(other, []).append(one)
     for seed in [node for node in weight if node[1] in PHASES]:
@@ -113,8 +114,3 @@ def _conductors(elements: Iterable[LinearElement]) -> Iterator[tuple[Node, Node]
         ends = element.nodes[:half], element.nodes[half:]
         if len(ends[0]) == len(ends[1]) and all(len({bus for bus, _ in end}) == 1 for end in ends):
             yield from zip(*ends, strict=True)
-
-
-def _poles(switches: Iterable[Switch]) -> Iterator[tuple[Node, Node]]:
-    for switch in switches:
-        yield from (((switch.from_bus, phase), (switch.to_bus, phase)) for phase in switch.phases)

@@ -8,7 +8,7 @@ A function trips when its condition has held at every step of its clearing time.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -49,7 +49,8 @@ class Relays:
         self.thresholds = np.array([value for value, _ in chosen.values()])
         self.times = np.array([time for _, time in chosen.values()])
         self._need = np.maximum(1, np.round(self.times / h)).astype(np.int64)
-        self._of = np.array([("f", "low", "high").index(_quantity(name)) for name in chosen], np.int64)
+        self._of = np.array([0 if name[1] == "F" else 2 if name[0] == "O" else 1 for name in chosen], np.int64)
+        """Quantity of each function: f, V_low or V_high."""
         self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
         self._count = np.zeros((n, len(chosen)), np.int64)
         """Number of steps for which each function's condition has held."""
@@ -169,9 +170,3 @@ class Recovery:
         waited = np.where(dead == self._was_dead, waited, np.minimum(waited, since_last))
         self._waited = np.where(self.tripped, waited, 0)
         self._was_dead = dead.copy()
-
-
-def _quantity(name: str) -> Literal["f", "low", "high"]:
-    if name[1] == "F":
-        return "f"
-    return "high" if name[0] == "O" else "low"
