@@ -151,9 +151,9 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
     at = {(other.bus, phase): other.name for other in others for phase in other.phases}
     floating = buses_without_ground(feeder.transformers, feeder.lines, [*feeder.switches, *feeder.regulators])
     load = sum(feeder.load_by_bus().values())
-    _check_place(row, bus, load, at, floating, inverter.neutral, neutrals_of(feeder))
     if any(inverter.name == other.name for other in others):
         row.problem("there is one of this name already; names must differ")
+    _check_place(row, bus, load, at, floating, inverter.neutral, neutrals_of(feeder))
     return problems
 
 
