@@ -62,12 +62,6 @@ class RecordPages:
         self._run = run
         self._worker = ThreadPoolExecutor(1, "record")
 
-    def begin(self) -> None:
-        """Begin to serve."""
-
-    def end(self) -> None:
-        """Serve no more."""
-
     def close(self) -> None:
         """End the thread that reads."""
         self._worker.shutdown(cancel_futures=True)
