@@ -32,9 +32,9 @@ def compare(
     if out.suffix not in kinds:
         fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
 
+    from gridpeers.runs.comparison import compare as compare_runs
     from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
     from gridpeers.scenarios.schema import ScenarioError
-    from gridpeers.studies.comparison import compare as compare_runs
 
     try:
         comparison = compare_runs(first, second, names=_names(first, second))

@@ -115,7 +115,7 @@ NO_BENCHMARK = Benchmark()
 
 
 def _benchmark_objection(it: Any) -> str:
-    return "" if isinstance(it, Benchmark) else "it is no gridpeers.benchmarks.Benchmark"
+    return "" if isinstance(it, Benchmark) else "it is no gridpeers.Benchmark"
 
 
 BENCHMARKS: Registry[Benchmark] = Registry(
