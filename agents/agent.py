@@ -93,15 +93,9 @@ SIGN_OF_LIFE = 0.5
 class Agent:
     """State of one agent.
 
-    Parameters
-    ----------
-    config : AgentConfig
-        The agent's nameplate and the run's rule.
-    law : Law, optional
-        Law that decides the set-points; by default the paper's, with the configuration's gains.
-    board : dict[str, State], optional
-        Last state of each agent that neighbours may use, where all agents of a run share it
-        (`gridpeers.agents.agent_group`); by default the agent keeps those that it hears.
+    By default its law is the paper's, with the configuration's gains. `board` has the last state of each agent that
+    neighbours may use, where all agents of a run share it (`gridpeers.agents.agent_group`); by default the agent keeps
+    those that it hears.
     """
 
     def __init__(self, config: AgentConfig, law: Law | None = None, board: dict[str, State] | None = None) -> None:

@@ -144,7 +144,6 @@ class Control(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
     """Control law."""
 
     def acts(self, name: str, kind: str) -> bool:
-        """Whether an inverter runs the secondary law."""
         if isinstance(self.secondary, tuple):
             return name in self.secondary
         return self.secondary == "all" or (self.secondary == "GFM" and kind == "GFM")
@@ -209,7 +208,6 @@ class AgentConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 def nameplate_of(config: AgentConfig) -> Nameplate:
-    """Make the nameplate of an agent from its configuration."""
     return Nameplate(
         sender=config.name,
         epoch=config.epoch,

@@ -23,10 +23,7 @@ from gridpeers.wire.messages import Journal, Measurement, State
 class AgentGroup:
     """The agents of a run, in the order of the roster; all with the same rule, each with its law.
 
-    Raises
-    ------
-    ValueError
-        If a value of a nameplate is out of bounds.
+    Raise ValueError if a value of a nameplate is out of bounds.
     """
 
     def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law]) -> None:
@@ -67,7 +64,6 @@ class AgentGroup:
         return listens
 
     def tick(self, measurements: Iterable[Measurement]) -> list[State]:
-        """Return the decision of each agent that has a measurement of this tick."""
         agents, neighbours = self._agents, self._neighbours
         states = [agents[measured.to].tick(measured, neighbours[measured.to]) for measured in measurements]
         if journals := self._journals:

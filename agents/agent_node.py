@@ -15,8 +15,7 @@ from gridpeers.agents.laws.law import Law
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import Links, arrived, is_usable
 from gridpeers.wire.messages import PLANT, Measurement, Nameplate, State, Stop
-from gridpeers.wire.node import Listen, Route
-from gridpeers.wire.plant_follower import PlantFollower
+from gridpeers.wire.node import Listen, PlantFollower, Route
 
 
 class NeighbourStates:
@@ -34,7 +33,6 @@ class NeighbourStates:
         self._measured_at = 0.0
 
     def keep(self, message: State | Measurement, at: float) -> None:
-        """Keep a state or the own measurement, which arrived at this time (s)."""
         if isinstance(message, State):
             self._states[message.sender] = message, at
         else:
@@ -60,11 +58,9 @@ class NeighbourStates:
         return max(at - arrived_at, self.t - state.t)
 
     def forget(self, name: str) -> None:
-        """Forget an agent whose process is gone."""
         self._states.pop(name, None)
 
     def clear(self) -> None:
-        """Forget every state and the measurement."""
         self._states.clear()
         self.measurement = None
 
@@ -76,18 +72,8 @@ _KEPT = State, Measurement
 class AgentNode(PlantFollower):
     """One agent as a participant of a run.
 
-    Parameters
-    ----------
-    config : AgentConfig
-        The agent's nameplate and the run's rule.
-    instance : str
-        Id of this process, unique in the run; part of the agent's token.
-    links : Links or None
-        Emulated links to the agent; None for none.
-    law : Law or None
-        Law that decides the set-points; None is the paper's.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
+    `instance` is the id of this process, unique in the run, and part of the agent's token. Without `links` none are
+    emulated; without a law it is the paper's. `rate` is that of `gridpeers.wire.membership.Admission`.
     """
 
     def __init__(
@@ -114,7 +100,6 @@ class AgentNode(PlantFollower):
 
     @property
     def token(self) -> str:
-        """Key of the own liveliness token."""
         return self.keys.alive_agent(self._name, self._instance)
 
     @property
@@ -124,16 +109,13 @@ class AgentNode(PlantFollower):
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
         return tuple(self.routes)
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return bool(self.stopped or self.failed)
 
     def use_links(self, links: Links) -> None:
-        """Use other emulated links from now on."""
         self._links = links
 
     def note_siblings(self, names: frozenset[str]) -> None:
@@ -146,7 +128,6 @@ class AgentNode(PlantFollower):
     # ---------------------------------------------------------------- the others
 
     def appeared(self, key: str, now: float) -> None:
-        """Note that a token appeared."""
         self._note_token(key, now, appeared=True)
         match self.keys.parts(key):
             case ("alive", "plant", epoch) if self._plant_appeared(epoch):
@@ -177,7 +158,6 @@ class AgentNode(PlantFollower):
         raise NotImplementedError
 
     def _listen_to(self, name: str) -> None:
-        """Subscribe to the states of an agent, once."""
         key = self.keys.state(name)
         if key not in self.routes:
             self.routes[key] = Route(name, (State,), self._on_state)
@@ -211,7 +191,6 @@ class AgentNode(PlantFollower):
                 self._keep(message, at)
 
     def _keep(self, message: State | Measurement, at: float) -> None:
-        """Keep a usable message, which arrived at this time (s of run time)."""
         if type(message) is State:
             self._agent.hear(message)
         self.states.keep(message, at)
@@ -219,6 +198,5 @@ class AgentNode(PlantFollower):
     # ---------------------------------------------------------------- reports
 
     def _report_links(self, *, final: bool = False) -> None:
-        """Send the account of the emulated links since the last report."""
         key, epoch = self.keys.report(self._name), self._config.epoch
         self._publish_link_reports(key, self._links, epoch, instance=self._instance, last=final)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Sequence
 from contextlib import ExitStack, closing, suppress
+from functools import partial
 from threading import Timer
 from time import monotonic, sleep
 
@@ -44,11 +45,8 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
 
     Agents of one process share a session; they are of one run, under one kind of time.
 
-    Raises
-    ------
-    ConfigurationError, SessionError
-        If the configuration cannot work. In wall-clock time also if the plant refuses an agent, or there is none
-        within the deadline.
+    Raise ConfigurationError, SessionError if the configuration cannot work. In wall-clock time also if the plant
+    refuses an agent, or there is none within the deadline.
     """
     configs = process if isinstance(process, tuple) else (process,)
     _check(configs)
@@ -58,7 +56,7 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
     else:
         schedule_as_batch()
     with ExitStack() as laws:
-        nodes = AgentSessions(configs, _made_laws(configs, laws), make_links).run()
+        nodes = _run(configs, _made_laws(configs, laws), make_links)
     failures = []
     for config, node in zip(configs, nodes, strict=True):
         log = logging.getLogger(config.name)
@@ -75,7 +73,6 @@ def run_agents(process: AgentProcess, make_links: MakeLinks = no_links) -> str:
 
 
 def _check(configs: Sequence[AgentConfig]) -> None:
-    """Raise ConfigurationError unless these agents can share a process."""
     if not configs:
         raise ConfigurationError("the configuration names no agent")
     try:
@@ -84,23 +81,11 @@ def _check(configs: Sequence[AgentConfig]) -> None:
             check_name("name", config.name)
     except ValueError as error:
         raise ConfigurationError(str(error)) from None
-    first = configs[0]
-    for config in configs[1:]:
-        for key in ("run", "clock", "listen", "connect", "star"):
-            if getattr(config, key) != getattr(first, key):
-                raise ConfigurationError(
-                    f"{config.name}: {key} {getattr(config, key)!r} differs from that of {first.name}; "
-                    "agents of one process share it"
-                )
-    if len(configs) > 1 and first.credentials is not None:
+    if len(configs) > 1 and configs[0].credentials is not None:
         raise ConfigurationError(f"agents of one process have one certificate; start that of {configs[1].name} alone")
-    names = [config.name for config in configs]
-    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
-        raise ConfigurationError(f"agents {', '.join(twice)} stand twice in the configuration")
 
 
 def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
-    """Return the law of each agent, which ends with the stack."""
     made: list[Law] = []
     for config in configs:
         try:
@@ -110,78 +95,30 @@ def _made_laws(configs: Sequence[AgentConfig], laws: ExitStack) -> list[Law]:
     return made
 
 
-class AgentSessions:
-    """Agents of one process, which take part with one session, and with a new one whenever the last was broken."""
-
-    def __init__(self, configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> None:
-        first = configs[0]
-        self._configs, self._laws, self._make_links = configs, laws, make_links
-        self._credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
-        self._log = logging.getLogger(first.name)
-        self._nodes: tuple[AnyAgent, ...] = ()
-        self._core: AnyAgent | NodeGroup | None = None
-        """The agents as one; None before the first session."""
-        self._session: Session | None = None
-        self._asked: StoppedError | KeyboardInterrupt | None = None
-        """Request to end that came between two sessions."""
-
-    def run(self) -> tuple[AnyAgent, ...]:
-        """Take part until all agents have finished; return them.
-
-        Raises
-        ------
-        StoppedError, KeyboardInterrupt
-            The request to end, once the agents have left.
-        SessionError
-            If no session can be opened.
-        """
-        while self._core is None or self._core.session_broken:
-            try:
-                self._take_part()
-            except (StoppedError, KeyboardInterrupt) as stop:
-                if self._asked is not None or not any(node.between_sessions for node in _realtime(self._nodes)):
-                    raise
-                self._leave_over_new_session(stop)
-            except SessionError:
-                if self._asked is None:
-                    raise
-                break
-        if self._asked is not None:
-            raise self._asked
-        return self._nodes
-
-    def _take_part(self) -> None:
-        """Open a session, and take part with it until it is broken or all agents have finished."""
-        again = self._core is not None and self._asked is None
-        self._session = session = _opened(self._configs[0], self._credentials, again=again)
+def _run(configs: Sequence[AgentConfig], laws: Sequence[Law], make_links: MakeLinks) -> tuple[AnyAgent, ...]:
+    """Take part until all agents have finished, with a new session whenever the last was broken; return the agents."""
+    first = configs[0]
+    credentials = None if first.credentials is None else first.credentials.knowing(first.inverters)
+    nodes: tuple[AnyAgent, ...] = ()
+    core: AnyAgent | NodeGroup | None = None
+    while core is None or core.session_broken:
+        session = _opened(first, credentials, again=core is not None)
         try:
-            core = self._make_nodes(session.id) if self._core is None else self._core
-            for agent in _realtime(self._nodes):
-                agent.host_moved = lambda: session.moved
-            if self._credentials is not None:
-                for node in self._nodes:
+            if core is None:
+                known: list[KnownAgents] = []  # one for each rule among the agents
+                nodes = tuple(
+                    _node(config, session.id, make_links, law, known) for config, law in zip(configs, laws, strict=True)
+                )
+                core = nodes[0] if len(nodes) == 1 else NodeGroup(nodes)
+            for agent in _realtime(nodes):
+                agent.host_moved = partial(getattr, session, "moved")
+            if credentials is not None:
+                for node in nodes:
                     node.vouches = session.vouches
-            take_part(core, self._nodes, session, self._log)
+            take_part(core, nodes, session, logging.getLogger(first.name))
         finally:
-            session.close(replaced=self._core is not None and self._core.session_broken)
-
-    def _make_nodes(self, instance: str) -> AnyAgent | NodeGroup:
-        """Make the agents, whose instance is the id of their first session."""
-        shared: list[KnownAgents] = []  # one for each rule among the agents
-        self._nodes = tuple(
-            _node(config, instance, self._make_links, law, shared)
-            for config, law in zip(self._configs, self._laws, strict=True)
-        )
-        self._core = self._nodes[0] if len(self._nodes) == 1 else NodeGroup(self._nodes)
-        return self._core
-
-    def _leave_over_new_session(self, stop: StoppedError | KeyboardInterrupt) -> None:
-        """Have the agents leave over a new session: with the last one they would be taken for dead."""
-        self._asked = stop.with_traceback(None)  # which would keep the session
-        if self._session is not None:
-            self._session.close(replaced=True)  # the request may have come before that was done
-        for node in _realtime(self._nodes):
-            node.leave_over_new_session(f"asked to leave: {stop}")
+            session.close(replaced=core is not None and core.session_broken)
+    return nodes
 
 
 def _realtime(nodes: Sequence[AnyAgent]) -> list[RealtimeAgent]:
@@ -235,8 +172,6 @@ def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Se
         drive(core, session, log)
     except (StoppedError, KeyboardInterrupt) as stop:
         leaving = _realtime(nodes)
-        if any(node.between_sessions for node in leaving):
-            raise  # the plant does not know this session, or not yet
         if leaving and isinstance(stop, StoppedOnLeashError):
             _go_on(core, session, log)
         for node in leaving:
@@ -247,7 +182,6 @@ def take_part(core: AnyAgent | NodeGroup, nodes: Sequence[AnyAgent], session: Se
 
 
 def _go_on(core: AnyAgent | NodeGroup, session: Session, log: logging.Logger) -> None:
-    """Serve for `RUN_ENDS` more, or until the core has finished."""
     over = Timer(RUN_ENDS, session.inbox.put, (("word", "the run goes on", b""),))
     over.daemon = True
     over.start()

@@ -16,8 +16,6 @@ _NOT_SATURATED = (0, 0)
 
 
 class DecisionJournal:
-    """Note the decisions of one agent in its journal."""
-
     def __init__(self, agent: Agent, journal: JournalBuffer) -> None:
         self._agent, self.journal = agent, journal
         self._neighbours: Sequence[str] | None = None
@@ -73,18 +71,9 @@ class DecisionJournal:
     ) -> None:
         """Note a decision in wall-clock time.
 
-        Parameters
-        ----------
-        tick, measurement : int
-            Numbers of the own state and of the own measurement.
-        ages : Mapping[str, float]
-            Age of the last state of each in-neighbour (s of run time), infinite if none was heard.
-        max_age : float
-            Age (s) beyond which a state is not used.
-        at : float
-            Time on the own clock (s, monotonic).
-        before : tuple[float, float] or None
-            Set-points (W, V) before it; None if the agent starts from those of its measurement.
+        `tick` and `measurement` are the numbers of the own state and measurement, `ages` (s of run time) those of the
+        last states, infinite if none was heard and not used beyond `max_age`; `at` is the own clock (s, monotonic) and
+        `before` the set-points (W, V), None if the agent starts from those of its measurement.
         """
         agent = self._agent
         used = {neighbour.name for neighbour in agent.around}
@@ -108,7 +97,6 @@ class DecisionJournal:
         )
 
     def _reasons(self, neighbours: Sequence[str], states: Sequence[int | None]) -> list[str]:
-        """Return why the agent left out each neighbour; empty for those that it used."""
         used = {neighbour.name for neighbour in self._agent.around}
         return [
             ""

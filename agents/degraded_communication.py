@@ -53,12 +53,10 @@ class StalenessWeights:
         """Ages (s) of each neighbour's last states, each at the first tick that could use it."""
 
     def arrived(self, name: str) -> None:
-        """Note that a newer state of a neighbour has arrived."""
         if self.ages_count:
             self._fresh.add(name)
 
     def forget(self, name: str) -> None:
-        """Forget a neighbour and its link."""
         self._fresh.discard(name)
         self._usual.pop(name, None)
 
@@ -96,7 +94,6 @@ class SaturationDetector:
         """Times (s) and outputs (pu) since it went to this side; of those older than T_sat only the last."""
 
     def begin(self) -> None:
-        """Forget the past outputs: their set-points were not the law's."""
         self._side = 0
         self._since.clear()
 
@@ -119,7 +116,6 @@ class SaturationDetector:
 
 
 def gains_in_force(gains: Gains, options: DegradedCommunication) -> Gains:
-    """Return the gains and limits of the law under these options."""
     if options.weights == "degree-normalised":
         gains = replace(
             gains,
@@ -159,8 +155,6 @@ KEPT = 512
 
 @dataclass
 class _Pair:
-    """Angle difference between one neighbour and the own inverter."""
-
     since: tuple[float, float] | None = None
     """Times (s) from which the two angles count."""
     t: float = 0.0
@@ -177,7 +171,6 @@ class _Pair:
     """How long it was left out last (s)."""
 
     def compare(self, since: tuple[float, float], t: float, difference: float) -> None:
-        """Note the difference of the angles (cycles) at t (s)."""
         if since != self.since:
             self.since, self.usual = since, difference
         else:
@@ -247,11 +240,9 @@ class IslandDetector:
         return pair.back is not None
 
     def forget(self, name: str) -> None:
-        """Forget a neighbour that is gone."""
         self._pairs.pop(name, None)
 
     def restart(self) -> None:
-        """Forget all neighbours: while grid-connected all are in step."""
         self._pairs.clear()
 
     def _own_at(self, t: float) -> float | None:

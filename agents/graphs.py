@@ -19,9 +19,8 @@ from types import FunctionType
 from typing import Annotated, Any, Protocol
 
 from gridpeers.agents.agent_config import Control
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, line_of, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, line_of, named
 from gridpeers.wire.wording import printable, suggestion
 
 
@@ -33,9 +32,7 @@ class Member(Protocol):
         """Kind: "GFM" or "GFL"."""
 
     @property
-    def microgrid(self) -> str:
-        """Name of the microgrid."""
-
+    def microgrid(self) -> str: ...
     @property
     def P_rated(self) -> float:
         """Rated power (W)."""
@@ -124,7 +121,6 @@ class EdgeList:
         self.links = tuple(links)
 
     def __call__(self, members: Members) -> Mapping[str, Iterable[str]]:
-        """Return the in-neighbours of each agent."""
         both = [pair for a, b in self.links for pair in ((a, b), (b, a))]
         return {name: {b for a, b in both if a == name and b in members} for name in members}
 
@@ -151,10 +147,7 @@ def neighbours_by(rule: Graph, members: Members, name: str, *, strict: bool = Fa
     `name` is that of the rule in the scenario, for messages. With `strict` a name that is no member is a problem, as
     in the check of a scenario; else it is left out: in wall-clock time agents meet one after the other.
 
-    Raises
-    ------
-    GraphError
-        If the rule raises, or its result is no graph of these agents.
+    Raise GraphError if the rule raises, or its result is no graph of these agents.
     """
     heard_by = _evaluated(rule, members, name)
     for one, heard in heard_by.items() if strict else ():
@@ -198,19 +191,16 @@ class RosterGraph:
 
 
 def _evaluated(rule: Graph, members: Members, name: str) -> dict[str, frozenset[str]]:
-    """Return each agent's in-neighbours as the rule has them."""
     ordered = {one: members[one] for one in sorted(members, key=natural_order)}
     try:
-        with foreign_code():
-            result = rule(ordered)
-            return {one: frozenset(result[one]) for one in result}
+        result = rule(ordered)
+        return {one: frozenset(result[one]) for one in result}
     except ANYTHING as error:  # a rule is foreign code
         members_of = ", ".join(ordered)
         raise GraphError(f"graph {name}{line_of(rule, error)} of {members_of} failed: {named(error)}") from error
 
 
 def make_graph(plugin: Plugin) -> Graph:
-    """Return a plugged-in rule; raise PluginError if it is missing or cannot be made with its parameters."""
     rule = made(GRAPHS, plugin)
     if not callable(rule):
         raise PluginError(f"{plugin.name}: an instance of its class cannot be called with the members' nameplates")

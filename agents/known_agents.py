@@ -29,16 +29,13 @@ class KnownAgents:
         """Number of changes of the members by then, and the names on the roster without a nameplate."""
 
     def add(self, nameplate: Nameplate) -> None:
-        """Note the nameplate of an agent that shares this."""
         self._own[nameplate.sender] = nameplate
 
     def introduce(self, name: str, instance: str, nameplate: Nameplate) -> None:
-        """Note the token and the nameplate of an agent in one process with all others."""
         self.members.appeared(name, instance)
         self.members.meet(instance, nameplate)
 
     def gone(self, name: str, instance: str) -> None:
-        """Note that a token is gone."""
         self.members.vanished(name, instance)
 
     def processes(self, message: Prepare) -> dict[str, str]:
@@ -48,7 +45,6 @@ class KnownAgents:
         return self._latest[1]
 
     def take(self, message: Prepare) -> None:
-        """Take a new roster, whose processes count from now on."""
         if message is self._taken:
             return
         self._taken, self._graph, self._unmet = message, None, (-1, [])
@@ -65,7 +61,6 @@ class KnownAgents:
         return [name for name in names if name != own] if names else names
 
     def nameplate(self, name: str) -> Nameplate:
-        """Return the nameplate of an agent of the roster that has been met."""
         return self.members.nameplates.get(name) or self._own[name]
 
     def in_neighbours(self, own: str) -> tuple[str, ...]:

@@ -100,31 +100,25 @@ class LockstepAgent(AgentNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         keys, name = self.keys, self._name
         return keys.ready(name), keys.state(name), keys.report(name), keys.journal(name)
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages that the next tick needs."""
         return self._barrier.messages_needed
 
     @property
     def deadline(self) -> float | None:
-        """End of the present wait (s on the driver's clock); None if it has none."""
         return self._barrier.deadline
 
     def note_siblings(self, names: frozenset[str]) -> None:
-        """Note the agents of the same process."""
         self._barrier.siblings = names
 
     def start(self, now: float) -> None:
-        """Start to wait for the plant, which is built first."""
         self._barrier.renew(now)
         self._barrier.deadline = max(self._barrier.deadline or 0.0, now + self._config.plant_wait)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Return the missing messages with their senders."""
         if not self.plant_seen:
             return (Awaited("sign of life", PLANT),)
         if self._roster is None:
@@ -135,7 +129,6 @@ class LockstepAgent(AgentNode):
         return missing[:1] if self._barrier.awaits(PLANT) else missing
 
     def expire(self, now: float) -> None:
-        """Give up if the deadline has passed."""
         if self.finished or not self._barrier.is_over(now):
             return
         if self._ending:
@@ -158,14 +151,12 @@ class LockstepAgent(AgentNode):
             self.failed = f"{self._name}: the plant is gone{tick}; the run has ended"
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, or is on the roster."""
         match self.keys.parts(key):
             case ("alive", "agent", name, instance) if self._processes.get(name) == instance:
                 return True
         return super().is_noted(key)
 
     def vanished(self, key: str, now: float) -> None:
-        """Note that a token is gone; another agent of this process may have noted it before."""
         match self.keys.parts(key):
             case ("alive", "agent", name, instance):
                 if self._forget_process(name, instance) or self._processes.get(name) == instance:

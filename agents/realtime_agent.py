@@ -67,15 +67,9 @@ LEAVING = 1.0
 """Longest wait (s, wall) for the plant's word that it has taken the inverter off: a session that closes at once can
 take what was sent last with it."""
 
-FOUND_AGAIN = 2.0
-"""Longest wait (s, wall) for the plant over a new session, of an agent that is asked to leave while it has none; it
-takes 0.1 to 0.3 s."""
-
 
 @dataclass
 class AgentStatistics:
-    """Counts since the start."""
-
     ticks: int = 0
     """Ticks done."""
     missed: int = 0
@@ -119,12 +113,6 @@ class RealtimeAgent(AgentNode):
         self._health = SessionHealth(config.name)
         self._leaving = ""
         """Reason why it leaves, once it has sent `Leave`."""
-        self._leaves_once_back = ""
-        """Reason why it leaves, once a new session brings measurements."""
-        self._back_by = inf
-        """When it leaves without them (s on the driver's clock)."""
-        self._is_back = True
-        """Whether the present session has brought a measurement; of the first one that does not matter."""
         self._ran = False
         """Whether it has ticked in the present epoch of the plant."""
         self._left = 0
@@ -158,24 +146,20 @@ class RealtimeAgent(AgentNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         keys, name = self.keys, self._name
         own = keys.state, keys.set_points, keys.leave, keys.status, keys.report, keys.link_acknowledgement, keys.journal
         return tuple(key(name) for key in own)
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return super().finished or self.session_broken
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages to be woken for: messages wait for the tick."""
         return CLOCK_ALONE
 
     @property
     def deadline(self) -> float:
-        """When the next tick is due (s on the driver's clock)."""
         return self._timer.due
 
     def start(self, now: float) -> None:
@@ -188,14 +172,12 @@ class RealtimeAgent(AgentNode):
         if self._config.deadline > 0.0:
             self._give_up = now + self._config.deadline
         if self.session_broken:
-            self.session_broken = self._is_back = False
-            self._back_by = now + FOUND_AGAIN
+            self.session_broken = False
             self._health.next_session()
             self._agent.restart()
             self._forget_everybody()
 
     def expire(self, now: float) -> None:
-        """Tick, if it is time."""
         late = now - self._timer.due
         if late < 0.0 or self.finished:
             return
@@ -219,9 +201,6 @@ class RealtimeAgent(AgentNode):
         self._hear_late(at)
         before = self.phase, self._used_neighbours
         self._tick(at)
-        if self._leaves_once_back and (self._is_back or now >= self._back_by):
-            self.asked_to_leave(self._leaves_once_back)
-            return
         if now >= self._journal_timer.due and self.phase == "running":  # then the plant knows this process
             self._journal_timer.take(now)
             self._report_journal()
@@ -264,16 +243,6 @@ class RealtimeAgent(AgentNode):
             self._timed.process("leave", reason, self._timed.now)
         self.leave(reason)
 
-    @property
-    def between_sessions(self) -> bool:
-        """Whether its session was broken and no new one has brought a measurement: the plant takes it for dead."""
-        return not (self.stopped or self.failed) and (self.session_broken or not self._is_back)
-
-    def leave_over_new_session(self, reason: str) -> None:
-        """Ask for a new session, to leave over it once it brings measurements, or after `FOUND_AGAIN`."""
-        if not (self.stopped or self.failed):
-            self.session_broken, self._leaves_once_back = True, reason
-
     def change(self, config: AgentConfig, law: Law | None = None) -> None:
         """Go on under another rule of control, with the set-points of now; see `Agent.taken_over`."""
         self._config, self._agent = config, self._agent.taken_over(config, law)
@@ -311,7 +280,6 @@ class RealtimeAgent(AgentNode):
             self._ask(name, instance)
 
     def _listen(self) -> None:
-        """Listen to the in-neighbours among all who have been met."""
         self._neighbours = self._agent.in_neighbours((self._name, *sorted(self.members.nameplates)))
         for name in self._neighbours:
             self._listen_to(name)
@@ -371,7 +339,6 @@ class RealtimeAgent(AgentNode):
     # ---------------------------------------------------------------- ticks
 
     def _hold(self, why: str) -> None:
-        """Stop ticking; what was heard is of no use any more."""
         if self.phase == "running":
             self.phase = "waiting"
             self._say(why)
@@ -388,7 +355,7 @@ class RealtimeAgent(AgentNode):
             self._hold("no recent measurement; holds")
             return
         if self.phase != "running":
-            self.phase, self._is_back = "running", True
+            self.phase = "running"
             m, joins = measurement, "goes on" if self._ran else "joins"
             self._say(f"{joins} at t = {m.t:.2f} s, from {m.P_set:.0f} W and {m.V_set:.1f} V")
             self._ran = True
@@ -409,7 +376,6 @@ class RealtimeAgent(AgentNode):
         self._send(state)
 
     def _report_journal(self) -> None:
-        """Send the journal since the last report."""
         self._publish_journal(self.keys.journal(self._name), self._config.epoch, self.states.t)
 
     def _send(self, state: State) -> None:

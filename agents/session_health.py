@@ -39,7 +39,6 @@ class SessionHealth:
         self._begin()
 
     def _begin(self) -> None:
-        """Begin with a session of which nothing is known."""
         self._came: dict[str, float] = {}
         """Time (s) at which the last message of each sender came off the wire."""
         self._crossed: dict[str, tuple[str, float]] = {}
@@ -51,15 +50,12 @@ class SessionHealth:
         self._begin()
 
     def came(self, name: str, now: float) -> None:
-        """Note that a message came off the wire."""
         self._came[name] = now
 
     def has_come(self, name: str) -> bool:
-        """Return whether a message has come from a sender."""
         return name in self._came
 
     def forget(self, name: str) -> None:
-        """Forget a sender, as its process is gone."""
         self._came.pop(name, None)
 
     def plant_seen(self, now: float) -> None:

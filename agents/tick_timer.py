@@ -33,11 +33,9 @@ class TickTimer:
 
     @property
     def due(self) -> float:
-        """Next due time (s)."""
         return self._timer.due
 
     def measured(self, at: float) -> None:
-        """Note when a measurement came (s)."""
         self._measured = at
 
     def take(self, now: float) -> int:

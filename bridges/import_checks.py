@@ -67,18 +67,9 @@ def placed(problem: str, places: Mapping[str, str]) -> str:
 
 
 def of_script(problem: str, folder: Path, script: str, places: Mapping[str, str]) -> str:
-    """Return a problem of an imported feeder's tables as one of the script, with the file and line if they are known.
+    """Return a problem of an imported feeder's tables ("buses.csv row 3: ...") as one of the script, with its place.
 
-    Parameters
-    ----------
-    problem
-        As `gridpeers.plant.tables.read_feeder` has it: "buses.csv row 3: ...".
-    folder
-        Folder of the tables.
-    script
-        Name of the script.
-    places
-        Those of the feeder (`Feeder.places`).
+    `folder` has the tables; `places` are those of the feeder.
     """
     found = re.match(r"(?P<file>\w+\.\w+)(?: row (?P<row>\d+))?: ", problem)
     if not found:
@@ -221,18 +212,8 @@ def refuse_unsolvable(
 ) -> None:
     """Raise a FeederError if an import has problems, or if its feeder has nodes without a determined voltage.
 
-    Parameters
-    ----------
-    path
-        The imported file.
-    feeder
-        Its feeder, with a source.
-    problems
-        Problems of the import so far.
-    remedy
-        What to do where nothing determines a voltage to ground.
-    name_node
-        Name of a node in the imported program, from its letter.
+    `remedy` says what to do where nothing determines a voltage to ground; `name_node` names a node by its letter as the
+    imported program does.
     """
     _report_unconnected(feeder, problems, name_node)
     refuse_if(path, problems, feeder.places)
@@ -283,14 +264,7 @@ def with_plain_names(feeder: Feeder, added: Mapping[str, str]) -> Feeder:
     """Return a feeder in which "_" stands for what a name cannot have; its notes name the buses.
 
     A bus has no blanks and no "~", and no name has characters that cannot be printed. Where two buses would have the
-    same name, the later one ends with "_2".
-
-    Parameters
-    ----------
-    feeder
-        As the other program has it.
-    added
-        Buses that the import has added, and the bus before each (`bus_behind`).
+    same name, the later one ends with "_2". `added` has the buses that the import has added, and the bus before each.
     """
     before = dict.fromkeys([*(bus.name for bus in feeder.buses if bus.name not in added), *added.values()])
     buses = _distinct(before, _plain_bus)

@@ -35,10 +35,7 @@ class Difference(NamedTuple):
 def difference(feeder: Feeder, theirs: Mapping[Node, complex]) -> Difference:
     """Return the largest difference between our voltages and another program's, `theirs` (V).
 
-    Raises
-    ------
-    ArithmeticError
-        If our power flow does not converge.
+    ArithmeticError if our power flow does not converge.
     """
     network = Network(feeder)
     at = [k for k, node in enumerate(network.nodes) if node in theirs]

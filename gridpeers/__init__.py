@@ -26,70 +26,78 @@ if TYPE_CHECKING:
     from gridpeers.lab.replay.counterfactual import Counterfactual, counterfactual
     from gridpeers.lab.replay.replay import replay
     from gridpeers.netem.models.own_fault import FAULTS, LinkFault
+    from gridpeers.runs.comparison import Comparison, compare
     from gridpeers.runs.result import Result, Results
     from gridpeers.runs.running import read
+    from gridpeers.runs.sweeping import sweep
     from gridpeers.scenario import Scenario, load
     from gridpeers.scenarios.checks.check_registry import CHECKS
     from gridpeers.scenarios.checks.check_verdict import Check, CheckVerdict, NotJudgedError, Violation
     from gridpeers.scenarios.checks.checked_case import CheckedCase
-    from gridpeers.scenarios.results.claims import CLAIMS, Claim
+    from gridpeers.scenarios.results.claims import (
+        CLAIMS,
+        Benchmark,
+        Claim,
+        Judge,
+        Published,
+        Verdict,
+        judge,
+    )
+    from gridpeers.scenarios.results.findings import Findings
     from gridpeers.scenarios.results.metric import METRICS
+    from gridpeers.scenarios.results.plots import style as figures
     from gridpeers.scenarios.results.run_files import FolderError
     from gridpeers.scenarios.results.window_metrics import WindowData
     from gridpeers.scenarios.run_request import BrokenRunError
     from gridpeers.scenarios.schema.loading import catalogue
     from gridpeers.scenarios.schema.scenario_errors import ScenarioError
-    from gridpeers.studies.comparison import Comparison, compare
-    from gridpeers.studies.sweeping import sweep
+    from gridpeers.scenarios.sweep import axes as random_graphs
+    from gridpeers.scenarios.sweep import sweep_reading as sweep_files
     from gridpeers.wire.schema.plausible import Plausible, Range, Unit
 
     claim, graph, law = CLAIMS.register, GRAPHS.register, LAWS.register  # one by one: each has a type of its own
     check, link_fault, metric = CHECKS.register, FAULTS.register, METRICS.register
 
-_HOME = {
-    "BrokenRunError": "gridpeers.scenarios.run_request",
-    "Check": "gridpeers.scenarios.checks.check_verdict",
-    "CheckVerdict": "gridpeers.scenarios.checks.check_verdict",
-    "CheckedCase": "gridpeers.scenarios.checks.checked_case",
-    "Claim": "gridpeers.scenarios.results.claims",
-    "Comparison": "gridpeers.studies.comparison",
-    "Feeder": "gridpeers.feeder",
-    "FolderError": "gridpeers.scenarios.results.run_files",
-    "Law": "gridpeers.agents.laws.law",
-    "LinkFault": "gridpeers.netem.models.own_fault",
-    "Neighbour": "gridpeers.agents.laws.law",
-    "NotJudgedError": "gridpeers.scenarios.checks.check_verdict",
-    "Own": "gridpeers.agents.laws.law",
-    "Plausible": "gridpeers.wire.schema.plausible",
-    "Range": "gridpeers.wire.schema.plausible",
-    "Result": "gridpeers.runs.result",
-    "Results": "gridpeers.runs.result",
-    "Scenario": "gridpeers.scenario",
-    "ScenarioError": "gridpeers.scenarios.schema.scenario_errors",
-    "SetPoints": "gridpeers.agents.laws.law",
-    "Term": "gridpeers.agents.laws.law",
-    "Terms": "gridpeers.agents.laws.law",
-    "Unit": "gridpeers.wire.schema.plausible",
-    "Violation": "gridpeers.scenarios.checks.check_verdict",
-    "WindowData": "gridpeers.scenarios.results.window_metrics",
-    "catalogue": "gridpeers.scenarios.schema.loading",
+_NAMES = {
+    "gridpeers.agents.laws.law": ("Law", "Neighbour", "Own", "SetPoints", "Term", "Terms"),
+    "gridpeers.feeder": ("Feeder",),
+    "gridpeers.netem.models.own_fault": ("LinkFault",),
+    "gridpeers.runs.comparison": ("Comparison", "compare"),
+    "gridpeers.runs.result": ("Result", "Results"),
+    "gridpeers.runs.running": ("read",),
+    "gridpeers.runs.sweeping": ("sweep",),
+    "gridpeers.scenario": ("Scenario", "load"),
+    "gridpeers.scenarios.checks.check_verdict": ("Check", "CheckVerdict", "NotJudgedError", "Violation"),
+    "gridpeers.scenarios.checks.checked_case": ("CheckedCase",),
+    "gridpeers.scenarios.results.claims": ("Benchmark", "Claim", "Judge", "Published", "Verdict", "judge"),
+    "gridpeers.scenarios.results.window_metrics": ("WindowData",),
+    "gridpeers.scenarios.results.findings": ("Findings",),
+    "gridpeers.scenarios.results.run_files": ("FolderError",),
+    "gridpeers.scenarios.run_request": ("BrokenRunError",),
+    "gridpeers.scenarios.schema.loading": ("catalogue",),
+    "gridpeers.scenarios.schema.scenario_errors": ("ScenarioError",),
+    "gridpeers.wire.schema.plausible": ("Plausible", "Range", "Unit"),
+}
+"""Public names by their module."""
+
+_HOME = {name: f"{module}:{name}" for module, names in _NAMES.items() for name in names} | {
     "check": "gridpeers.scenarios.checks.check_registry:CHECKS.register",
     "claim": "gridpeers.scenarios.results.claims:CLAIMS.register",
-    "compare": "gridpeers.studies.comparison",
     "graph": "gridpeers.agents.graphs:GRAPHS.register",
     "law": "gridpeers.agents.carriers.law_registry:LAWS.register",
     "link_fault": "gridpeers.netem.models.own_fault:FAULTS.register",
-    "load": "gridpeers.scenario",
     "metric": "gridpeers.scenarios.results.metric:METRICS.register",
-    "read": "gridpeers.runs.running",
-    "sweep": "gridpeers.studies.sweeping",
+    "figures": "gridpeers.scenarios.results.plots.style",
+    "random_graphs": "gridpeers.scenarios.sweep.axes",
+    "sweep_files": "gridpeers.scenarios.sweep.sweep_reading",
 }
-"""Module of each public name, or `module:attributes`; it is imported when the name is first used (PEP 562)."""
+"""`module:attributes` of each public name, or a module; it is imported when the name is first used (PEP 562)."""
 
 _OF_ROOMS = ("Counterfactual", "Prediction", "counterfactual", "predict", "replay")
 """Public names that rooms above the face bring (`gridpeers.rooms`)."""
 
 __all__ = [
+    "Benchmark",
     "BrokenRunError",
     "Check",
     "CheckVerdict",
@@ -98,7 +106,9 @@ __all__ = [
     "Comparison",
     "Counterfactual",
     "Feeder",
+    "Findings",
     "FolderError",
+    "Judge",
     "Law",
     "LinkFault",
     "Neighbour",
@@ -106,6 +116,7 @@ __all__ = [
     "Own",
     "Plausible",
     "Prediction",
+    "Published",
     "Range",
     "Result",
     "Results",
@@ -115,6 +126,7 @@ __all__ = [
     "Term",
     "Terms",
     "Unit",
+    "Verdict",
     "Violation",
     "WindowData",
     "catalogue",
@@ -122,15 +134,19 @@ __all__ = [
     "claim",
     "compare",
     "counterfactual",
+    "figures",
     "graph",
+    "judge",
     "law",
     "link_fault",
     "load",
     "metric",
     "predict",
+    "random_graphs",
     "read",
     "replay",
     "sweep",
+    "sweep_files",
 ]
 
 if not TYPE_CHECKING:
@@ -147,7 +163,8 @@ if not TYPE_CHECKING:
             found = ROOMS.resolve(name)
         elif name in _HOME:
             module, _, attributes = _HOME[name].partition(":")
-            found = attrgetter(attributes or name)(import_module(module))
+            found = import_module(module)
+            found = attrgetter(attributes)(found) if attributes else found
         else:
             from gridpeers.wire.wording import suggestion
 

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 class Feeder(Tables, frozen=True, kw_only=True):
     """A feeder: its buses, branches, switches, loads and inverters. It never changes; methods return another one.
 
-    Examples
-    --------
     >>> feeder = Feeder.read("microgrid123")
     >>> feeder
     <Feeder microgrid123: buses 134, switches 10, inverters 9, loads 88>
@@ -47,10 +45,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
     def read(cls, name: str | Path, load_set: str = "main") -> Feeder:
         """Return a feeder that comes with gridpeers, by its name, or that of a folder of tables, by its path.
 
-        Raises
-        ------
-        gridpeers.plant.tables.FeederError
-            With every problem of its tables.
+        `gridpeers.plant.tables.FeederError` has every problem of its tables.
         """
         from gridpeers.plant.tables import read_feeder
 
@@ -66,23 +61,11 @@ class Feeder(Tables, frozen=True, kw_only=True):
         leave_out: Sequence[str] = (),
         switches: Sequence[str] = (),
     ) -> Feeder:
-        """Return the feeder of a script for OpenDSS; needs the extra `opendss`.
+        """Return the feeder of a script for OpenDSS, often Master.dss; needs the extra `opendss`.
 
-        Parameters
-        ----------
-        path : str or Path
-            The script, often Master.dss.
-        f_nom : float, optional
-            Nominal frequency (Hz); the script's if left out.
-        leave_out : sequence of str, optional
-            Elements to do without, as `Class.name`, with `*` for any: "PVSystem.*".
-        switches : sequence of str, optional
-            Lines that can be opened, beside those that the script calls switches.
-
-        Raises
-        ------
-        gridpeers.plant.tables.FeederError
-            With everything that the engine refuses, and everything that cannot be represented.
+        The nominal frequency (Hz) is the script's if left out. Elements to leave out are written `Class.name`, with
+        `*` for any: "PVSystem.*". The `switches` are lines that can be opened, beside those that the script calls so.
+        `gridpeers.plant.tables.FeederError` has all that the engine refuses, and all that cannot be represented.
         """
         return _imported("dss", path, f_nom, leave_out=leave_out, switches=switches)
 
@@ -97,21 +80,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
     ) -> Feeder:
         """Return the feeder of a model for GridLAB-D, once its controls rest; needs the extra `gridlabd`.
 
-        Parameters
-        ----------
-        path : str or Path
-            The model.
-        f_nom : float, optional
-            Nominal frequency (Hz); the model's if left out.
-        leave_out : sequence of str, optional
-            Objects to do without, as `class.name`, with `*` for any: "house.*".
-        switches : sequence of str, optional
-            Lines that can be opened, beside the model's switches, reclosers and sectionalizers.
-
-        Raises
-        ------
-        gridpeers.plant.tables.FeederError
-            With everything that GridLAB-D refuses, and everything that cannot be represented.
+        Its arguments are those of `from_opendss`, with objects as `class.name`, and lines that can be opened beside
+        the model's switches, reclosers and sectionalizers.
         """
         return _imported("glm", path, f_nom, leave_out=leave_out, switches=switches)
 
@@ -129,35 +99,24 @@ class Feeder(Tables, frozen=True, kw_only=True):
         m_q: float = 0.05,
         params: str | Mapping[str, Any] | GfmParameters | GflParameters | None = None,
     ) -> Feeder:
-        """Return the feeder with one inverter more.
+        """Return the feeder with one inverter more; ValueError says why there can be none.
 
         Parameters
         ----------
-        name : str
-            Its name, unique.
         bus : str
             A bus that has these phases, without another inverter on them.
         kind : {"GFM", "GFL"}
             Grid-forming or grid-following.
         P_rated : float
             Rated power (W, of all its phases).
-        phases : {"ABC", "A", "B", "C"}, optional
-            All three, or one for a single-phase inverter.
         neutral : str or int, optional
             Node of the bus to which its phases return, by its number or letter, or "earth"; by default the neutral to
             which loads return, else earth. Its V, P and Q are those between its phases and this node.
-        microgrid : str, optional
-            Microgrid it belongs to.
         m_p, m_q : float, optional
             Droops (pu frequency per pu power, pu voltage per pu reactive power).
         params : str, Mapping, GfmParameters or GflParameters, optional
             Its own parameters, which replace those of `[plant.gfm]` or `[plant.gfl]` of a scenario: the name of a set
             that the feeder has, some by their keys there ({"T_p_s": 0.02}), or all.
-
-        Raises
-        ------
-        ValueError
-            If the name or a phase of the bus is taken, the bus is not there or lacks a phase, or a value is wrong.
         """
         from gridpeers.plant.tables.parameter_sets import as_set
         from gridpeers.plant.tables.shunts import problems_of
@@ -198,19 +157,8 @@ class Feeder(Tables, frozen=True, kw_only=True):
         """Return the voltages that the substation alone gives: bus, phase, V (V), V_pu, angle_deg, to.
 
         They are 0 where it does not reach. Those of phases A, B and C count from the neutral of the bus, whose letter
-        is in `to`; those of other nodes, and of phases without a neutral, from earth: `to` is empty.
-
-        Parameters
-        ----------
-        open_switches : sequence of str, optional
-            Switches to open first.
-
-        Raises
-        ------
-        ValueError
-            If there is no substation, or no such switch.
-        ArithmeticError
-            If the feeder cannot carry its loads.
+        is in `to`; those of other nodes, and of phases without a neutral, from earth: `to` is empty. ValueError if
+        there is no substation, or no such switch; ArithmeticError if the feeder cannot carry its loads.
         """
         import numpy as np
         import pandas as pd
@@ -247,13 +195,7 @@ class Feeder(Tables, frozen=True, kw_only=True):
         return feeder_diagram(self, V)
 
     def save(self, folder: str | Path) -> Path:
-        """Write the tables into a folder, which a scenario names as `plant.feeder`; return its path.
-
-        Raises
-        ------
-        OSError
-            If the folder cannot be written.
-        """
+        """Write the tables into a folder, which a scenario names as `plant.feeder`; return its path."""
         from gridpeers.plant.tables.write import write_feeder
 
         write_feeder(self, Path(folder))

@@ -7,7 +7,18 @@ from typing import TYPE_CHECKING
 from gridpeers.scenarios.results import metrics
 from gridpeers.scenarios.results.event_windows import Window
 from gridpeers.scenarios.results.history import Flags, Floats, History, Nameplates
-from gridpeers.scenarios.results.metrics import MPSI, MQSI, Settling, V_error, mean_frequency, mean_voltage
+from gridpeers.scenarios.results.metric import DIGITS, HEADINGS, UNITS, Quantity, label
+from gridpeers.scenarios.results.metrics import (
+    F_BAND,
+    MPSI,
+    MPSI_BAND,
+    MQSI,
+    Settling,
+    Steady,
+    V_error,
+    mean_frequency,
+    mean_voltage,
+)
 from gridpeers.scenarios.results.steadiness import STEADY
 
 if TYPE_CHECKING:
@@ -15,16 +26,24 @@ if TYPE_CHECKING:
     from gridpeers.scenarios.schema import ScenarioModel
 
 __all__ = [
+    "DIGITS",
+    "F_BAND",
+    "HEADINGS",
     "MPSI",
+    "MPSI_BAND",
     "MQSI",
     "STEADY",
+    "UNITS",
     "Flags",
     "Floats",
     "History",
     "Nameplates",
+    "Quantity",
     "Settling",
+    "Steady",
     "V_error",
     "Window",
+    "label",
     "mean_frequency",
     "mean_voltage",
     "nameplates_of",

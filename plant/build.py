@@ -19,12 +19,8 @@ from gridpeers.plant.tables import read_feeder
 def start_plant(config: PlantConfig) -> LivePlant:
     """Start the plant of the configuration's simulator; its `close` ends it.
 
-    Raises
-    ------
-    FeederError
-        If the feeder's tables have problems.
-    RuntimeError
-        If it cannot start; the message says why, and what to do.
+    FeederError if the feeder's tables have problems. RuntimeError if it cannot start; the message says why, and what to
+    do.
     """
     if config.bridged:
         alone = replace(config, bridged=False)
@@ -37,12 +33,7 @@ def start_plant(config: PlantConfig) -> LivePlant:
 def build_plant(config: PlantConfig) -> Plant:
     """Read the feeder, find the initial operating point of our own plant, and load its step.
 
-    Raises
-    ------
-    FeederError
-        If the feeder's tables have problems.
-    PlantError
-        If there is no operating point.
+    FeederError if the feeder's tables have problems. PlantError if there is no operating point.
     """
     plant = plant_at_rest(config)
     plant.load_step()
@@ -50,15 +41,7 @@ def build_plant(config: PlantConfig) -> Plant:
 
 
 def plant_at_rest(config: PlantConfig) -> Plant:
-    """Return our plant at its initial operating point, for who takes no step: the step is not compiled.
-
-    Raises
-    ------
-    FeederError
-        If the feeder's tables have problems.
-    PlantError
-        If there is no operating point.
-    """
+    """Return our plant at its initial operating point, for who takes no step: the step is not compiled."""
     network = Network(_feeder(config), spares=config.settings.spares)
     return Plant(network, config.settings, config.T_c, config.record_step)
 

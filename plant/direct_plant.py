@@ -14,16 +14,7 @@ from gridpeers.wire.messages import Journal, Measurement, State, Telemetry
 class DirectPlant(LockstepPlant):
     """A plant whose agents all take part from t = 0 to the end, and which gets their states as they are.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents, the control period and the end; without schedule and emulated links.
-    plant : PlantLike
-        The plant at t = 0.
-    on_telemetry : Callable[[Telemetry], None]
-        Takes the telemetry, as it is.
-    on_journal : Callable[[Journal], None]
-        Takes the journal, if the configuration asks for one.
+    `config`: names the agents, the control period and the end; without schedule and emulated links.
     """
 
     def __init__(
@@ -37,13 +28,11 @@ class DirectPlant(LockstepPlant):
         assert not config.links
         super().__init__(config, plant)
         self._on_telemetry, self._on_own_journal = on_telemetry, on_journal
-        self._measured: list[Measurement] = []
-        """Measurements of this tick."""
+        self._measured: list[Measurement] = []  # measurements of this tick
         self._roster, self.phase = config.agents, "ticking"
         self._reporter.collect()
 
     def begin_tick(self) -> list[Measurement]:
-        """Return the measurements of this tick, one for each agent."""
         measurements = list(self._measurements())
         if self.tick == 0:
             self._report(final=False)

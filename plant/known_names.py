@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-LISTENING = "listening"
-"""Its session is open."""
+LISTENING = "listening"  # its session is open
 
 COMPILING = "compiling"
 """It is being built; its step is compiled first if there is no machine code of it, which takes up to a minute."""
 
-READY = "ready"
-"""It waits for agents."""
-
-
-SUBSTATION = "substation"
-"""Name of a substation that trips, in the text of the event, beside those of inverters."""
-
-F_BASE = 60.0
-"""Nominal frequency (Hz) of the standard's settings; at another one the defaults are in proportion."""
+READY = "ready"  # it waits for agents
+SUBSTATION = "substation"  # name of a substation that trips, in the text of the event, beside those of inverters
+F_BASE = 60.0  # nominal frequency (Hz) of the standard's settings; at another one the defaults are in proportion
 
 _FREQUENCY = {"OF2": (62.0, 0.16), "OF1": (61.2, 300.0), "UF1": (58.5, 300.0), "UF2": (56.5, 0.16)}
 
@@ -30,8 +23,6 @@ DEFAULTS: dict[str, dict[str, tuple[float, float]]] = {
 def defaults(category: str, f_nom: float) -> dict[str, tuple[float, float]]:
     """Return the default trip settings at a nominal frequency (Hz): threshold (pu or Hz) and clearing time (s).
 
-    Examples
-    --------
     >>> defaults("III", 60.0)["OF2"], defaults("III", 50.0)["UF1"]
     ((62.0, 0.16), (48.75, 300.0))
     """

@@ -27,7 +27,7 @@ from typing import Literal
 
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import PlantLike
-from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode
+from gridpeers.plant.plant_node import CLOSING, STAYS, PlantNode, TickActions
 from gridpeers.plant.telemetry_reporter import UnacknowledgedTelemetry, measurement_of
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.links import REPORT_TICKS, Links, is_usable
@@ -54,25 +54,12 @@ Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "clos
 TELEMETRY_TICKS = 10
 """Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
 
-AGAIN = 1.0
-"""Time (s) after which a question without an answer is asked again."""
-
-SILENT = 3.0
-"""Time (s) after a recorder's last word after which it counts as silent; it speaks every second."""
+AGAIN = 1.0  # time (s) after which a question without an answer is asked again
+SILENT = 3.0  # time (s) after a recorder's last word after which it counts as silent; it speaks every second
 
 
 class LockstepPlant(PlantNode):
-    """The plant under simulated time.
-
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents and recorders to wait for, the control period and the end.
-    plant : PlantLike
-        The plant at t = 0.
-    links : Links, optional
-        Emulated links to the plant; None for none.
-    """
+    """The plant under simulated time."""
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
         super().__init__(config, plant, links)
@@ -81,25 +68,21 @@ class LockstepPlant(PlantNode):
         self.reproducible = True
         self.phase: Phase = "gathering"
         self._plant = plant
-        joiners = self._schedule.joiners.difference(config.agents)
+        joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
         """All agents that may ever take part, in the order of the inverters."""
-        self._roster: tuple[str, ...] = ()
-        """Agents of the last roster sent."""
+        self._roster: tuple[str, ...] = ()  # agents of the last roster sent
         self._roster_number = -1
-        self._roster_changed = False
-        """Whether an agent has joined or gone since."""
+        self._roster_changed = False  # whether an agent has joined or gone since
         self._joining: tuple[str, ...] = ()
         """Newcomers that the held tick waits for: they may appear although the run has begun."""
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._last_heard = self._barrier.last_heard
-        self._ask_at = inf
-        """When open questions are asked again (s on the driver's clock)."""
+        self._ask_at = inf  # when open questions are asked again (s on the driver's clock)
         self._unacknowledged = UnacknowledgedTelemetry(config.recorders)
         self._recorders_at = dict.fromkeys(config.recorders, -inf)
         """When each recorder that the run waits for has spoken last (s on the driver's clock)."""
-        self._prepare_bytes = b""
-        """The last roster sent."""
+        self._prepare_bytes = b""  # the last roster sent
         self._states: dict[str, State] = {}
         for name in self._everyone:
             self.routes[self.keys.state(name)] = Route(name, (State,), self._on_state)
@@ -109,7 +92,6 @@ class LockstepPlant(PlantNode):
         if config.recorders:
             self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
-        """Keys to subscribe to before the token is declared."""
         self._tick_traffic: TickTraffic | None = None
         if self.journal is not None:
             self._tick_traffic = self.traffic = TickTraffic(self.keys, self._everyone, self.journal)
@@ -119,17 +101,14 @@ class LockstepPlant(PlantNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         return self.keys.control, self.keys.telemetry, *self._measurement_keys.values()
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return self.phase == "over"
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages that the plant needs to continue."""
         return self._barrier.messages_needed
 
     @property
@@ -139,13 +118,11 @@ class LockstepPlant(PlantNode):
         return None if deadline == inf else deadline
 
     def start(self, now: float) -> None:
-        """Start to wait for the agents."""
         self._barrier.renew(now)
         self._ask_at = now + AGAIN
         self._gather(now)
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Return the missing messages with their senders."""
         match self.phase:
             case "gathering":
                 absent = [name for name in self.config.recorders if name not in self._recorders]
@@ -157,7 +134,6 @@ class LockstepPlant(PlantNode):
         return ()
 
     def expire(self, now: float) -> None:
-        """Ask again, and end the run if the deadline has passed."""
         if now >= self._ask_at:
             self._ask_again(now)
         if self._barrier.is_over(now):
@@ -166,25 +142,24 @@ class LockstepPlant(PlantNode):
                 self._barrier.deadline = now + CLOSING
                 if self._unacknowledged.is_empty:
                     self._be_over()
-            elif self.phase in ("gathering", "joining") and self._recorder_is_silent(now):
+            elif self.phase in ("gathering", "joining") and any(
+                now > at + SILENT for at in self._recorders_at.values()
+            ):
                 self._barrier.renew(now)
             elif missing := self.missing_messages():  # else the last awaited message has just arrived
                 self.abort(self._barrier.complaint(missing, now), now)
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because of a failure."""
         if self.phase not in ("closing", "over"):
             self.outcome = reason
             self.reproducible = False
             self._close(reason, now)
 
-    interrupt = abort
-    """End the run because this process must leave."""
+    interrupt = abort  # end the run because this process must leave
 
     # ---------------------------------------------------------------- liveliness
 
     def _unmet(self, names: tuple[str, ...]) -> tuple[Awaited, ...]:
-        """Return the missing tokens and nameplates of these agents."""
         here = {name for name in names if self.members.instance(name)}
         tokens = [Awaited("token", name) for name in names if name not in here]
         met = self.members.nameplates
@@ -284,10 +259,6 @@ class LockstepPlant(PlantNode):
                 self._publish_aside(self.keys.telemetry, kept)
         self._close_if_alone()
 
-    def _recorder_is_silent(self, now: float) -> bool:
-        """Whether a recorder that the run waits for has not spoken for `SILENT`."""
-        return any(now > at + SILENT for at in self._recorders_at.values())
-
     def _publish(self, key: str, payload: bytes) -> None:
         if key == self.keys.telemetry:
             self._unacknowledged.keep(self._reporter.seq, payload)
@@ -300,7 +271,6 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- the roster
 
     def _gather(self, now: float) -> None:
-        """Prepare the first roster, if all agents and recorders are there."""
         enough = len(self.members.nameplates) >= len(self.config.agents)  # else it would ask n times for all n
         if self.phase == "gathering" and enough and not self.missing_messages():
             self._reporter.collect()
@@ -308,7 +278,6 @@ class LockstepPlant(PlantNode):
             assert set(self._roster) == set(self.config.agents)
 
     def _prepare(self, now: float) -> None:
-        """Send the next roster: all present agents."""
         self._roster = tuple(name for name in self._everyone if self.members.instance(name))
         self._roster_number += 1
         self._roster_changed = False
@@ -327,7 +296,7 @@ class LockstepPlant(PlantNode):
 
     def _let_leave_and_join(self, now: float) -> None:
         """Perform the scheduled leaves and deaths of this tick, and start to wait for its newcomers."""
-        leave, join, die = self._schedule.take(self.tick)
+        leave, join, die = self._schedule.pop(self.tick, TickActions())
         when = f"at t = {self.t:g} s, as the scenario says"
         for name in leave:
             self._dismiss(name, f"{name} leaves {when}")
@@ -356,15 +325,7 @@ class LockstepPlant(PlantNode):
         self._note_event("roster", name, text)
 
     def _connect(self, name: str, on: bool, now: float) -> None:
-        """Connect or disconnect an inverter."""
-        if self.outcome:
-            return
-        try:
-            self._plant.connect(name, on)
-        except RuntimeError as error:
-            self.cause = error
-            self.abort(f"plant at t = {self.t:g} s: {error}", now)
-        else:
+        if not self.outcome and self._operate(lambda: self._plant.connect(name, on), now):
             self._reporter.collect()
 
     # ---------------------------------------------------------------- ticks
@@ -407,14 +368,12 @@ class LockstepPlant(PlantNode):
             self._report(final=False)
 
     def _measurements(self) -> Iterator[Measurement]:
-        """Yield the measurement of this tick of each agent on the roster."""
         t, tick, epoch = self.t, self.tick, self.config.epoch
         readings = self._plant.measure()
         for name in self._roster:
             yield measurement_of(name, readings[name], epoch=epoch, tick=tick, t=t)
 
     def _finish_tick(self, now: float) -> None:
-        """Hold the set-points and advance."""
         if self._stops_for_a_law(now):
             return
         if self._tick_traffic is not None:
@@ -441,7 +400,12 @@ class LockstepPlant(PlantNode):
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         others = self._unacknowledged.others(self._reporter.seq)
-        self._telemetry(final=final, reproducible=self.reproducible, missing_agents=missing_agents, others=others)
+        sound, awaited = self.reproducible, missing_agents
+        self._send_all(
+            self._reporter.report(
+                self.t, final=final, outcome=self.outcome, reproducible=sound, awaited=awaited, others=others
+            )
+        )
 
     def _close(self, reason: str, now: float) -> None:
         if self._tick_traffic is not None:

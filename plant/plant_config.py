@@ -62,63 +62,45 @@ class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 class LoadEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Another power of a load from a scheduled time on."""
 
-    t: float
-    """Time (s), a multiple of h."""
-    load: str
-    """Name of the load, or of its bus."""
-    setting: LoadSetting
-    """Its power at nominal voltage; what is None stays as it is."""
+    t: float  # time (s), a multiple of h
+    load: str  # name of the load, or of its bus
+    setting: LoadSetting  # its power at nominal voltage; what is None stays as it is
 
 
 class PowerLimit(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Available power of a grid-following inverter from a scheduled time on, e.g. under clouds."""
 
-    t: float
-    """Time (s), a multiple of h."""
-    inverter: str
-    """Name of a GFL, e.g. "inv2"."""
-    P_max: float
-    """Upper bound of its P reference from then on (W)."""
+    t: float  # time (s), a multiple of h
+    inverter: str  # name of a GFL, e.g. "inv2".
+    P_max: float  # upper bound of its P reference from then on (W)
 
 
 class ScheduledAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A scheduled leave (with the inverter), death (without it) or join of an agent."""
 
-    t: float
-    """Time (s), a multiple of T_c."""
-    inverter: str
-    """Name, e.g. "inv2"."""
+    t: float  # time (s), a multiple of T_c
+    inverter: str  # name, e.g. "inv2".
     action: Literal["leave", "die", "join"]
 
 
 class InverterChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Values of one inverter that replace the feeder's table; None keeps the table's."""
 
-    m_p: float | None = None
-    """P-f droop (pu frequency per pu power)."""
-    m_q: float | None = None
-    """Q-V droop (pu voltage per pu reactive power)."""
-    P_rated: float | None = None
-    """Rated power (W)."""
-    parameters: str | None = None
-    """Name of the feeder's set of parameters, in place of the one that its table names."""
-    own: OwnParameters = OwnParameters()
-    """Parameters that replace those of that set and of its kind."""
+    m_p: float | None = None  # P-f droop (pu frequency per pu power)
+    m_q: float | None = None  # Q-V droop (pu voltage per pu reactive power)
+    P_rated: float | None = None  # rated power (W)
+    parameters: str | None = None  # name of the feeder's set of parameters, in place of the one that its table names
+    own: OwnParameters = OwnParameters()  # parameters that replace those of that set and of its kind
 
 
 class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Changes of a scenario to the tables of its feeder."""
 
-    f_nom: float | None = None
-    """Nominal frequency (Hz); None is the feeder's."""
-    load_factor: float = 1.0
-    """Factor on all loads, real and reactive power."""
-    m_p_factor: float = 1.0
-    """Factor on the P-f droops of all inverters without an m_p below."""
-    m_q_factor: float = 1.0
-    """Factor on the Q-V droops of all inverters without an m_q below."""
-    inverters: dict[str, InverterChange] = {}
-    """Changes by inverter."""
+    f_nom: float | None = None  # nominal frequency (Hz); None is the feeder's
+    load_factor: float = 1.0  # factor on all loads, real and reactive power
+    m_p_factor: float = 1.0  # factor on the P-f droops of all inverters without an m_p below
+    m_q_factor: float = 1.0  # factor on the Q-V droops of all inverters without an m_q below
+    inverters: dict[str, InverterChange] = {}  # changes by inverter
 
 
 Method = Literal["first-order", "second-order"]
@@ -129,36 +111,24 @@ Method = Literal["first-order", "second-order"]
 class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
     """All settings that determine the plant's numbers; of older records, others are passed over."""
 
-    simulator: str = "gridpeers"
-    """What simulates the plant: a name in `gridpeers.plant.simulators.SIMULATORS`."""
+    simulator: str = "gridpeers"  # what simulates the plant: a name in `gridpeers.plant.simulators.SIMULATORS`
     simulators: dict[str, dict[str, Any]] = {}
     """Own table of each simulator that the scenario has, as a tree, by the simulator's name."""
-    feeder: str = "microgrid123"
-    """Name of a feeder in `plant/data`, or a path to a folder of the same layout."""
-    load_set: str = "main"
-    """Which load table of the feeder: "main" or "event2"."""
-    h: float = 0.002
-    """Integration step (s)."""
-    method: Method = "first-order"
-    """Method of time stepping."""
-    P_set0: float = 0.647
-    """First P_set of every inverter (pu of its rating)."""
-    V_set0: float = 1.0
-    """First V_set of every inverter (pu of its nominal voltage)."""
+    feeder: str = "microgrid123"  # name of a feeder in `plant/data`, or a path to a folder of the same layout
+    load_set: str = "main"  # which load table of the feeder: "main" or "event2"
+    h: float = 0.002  # integration step (s)
+    method: Method = "first-order"  # method of time stepping
+    P_set0: float = 0.647  # first P_set of every inverter (pu of its rating)
+    V_set0: float = 1.0  # first V_set of every inverter (pu of its nominal voltage)
     gfm: GfmParameters = GfmParameters()
     gfl: GflParameters = GflParameters()
     protection: Protection = Protection()
-    events: tuple[SwitchEvent, ...] = ()
-    """Switches operated on schedule."""
+    events: tuple[SwitchEvent, ...] = ()  # switches operated on schedule
     sync_check: SyncCheck = SyncCheck()
-    limits: tuple[PowerLimit, ...] = ()
-    """Scheduled changes of available power."""
-    loads: tuple[LoadEvent, ...] = ()
-    """Scheduled changes of loads."""
-    changes: FeederChanges = FeederChanges()
-    """Changes to the feeder's tables."""
-    spares: tuple[str, ...] = ()
-    """Spare inverters of the run, off at the start."""
+    limits: tuple[PowerLimit, ...] = ()  # scheduled changes of available power
+    loads: tuple[LoadEvent, ...] = ()  # scheduled changes of loads
+    changes: FeederChanges = FeederChanges()  # changes to the feeder's tables
+    spares: tuple[str, ...] = ()  # spare inverters of the run, off at the start
 
 
 OnLawFailure = Literal["droop", "stop"]
@@ -168,11 +138,9 @@ OnLawFailure = Literal["droop", "stop"]
 class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Configuration of the plant process (JSON on its standard input)."""
 
-    run: str
-    """Name of the run, part of every key."""
+    run: str  # name of the run, part of every key
     settings: PlantSettings
-    agents: tuple[str, ...]
-    """Agents the plant waits for before tick 0."""
+    agents: tuple[str, ...]  # agents the plant waits for before tick 0
     agent_processes: int | msgspec.UnsetType = msgspec.UNSET
     """Processes that carry these agents, each with one link to the plant; unset, as in a record: one each."""
     schedule: tuple[ScheduledAction, ...] = ()
@@ -180,44 +148,30 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     bridged: str | bool = False
     """Simulator, e.g. "helics", by which inverters without an agent follow set-points of programs outside; False: none.
     Older records have True."""
-    T_c: float
-    """Control period (s), a multiple of h."""
+    T_c: float  # control period (s), a multiple of h
     end: float | None
     """Duration of the run (s), a multiple of T_c; None, in wall-clock time only: until a person ends it."""
-    record_step: float
-    """Distance of the recorded rows (s): a multiple of h that divides T_c."""
-    deadline: float
-    """Longest wait for any agent (s)."""
-    listen: tuple[str, ...]
-    """Endpoints the plant listens on; the rendezvous of the run."""
+    record_step: float  # distance of the recorded rows (s): a multiple of h that divides T_c
+    deadline: float  # longest wait for any agent (s)
+    listen: tuple[str, ...]  # endpoints the plant listens on; the rendezvous of the run
     links: dict[str, Any] = {}
     """Emulated links to the plant: `gridpeers.scenarios.emulation.link_data`, a tree: the plant knows no netem.
     Empty: none."""
-    connect: tuple[str, ...] = ()
-    """Endpoints the plant connects to, beside listening."""
-    star: bool = False
-    """Whether the plant relays all messages, in simulated time: the agents have one link each."""
-    recorders: tuple[str, ...] = ()
-    """Recorders of the telemetry that the plant waits for before tick 0."""
-    epoch: int = 1
-    """Epoch of this process; see `gridpeers.wire.membership`."""
-    clock: Literal["simulated", "wall"] = "simulated"
-    """Lock-step with the agents, or real time."""
-    speed: float = 1.0
-    """Wall-clock: run time per wall time (s/s), > 0."""
-    max_age: float = 0.25
-    """Wall-clock: age (s of run time) beyond which agents do not use a neighbour's state."""
+    connect: tuple[str, ...] = ()  # endpoints the plant connects to, beside listening
+    star: bool = False  # whether the plant relays all messages, in simulated time: the agents have one link each
+    recorders: tuple[str, ...] = ()  # recorders of the telemetry that the plant waits for before tick 0
+    epoch: int = 1  # epoch of this process; see `gridpeers.wire.membership`
+    clock: Literal["simulated", "wall"] = "simulated"  # lock-step with the agents, or real time
+    speed: float = 1.0  # wall-clock: run time per wall time (s/s), > 0
+    max_age: float = 0.25  # wall-clock: age (s of run time) beyond which agents do not use a neighbour's state
     wait_for_agents: float = 10.0
     """Wall-clock: longest wait (s) for the agents; then the plant starts without the missing ones."""
-    strict: bool = False
-    """Wall-clock: whether the run breaks when it cannot keep pace."""
+    strict: bool = False  # wall-clock: whether the run breaks when it cannot keep pace
     agent_configs: dict[str, dict[str, Any]] = {}
     """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""
-    record: RecordLevel = "physics"
-    """How much this process notes in its journal, which a recorder gets."""
+    record: RecordLevel = "physics"  # how much this process notes in its journal, which a recorder gets
     credentials: Credentials | None = None
     """Certificate of this process and members of its site; None: links are open."""
-    on_law_failure: OnLawFailure = "droop"
-    """What follows when the law of an agent fails."""
+    on_law_failure: OnLawFailure = "droop"  # what follows when the law of an agent fails
     feeder_map: dict[str, Any] = {}
     """Wall-clock: the one-line diagram (`gridpeers.scenarios.live.feeder_map`) as a tree, for clients."""

@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 
 
-class ReadingLike(Protocol):
-    """Sensor readings of one inverter; units as in `gridpeers.wire.messages.Measurement`."""
+class Reading(NamedTuple):
+    """Sensor readings of one inverter."""
 
-    @property
-    def P(self) -> float: ...
-    @property
-    def Q(self) -> float: ...
-    @property
-    def V(self) -> float: ...
-    @property
-    def f(self) -> float: ...
-    @property
-    def P_set(self) -> float: ...
-    @property
-    def V_set(self) -> float: ...
-    @property
-    def grid_connected(self) -> bool: ...
-    @property
-    def island(self) -> str: ...
+    P: float  # real power out (W)
+    Q: float  # reactive power out (var)
+    V: float  # mean terminal voltage (V, line-to-neutral)
+    f: float  # frequency (Hz)
+    P_set: float  # set-point held (W)
+    V_set: float  # set-point held (V)
+    grid_connected: bool  # whether the substation feeds its island
+    island: str
+    """"grid", or the name of the first inverter in its island; `OFF` for one that is off the network or idle."""
 
 
 class PlantLike(Protocol):
     """The part of a plant that the lock-step uses; `gridpeers.plant.feeder.Plant` has it."""
 
     @property
-    def inverters(self) -> tuple[str, ...]:
-        """Names of the inverters."""
-        ...
+    def inverters(self) -> tuple[str, ...]: ...
 
-    def measure(self) -> Mapping[str, ReadingLike]:
-        """Read all sensors now."""
-        ...
+    def measure(self) -> Mapping[str, Reading]: ...
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
         """Take set-points (W, V)."""
@@ -63,9 +52,7 @@ class PlantLike(Protocol):
         """
         ...
 
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        """Take out the events since the last call."""
-        ...
+    def take_events(self) -> tuple[PlantEvent, ...]: ...
 
     def close(self) -> None:
         """End what belongs to the plant outside of this process, after a good end and after a bad one."""

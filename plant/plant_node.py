@@ -18,99 +18,48 @@ from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import JournalBuffer
 from gridpeers.wire.keys import check_name
 from gridpeers.wire.links import Links, arrived
-from gridpeers.wire.messages import PLANT, Journal, LinkReport, Pacing, PlantEvent, State, Stop, Telemetry
+from gridpeers.wire.messages import PLANT, Journal, LinkReport, PlantEvent, State, Stop, Telemetry
 from gridpeers.wire.node import Node
 from gridpeers.wire.timing import ticks_until, time_of
 from gridpeers.wire.wording import printable
 
 
 class TickActions(NamedTuple):
-    """Scheduled joins, leaves and deaths of one tick."""
-
-    leave: tuple[str, ...] = ()
-    """Inverters whose agents leave."""
-    join: tuple[str, ...] = ()
-    """Inverters whose agents join."""
-    die: tuple[str, ...] = ()
-    """Inverters whose agents die."""
+    leave: tuple[str, ...] = ()  # inverters whose agents leave
+    join: tuple[str, ...] = ()  # inverters whose agents join
+    die: tuple[str, ...] = ()  # inverters whose agents die
 
 
-class AgentSchedule:
-    """Scheduled joins, leaves and deaths of a run, by tick.
+def agent_schedule(config: PlantConfig, inverters: tuple[str, ...]) -> dict[int, TickActions]:
+    """Return the scheduled joins, leaves and deaths of a run, by tick.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        Has the schedule and the control period.
-    inverters : tuple[str, ...]
-        The plant's inverters.
-
-    Raises
-    ------
-    ValueError
-        If an action names no inverter of the plant, or its time is no tick after 0.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.plant_config import PlantSettings, ScheduledAction
-    >>> leave = ScheduledAction(t=2.0, inverter="inv2", action="leave")
-    >>> config = PlantConfig(run="demo", settings=PlantSettings(), agents=("inv1", "inv2"), T_c=0.02, end=5.0,
-    ...     record_step=0.01, deadline=10.0, listen=(), schedule=(leave,))
-    >>> AgentSchedule(config, ("inv1", "inv2")).take(100)
-    TickActions(leave=('inv2',), join=(), die=())
+    ValueError if an action names no inverter of the plant, or its time is no tick after 0.
     """
-
-    def __init__(self, config: PlantConfig, inverters: tuple[str, ...]) -> None:
-        self._at: dict[int, TickActions] = {}
-        for action in config.schedule:
-            if action.inverter not in inverters:
-                raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
-            tick = round(action.t / config.T_c)
-            if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
-                raise ValueError(
-                    f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
-                    f"{config.T_c:g} s, got {action.t:g} s"
-                )
-            actions = self._at.get(tick, TickActions())
-            names = (*getattr(actions, action.action), action.inverter)
-            self._at[tick] = actions._replace(**{action.action: names})
-
-    @property
-    def joiners(self) -> frozenset[str]:
-        """Names of the agents that are yet to join."""
-        return frozenset(name for actions in self._at.values() for name in actions.join)
-
-    def take(self, tick: int) -> TickActions:
-        """Return the actions of a tick, and forget them."""
-        return self._at.pop(tick, TickActions())
+    at: dict[int, TickActions] = {}
+    for action in config.schedule:
+        if action.inverter not in inverters:
+            raise ValueError(f'schedule: no inverter "{action.inverter}"; inverters are {", ".join(inverters)}')
+        tick = round(action.t / config.T_c)
+        if tick < 1 or abs(tick * config.T_c - action.t) > 1e-9 * max(1.0, action.t):
+            raise ValueError(
+                f"schedule: {action.inverter} must {action.action} at a positive multiple of the control period "
+                f"{config.T_c:g} s, got {action.t:g} s"
+            )
+        actions = at.get(tick, TickActions())
+        at[tick] = actions._replace(**{action.action: (*getattr(actions, action.action), action.inverter)})
+    return at
 
 
-CLOSING = 2.0
-"""Longest wait (s) for the other nodes to close."""
-
-MOST_RECORDERS = 20
-"""Recorders that are noted beside those that the run waits for: anybody may hold tokens."""
-
-STAYS = "its inverter stays on primary droop at its last set-points"
-"""State of the inverter whose agent has died."""
-
-IDLE = "; its agent is idle, its inverter stays on primary droop"
-"""End of the event of a law that failed."""
+CLOSING = 2.0  # longest wait (s) for the other nodes to close
+MOST_RECORDERS = 20  # recorders that are noted beside those that the run waits for: anybody may hold tokens
+STAYS = "its inverter stays on primary droop at its last set-points"  # state of the inverter whose agent has died
+IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the event of a law that failed
 
 
 class PlantNode(Node):
     """The plant as a participant of a run.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        Names the agents and recorders to wait for, the control period and the end.
-    plant : PlantLike
-        The plant at t = 0.
-    links : Links or None
-        Emulated links to the plant; None for none.
-    rate : float, optional
-        Most messages of one sender per s of run time; see `gridpeers.wire.membership`.
+    `rate`: most messages of one sender per s of run time; see `gridpeers.wire.membership`.
     """
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:
@@ -119,12 +68,9 @@ class PlantNode(Node):
             check_name("agents", name)
             if name not in plant.inverters:
                 raise ValueError(f'agents: no inverter "{name}"; inverters are {", ".join(plant.inverters)}')
-        self.outcome = ""
-        """Why the run broke; empty while it is sound."""
-        self.cause: Exception | None = None
-        """Error of the plant that broke the run, if any."""
-        self.tick = 0
-        """k: the plant is at k T_c."""
+        self.outcome = ""  # why the run broke; empty while it is sound
+        self.cause: Exception | None = None  # error of the plant that broke the run, if any
+        self.tick = 0  # k: the plant is at k T_c
         self.config = config
         self._inverters = tuple(plant.inverters)
         self._links = links
@@ -132,24 +78,20 @@ class PlantNode(Node):
         self._recorders: set[str] = set()
         self._tokens: set[str] = set()
         """Present tokens of agents and recorders that take part; while it closes, also of agents told to stop."""
-        self._schedule = AgentSchedule(config, plant.inverters)
+        self._schedule = agent_schedule(config, plant.inverters)
         self._reporter = Reporter(config.epoch, plant)
         if config.record != "physics":
             self.journal = JournalBuffer()
         self._awaits_journals = self.journal is not None and config.clock == "wall"
         """Whether agents send the end of their journals when they close."""
-        self._last_due = False
-        """Whether the run has ended and the last telemetry is still to be sent."""
-        self._failed_laws: dict[str, str] = {}
-        """By agent, why its law failed."""
+        self._last_due = False  # whether the run has ended and the last telemetry is still to be sent
+        self._failed_laws: dict[str, str] = {}  # by agent, why its law failed
 
     @property
     def token(self) -> str:
-        """Key of the plant's liveliness token."""
         return self.keys.alive_plant(self.config.epoch)
 
     def use_links(self, links: Links) -> None:
-        """Use other emulated links from now on."""
         self._links = links
 
     @property
@@ -198,7 +140,6 @@ class PlantNode(Node):
         return known or len(self._recorders) < MOST_RECORDERS
 
     def _is_taken(self, name: str, instance: str) -> bool:
-        """Whether another process holds a name."""
         return self.members.instance(name) not in ("", instance)
 
     def _refusal(self, name: str, instance: str) -> str:
@@ -206,7 +147,6 @@ class PlantNode(Node):
         raise NotImplementedError
 
     def _refuse(self, name: str, instance: str, reason: str, now: float) -> None:
-        """Tell a process that it cannot take part."""
         self.stop(self.keys.stop_request(name, instance), reason, refused=True)
 
     def _recorder_came(self, name: str, now: float) -> None:
@@ -216,7 +156,6 @@ class PlantNode(Node):
         """Note that a recorder's token is gone."""
 
     def _agent_gone(self, name: str, now: float) -> None:
-        """Note that the process that took part for a name is gone."""
         raise NotImplementedError
 
     def _close_if_alone(self) -> None:
@@ -226,7 +165,6 @@ class PlantNode(Node):
     # ---------------------------------------------------------------- the plant itself
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because of a failure."""
         raise NotImplementedError
 
     def _operate(self, operation: Callable[[], object], now: float) -> bool:
@@ -247,7 +185,6 @@ class PlantNode(Node):
             self._note_event("link", name, text)
 
     def _note_event(self, kind: Literal["law", "link", "roster", "warning"], subject: str, text: str) -> None:
-        """Note an event at the plant's time."""
         self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
@@ -257,7 +194,6 @@ class PlantNode(Node):
         self._publish(key, encode(stop))
 
     def _note_state(self, state: State) -> None:
-        """Note a failed law or a quiet state."""
         if state.fault:
             self._failed_laws.setdefault(state.sender, state.fault)
             self._note_event("law", state.sender, f"{state.sender}: {state.fault}{IDLE}")
@@ -285,11 +221,9 @@ class PlantNode(Node):
             self.stop(self.keys.stop_request(report.sender, report.instance), "its report is here")
 
     def _on_journal(self, journal: Journal, payload: bytes, now: float) -> None:
-        """Pass on a part of an agent's journal."""
         self._publish(self.keys.telemetry, payload)
 
     def _report_journal(self, *, last: bool = False) -> None:
-        """Send the own journal since the last report."""
         self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
 
     def _report_links(self, *, last: bool = False) -> None:
@@ -300,32 +234,11 @@ class PlantNode(Node):
         """Send telemetry, with the names of agents to start."""
         raise NotImplementedError
 
-    def _telemetry(
-        self,
-        *,
-        final: bool,
-        reproducible: bool,
-        missing_agents: tuple[str, ...] = (),
-        pacing: Pacing | None = None,
-        impaired: tuple[str, ...] = (),
-        others: int = 0,
-    ) -> None:
-        """Send rows and events."""
-        messages = self._reporter.report(
-            self.t,
-            final=final,
-            outcome=self.outcome,
-            reproducible=reproducible,
-            pacing=pacing,
-            awaited=missing_agents,
-            impaired=impaired,
-            others=others,
-        )
+    def _send_all(self, messages: Iterable[Telemetry]) -> None:
         for message in messages:
             self._send(message)
 
     def _send(self, message: Telemetry) -> None:
-        """Send a message of telemetry."""
         self._publish(self.keys.telemetry, encode(message))
 
     # ---------------------------------------------------------------- the end
@@ -344,7 +257,6 @@ class PlantNode(Node):
         return not self._tokens
 
     def _send_the_last(self) -> None:
-        """Send the last telemetry, unless it is sent already."""
         if self._last_due:
             self._last_due = False
             self._report_journal(last=True)

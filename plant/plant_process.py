@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import gc
 import logging
-import sys
 from collections.abc import Callable
+from functools import partial
 from time import monotonic
 
 import msgspec
@@ -21,11 +21,10 @@ from gridpeers.wire.driver.machine import OpenFilesError, check_open_files, sche
 from gridpeers.wire.driver.process import ConfigurationError, MakeLinks, new_epoch, no_links
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.messages import PLANT
-from gridpeers.wire.packages import not_importable
+from gridpeers.wire.wording import not_importable
 
 
 def build(config: PlantConfig) -> LivePlant:
-    """Start the configuration's plant."""
     from gridpeers.plant.build import (
         start_plant,  # numba and scipy take a second: import them only once the session is open
     )
@@ -33,10 +32,7 @@ def build(config: PlantConfig) -> LivePlant:
     return start_plant(config)
 
 
-def print_word(word: str) -> None:
-    """Print a word at once, for the parent process."""
-    sys.stdout.write(word + "\n")
-    sys.stdout.flush()
+print_word = partial(print, flush=True)  # at once, for the parent process
 
 
 def run_plant(
@@ -49,26 +45,11 @@ def run_plant(
 
     The session opens first, because it is the rendezvous: the agents find each other while the plant is built.
 
-    Parameters
-    ----------
-    config : PlantConfig
-        The plant, its agents and its times.
-    builder : Callable[[PlantConfig], LivePlant], optional
-        Builds the plant; tests have smaller ones.
-    make_links : MakeLinks, optional
-        Makes the emulated links to the plant, if there are any.
-    on_word : Callable[[str], None], optional
-        Receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
+    `on_word`: receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
 
-    Returns
-    -------
-    str
-        Why the run broke; empty after a good end.
+    Return why the run broke; empty after a good end.
 
-    Raises
-    ------
-    ConfigurationError, SessionError
-        If the configuration cannot work.
+    ConfigurationError, SessionError if the configuration cannot work.
     """
     log = logging.getLogger("plant")
     wall = config.clock == "wall"

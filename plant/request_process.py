@@ -17,26 +17,18 @@ from time import monotonic
 from types import MappingProxyType
 from typing import Any
 
-REMOVER = 'read _; rm -rf -- "$0"'
-"""Program of the shell that waits for the end of its standard input."""
+REMOVER = 'read _; rm -rf -- "$0"'  # program of the shell that waits for the end of its standard input
 
 
 class TransientFolder:
     """A temporary folder that is removed when it is closed, or when all its users have ended, also by kill -9.
 
     A process that is killed can remove nothing. So a shell waits at a pipe until nobody holds its other end any more.
-
-    Parameters
-    ----------
-    prefix
-        Beginning of its name.
     """
 
     def __init__(self, prefix: str) -> None:
         self.path = Path(tempfile.mkdtemp(prefix=prefix))
-        """Where it is."""
-        end, self.user = os.pipe()
-        """File descriptor; the folder stays while a process has inherited it and runs."""
+        end, self.user = os.pipe()  # file descriptor; the folder stays while a process has inherited it and runs
         command = ["sh", "-c", REMOVER, str(self.path)]
         self._remover = subprocess.Popen(command, stdin=end, cwd="/", start_new_session=True)
         os.close(end)
@@ -51,20 +43,12 @@ class TransientFolder:
 
 
 def no_room(what: str, reason: str, folder: Path | None = None) -> str:
-    """Return words for something that a process cannot write into a temporary folder; the system's when left out.
-
-    Examples
-    --------
-    >>> no_room("the answer", "[Errno 28] No space left on device").replace(tempfile.gettempdir(), "/tmp")
-    'the answer cannot be written in /tmp ([Errno 28] No space left on device); make room there, raise the limit of \
-file sizes (ulimit -f), or set TMPDIR to another folder'
-    """
+    """Return words for something that a process cannot write into a temporary folder; the system's when left out."""
     remedy = "make room there, raise the limit of file sizes (ulimit -f), or set TMPDIR to another folder"
     return f"{what} cannot be written in {folder or tempfile.gettempdir()} ({reason}); {remedy}"
 
 
-ROOT = str(Path(__file__).parents[2])
-"""Folder of our packages."""
+ROOT = str(Path(__file__).parents[2])  # folder of our packages
 
 
 def program(module: str, *arguments: str) -> list[str]:
@@ -84,19 +68,8 @@ class ProcessEndedError(RuntimeError):
 class RequestProcess:
     """A program that is asked on standard input and answers on standard output; its standard error is kept.
 
-    Parameters
-    ----------
-    command
-        The program and its arguments.
-    folder
-        Where it stands, and which stays as long as it does; None: where this process stands.
-    environment
-        Variables that it has beside those of this process.
-
-    Raises
-    ------
-    OSError
-        If there is no such program.
+    `folder`: where it stands, and which stays as long as it does; None: where this process stands; `environment`:
+    variables that it has beside those of this process.
     """
 
     def __init__(
@@ -129,12 +102,10 @@ class RequestProcess:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     @property
     def closed(self) -> bool:
-        """Whether it was closed."""
         return self._log.closed
 
     def send(self, request: Mapping[str, Any]) -> None:
@@ -146,10 +117,7 @@ class RequestProcess:
     def answer(self, until: float) -> dict[str, Any] | None:
         """Return the next answer; None if it has not come by a time of `monotonic` (s).
 
-        Raises
-        ------
-        ProcessEndedError
-            If the process has ended.
+        ProcessEndedError if the process has ended.
         """
         while b"\n" not in self._unread:
             if not self._selector.select(max(0.0, until - monotonic())):
@@ -165,7 +133,6 @@ class RequestProcess:
         return answer
 
     def printed(self) -> str:
-        """Return what the program has printed on standard error."""
         return os.pread(self._log.fileno(), os.fstat(self._log.fileno()).st_size, 0).decode(errors="replace")
 
     def close(self, patience: float = 0.0) -> None:

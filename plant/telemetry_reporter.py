@@ -9,16 +9,15 @@ from typing import get_type_hints
 
 from msgspec.structs import replace
 
-from gridpeers.plant.plant_interface import PlantLike, ReadingLike
+from gridpeers.plant.plant_interface import PlantLike, Reading
 from gridpeers.wire.messages import PLANT, VALUES, Measurement, Pacing, PlantEvent, Telemetry
 from gridpeers.wire.wording import printable
 
-_NUMBER_BYTES = 9
-"""Bytes of one float in msgpack."""
+_NUMBER_BYTES = 9  # bytes of one float in msgpack
 
 
 def measurement_of(
-    name: str, reading: ReadingLike, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] | None = None
+    name: str, reading: Reading, *, epoch: int, tick: int, t: float, roster: tuple[str, ...] | None = None
 ) -> Measurement:
     """Return the measurement of one inverter (t in s) from its reading, within the range of a sensor.
 
@@ -52,58 +51,37 @@ def _scale(field: str) -> Callable[[float], float]:
 
 _in_W, _in_V, _in_Hz = _scale("P"), _scale("V"), _scale("f")
 
-_LATEST = 20
-"""Number of latest events for late clients: with twice as many of the longest, an answer is still short."""
-
-
-ROWS_BYTES = 32_000
-"""Bytes of rows in a message: Zenoh sends it in one piece."""
-
-EVENTS = 30
-"""Most events in a message; the longest possible ones fit within the limit."""
+_LATEST = 20  # number of latest events for late clients: with twice as many of the longest, an answer is still short
+ROWS_BYTES = 32_000  # bytes of rows in a message: Zenoh sends it in one piece
+EVENTS = 30  # most events in a message; the longest possible ones fit within the limit
 
 
 class Reporter:
-    """Gather rows and events between two reports.
-
-    Parameters
-    ----------
-    epoch : int
-        Epoch of the plant.
-    plant : PlantLike
-        Source of the rows.
-    """
+    """Gather rows and events between two reports."""
 
     def __init__(self, epoch: int, plant: PlantLike) -> None:
         self._epoch, self._plant = epoch, plant
         self._rows: list[tuple[float, ...]] = []
         self._events: list[PlantEvent] = []
-        self._quiet: dict[float, int] = {}
-        """Number of quiet states, by run time (s)."""
-        self.seq = 0
-        """Number of the next Telemetry, or of the one under way."""
-        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)
-        """The latest events, for late clients."""
+        self._quiet: dict[float, int] = {}  # number of quiet states, by run time (s)
+        self.seq = 0  # number of the next Telemetry, or of the one under way
+        self.latest: deque[PlantEvent] = deque(maxlen=_LATEST)  # the latest events, for late clients
 
     @property
     def has_events(self) -> bool:
-        """Whether events wait for the next report."""
         return bool(self._events)
 
     def collect(self) -> None:
-        """Take the plant's new rows and events."""
         self._rows += self._plant.take_rows()
         for event in self._plant.take_events():
             self.note(event)
 
     def note(self, event: PlantEvent) -> None:
-        """Add an event."""
         event = replace(event, subject=printable(event.subject, 200), text=printable(event.text))
         self._events.append(event)
         self.latest.append(event)
 
     def note_quiet(self, t: float) -> None:
-        """Count a quiet state at run time t (s)."""
         self._quiet[t] = self._quiet.get(t, 0) + 1
 
     def report(
@@ -156,18 +134,16 @@ WINDOW = 1_000_000
 without its reader, so Zenoh has no reason to close it."""
 
 
+def count_last(kept: deque[tuple[int, bytes]], number: int) -> int:
+    """Return how many of the last messages count to the Telemetry of this number."""
+    return sum(1 for _ in takewhile(lambda message: message[0] == number, reversed(kept)))
+
+
 class UnacknowledgedTelemetry:
     """Messages for the recorders that a run waits for; without any, nothing is kept.
 
     Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
 
-    Parameters
-    ----------
-    recorders : Iterable[str]
-        Names of the recorders.
-
-    Examples
-    --------
     >>> kept = UnacknowledgedTelemetry(["history"])
     >>> for number, payload in [(0, b"T0"), (1, b"L1"), (1, b"T1")]:
     ...     kept.keep(number, payload)
@@ -178,13 +154,11 @@ class UnacknowledgedTelemetry:
     """
 
     def __init__(self, recorders: Iterable[str]) -> None:
-        self._needed = dict.fromkeys(recorders, 0)
-        """Number of the Telemetry that each recorder needs next."""
+        self._needed = dict.fromkeys(recorders, 0)  # number of the Telemetry that each recorder needs next
         self._kept: deque[tuple[int, bytes]] = deque()
         self._bytes = 0
 
     def keep(self, number: int, payload: bytes) -> None:
-        """Keep a message that counts to the Telemetry of this number."""
         if self._needed:
             self._kept.append((number, payload))
             self._bytes += len(payload)
@@ -202,7 +176,7 @@ class UnacknowledgedTelemetry:
 
     def others(self, number: int) -> int:
         """Return the number of messages that count to a Telemetry that is yet to be kept."""
-        return sum(1 for _ in takewhile(lambda kept: kept[0] == number, reversed(self._kept)))
+        return count_last(self._kept, number)
 
     @property
     def is_full(self) -> bool:
@@ -211,5 +185,4 @@ class UnacknowledgedTelemetry:
 
     @property
     def is_empty(self) -> bool:
-        """Whether the recorders have everything."""
         return not self._kept

@@ -193,7 +193,7 @@ def page(topic: str) -> str:
 def _keys() -> Iterator[str]:
     yield from ("# Keys of a run", "")
     header = ("key", "kind", "message", "from", "to", "when")
-    rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.describe())
+    rows = ((f"`{s.expression}`", s.kind, s.message, s.sender, s.listener, s.when) for s in keys.KEY_SPECS)
     yield from markdown_table(header, rows)
 
 

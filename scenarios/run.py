@@ -28,7 +28,7 @@ from gridpeers.scenarios.versions import version_of, versions
 from gridpeers.wire.driver.ending import OutputLostError
 from gridpeers.wire.driver.machine import too_few_files
 from gridpeers.wire.messages import Pacing
-from gridpeers.wire.packages import not_importable
+from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.live.departures import Departures

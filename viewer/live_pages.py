@@ -39,8 +39,14 @@ class LivePages:
         self._looks_only = looks_only(where.credentials)
         self._agents = OwnAgents(where)
 
-    def begin(self) -> None:
-        """Note the loop that runs now, which serves the pages."""
+    def close(self) -> None:
+        """End what pages have begun."""
+        self._worker.shutdown(cancel_futures=True)
+        self._actions.close()
+        self._agents.close()
+
+    def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
+        """Return what sends a page its frames, and what carries out its actions."""
         loop = asyncio.get_running_loop()
 
         def wake() -> None:
@@ -52,19 +58,6 @@ class LivePages:
                 loop.call_soon_threadsafe(wake)
 
         self._follower.on_news(on_news)
-
-    def end(self) -> None:
-        """Forget the loop."""
-        self._follower.on_news(lambda: None)
-
-    def close(self) -> None:
-        """End what pages have begun."""
-        self._worker.shutdown(cancel_futures=True)
-        self._actions.close()
-        self._agents.close()
-
-    def talk(self, socket: WebSocket) -> tuple[Talk, Talk]:
-        """Return what sends a page its frames, and what carries out its actions."""
         return self._send(socket), self._receive(socket)
 
     async def _send(self, socket: WebSocket) -> None:

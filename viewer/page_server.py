@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import errno
 import hashlib
 import logging
@@ -78,14 +77,6 @@ Talk = Coroutine[Any, Any, None]
 class Pages(Protocol):
     """What the pages show: a live run, or records."""
 
-    def begin(self) -> None:
-        """Begin to serve, in the loop that runs now."""
-        ...
-
-    def end(self) -> None:
-        """Serve no more."""
-        ...
-
     def close(self) -> None:
         """End what pages have begun; no loop runs any more."""
         ...
@@ -134,16 +125,7 @@ class PageServer:
                 Route("/static/{name}", self._static),
                 WebSocketRoute("/frames", self._page),
             ],
-            lifespan=self._lifespan,
         )
-
-    @contextlib.asynccontextmanager
-    async def _lifespan(self, app: Starlette) -> AsyncIterator[None]:
-        self._pages.begin()
-        yield
-        self._pages.end()
-
-    # ---- who may see it
 
     def _admits(self, connection: HTTPConnection) -> bool:
         """Return whether a request comes from our own page: under a name of ours, and not from a page of others."""
@@ -186,8 +168,6 @@ class PageServer:
         if found is None or found.suffix not in KINDS or not self._admits(request):
             return _answer("not found", 404, "text/plain")
         return _answer(found.read_text(), 200, KINDS[found.suffix])
-
-    # ---- a page that is open
 
     async def _page(self, socket: WebSocket) -> None:
         from starlette.websockets import WebSocketDisconnect

@@ -24,7 +24,7 @@ from gridpeers.viewer.run_view import EventView
 from gridpeers.wire.bounds import Text
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.driver.command_line import command_line
-from gridpeers.wire.plugins.foreign_code import ANYTHING, named
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
@@ -61,12 +61,6 @@ class RecordPages:
     def __init__(self, run: RecordedRun) -> None:
         self._run = run
         self._worker = ThreadPoolExecutor(1, "record")
-
-    def begin(self) -> None:
-        """Begin to serve."""
-
-    def end(self) -> None:
-        """Serve no more."""
 
     def close(self) -> None:
         """End the thread that reads."""

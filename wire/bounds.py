@@ -128,7 +128,6 @@ _TEXT = re.compile(_PRINTABLE)
 
 
 def is_name(text: str) -> bool:
-    """Whether a text is a `Name`."""
     return _PATTERN.fullmatch(text) is not None
 
 

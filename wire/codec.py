@@ -12,6 +12,7 @@ import re
 import traceback
 from collections import Counter
 from collections.abc import Callable
+from functools import lru_cache
 from math import isfinite
 from typing import Any, TypeVar
 from zlib import crc32
@@ -52,13 +53,7 @@ _latest: tuple[bytes | None, AnyMessage] = (None, None)  # type: ignore[assignme
 _decoder: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
 
 
-TRACED = 40
-"""Number of a traceback's last lines in the log."""
-
-
 class RejectedError(Exception):
-    """A message that must be dropped."""
-
     def __init__(self, kind: str, text: str) -> None:
         super().__init__(text)
         self.kind = kind
@@ -96,8 +91,21 @@ def decode(payload: bytes) -> AnyMessage:
     return message
 
 
+_HEAD = 160
+"""Bytes in which type, name and epoch stand."""
+
+
+@lru_cache(maxsize=4096)
+def _mark(sender: str, epoch: int) -> bytes:
+    return b"\xa6sender" + _encoder.encode(sender) + b"\xa5epoch" + _encoder.encode(epoch)
+
+
+def is_marked(payload: bytes, sender: str, epoch: int) -> bool:
+    """Whether a payload begins as a message of this sender in this epoch does."""
+    return _mark(sender, epoch) in payload[:_HEAD]
+
+
 def sound(payload: bytes) -> AnyMessage | None:
-    """Return the message of a payload; None if no receiver of this version would take it."""
     try:
         return decode(payload)
     except RejectedError:
@@ -120,7 +128,6 @@ def _kind(text: str, payload: bytes) -> str:
 
 
 def _is_finite(value: Any) -> bool:
-    """Whether all numbers of a message are finite."""
     if isinstance(value, float):
         return isfinite(value)
     if isinstance(value, dict):
@@ -144,21 +151,16 @@ class RejectedMessages:
                 f"{self._who}: dropped a message on {key}: {kind} ({KINDS[kind]}): {printable(text, 200)}. "
                 "More of this kind are only counted. See docs/protocol.md"
             )
-            self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-TRACED:])]))
+            self._lines.append("\n".join([line, *(printable(row, 200) for row in trace.splitlines()[-40:])]))
         self.counts[kind] += count
 
     def failed(self, key: str, error: Exception) -> None:
-        """Count a message that raised an error of ours; call it while that error is caught."""
         trace = "" if self.counts["failed"] else traceback.format_exc()
         self.add("failed", key, f"{type(error).__name__}: {error}", trace)
 
-    @property
-    def has_lines(self) -> bool:
-        """Whether there are log lines to take."""
-        return bool(self._lines)
-
     def take_lines(self) -> tuple[str, ...]:
-        """Take out the log lines since the last call."""
+        if not self._lines:
+            return ()
         lines, self._lines = tuple(self._lines), []
         return lines
 
@@ -168,22 +170,10 @@ T = TypeVar("T")
 
 
 def decode_foreign(decode: Callable[[Text], T], data: Text) -> T:
-    """Return the value that bytes or a text encode.
+    """Return the value that bytes or a text encode; raise `msgspec.DecodeError` in one printable line if there is none.
 
-    Raises
-    ------
-    msgspec.DecodeError
-        If they encode no such value; in one printable line. msgspec itself has other errors for a text that is no UTF-8
-        and for brackets a thousand deep, and repeats the name of a field that it does not know as it came.
-
-    Examples
-    --------
-    >>> numbers = msgspec.json.Decoder(list[float])
-    >>> decode_foreign(numbers.decode, b"[1.5]")
-    [1.5]
-    >>> decode_foreign(msgspec.json.Decoder().decode, b"[" * 2000)
-    Traceback (most recent call last):
-    msgspec.DecodeError: maximum recursion depth exceeded while deserializing an object
+    msgspec itself has other errors for a text that is no UTF-8 and for brackets a thousand deep, and repeats the name
+    of a field that it does not know as it came.
     """
     try:
         return decode(data)

@@ -34,6 +34,9 @@ LOT = 32_000
 ROOM = 1_000_000
 """Bytes that a journal holds at most: what comes beyond, as in a flood of messages, is counted only."""
 
+NOTED_REJECTED = 200
+"""Rejected messages that are noted between two times at which a journal is taken; the others are counted only."""
+
 COUNTED_KEYS = 200
 """Keys and kinds of which a part counts messages; all further ones are counted by their kind alone."""
 
@@ -46,8 +49,6 @@ class Entry(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=
 
 
 class KeyEntry(Entry, frozen=True, array_like=True):
-    """An entry about a key."""
-
     at: float | None
     """Time on the own clock (s, monotonic), of a message its arrival; None in simulated time."""
     key: str
@@ -190,9 +191,7 @@ _encode_into = msgspec.msgpack.Encoder().encode_into
 
 
 class JournalBuffer:
-    """Entries since the last part."""
-
-    __slots__ = ("_bytes", "_ends", "_lost", "_rejected")
+    __slots__ = ("_bytes", "_counts", "_ends", "_lost", "_rejected")
 
     def __init__(self) -> None:
         self._bytes = bytearray()
@@ -200,14 +199,15 @@ class JournalBuffer:
         """Entries that found no room."""
         self._ends: list[int] = []
         """Ends of the entries that a part may end with."""
-        self._rejected: dict[tuple[str, str], RejectedCount] = {}
+        self._rejected = 0
+        """Rejected messages that are noted."""
+        self._counts: dict[tuple[str, str], RejectedCount] = {}
         """Messages that are only counted, by key and kind."""
 
     def __len__(self) -> int:
         return len(self._bytes)
 
     def add(self, entry: Entry) -> None:
-        """Add an entry at the end, if there is room."""
         if len(self._bytes) > ROOM:
             self._lost += 1
             return
@@ -218,20 +218,28 @@ class JournalBuffer:
         if len(self._bytes) - (self._ends[-1] if self._ends else 0) >= LOT:
             self._ends.append(len(self._bytes))
 
+    def add_rejected(self, entry: ReceivedMessage | MessageReference) -> None:
+        """Add an entry about a rejected message, or count it if there are many: floods must not fill the record."""
+        self._rejected += 1
+        if self._rejected <= NOTED_REJECTED:
+            self.add(entry)
+        else:
+            self.count(RejectedCount(entry.at, entry.key, entry.rejected, 1))
+
     def count(self, rejected: RejectedCount) -> None:
         """Add to the entry about one key and kind; these come after all others, whatever room there is."""
-        if len(self._rejected) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._rejected:
+        if len(self._counts) >= COUNTED_KEYS and (rejected.key, rejected.kind) not in self._counts:
             rejected = replace(rejected, key="")
-        before = self._rejected.get((rejected.key, rejected.kind))
+        before = self._counts.get((rejected.key, rejected.kind))
         if before is not None:
             rejected = replace(rejected, count=before.count + rejected.count)
-        self._rejected[rejected.key, rejected.kind] = rejected
+        self._counts[rejected.key, rejected.kind] = rejected
 
     def take_parts(self) -> list[bytes]:
-        """Take out all entries, in parts of about `LOT` bytes."""
-        for rejected in self._rejected.values():
+        for rejected in self._counts.values():
             self._append(rejected)
-        self._rejected.clear()
+        self._counts.clear()
+        self._rejected = 0
         if self._lost:
             self._append(ProcessEvent(None, "lost", f"{self._lost} entries: more than {ROOM} bytes"))
             self._lost = 0
@@ -259,12 +267,10 @@ TO_LINKS = ("link_request", "command")
 
 
 def kind_of(key: str) -> str:
-    """Return the kind of a key."""
     return key.partition("/")[0]
 
 
 def name_of(key: str) -> str:
-    """Return the inverter that a key is about; empty if it is about none."""
     return key.partition("/")[2]
 
 

@@ -27,8 +27,6 @@ class Arrival(NamedTuple):
 
 
 class CommandEffect(NamedTuple):
-    """Effect of a link command."""
-
     text: str
     """The command in words, in one line; a heal names the links that it heals."""
     receivers: tuple[str, ...]
@@ -52,16 +50,10 @@ class Links(Protocol):
         """Number of messages that the links have lost, of all senders."""
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
-        """Take a message off the wire and return True; return False if no fault ever acts on its link.
+        """Take a message off the wire at this time (s) and return True; return False if no fault ever acts on its link.
 
-        Parameters
-        ----------
-        message : State or Measurement
-            The message. Its number finds its random numbers; its time decides which faults act on it.
-        payload : bytes
-            Bytes of the message; a link uses their size, and may corrupt them.
-        at : float
-            Present time (s): the arrival time over a link without fault.
+        The number of the message finds its random numbers; its time decides which faults act on it. A link uses the
+        size of the payload, and may corrupt it.
         """
 
     def due(self, now: float) -> Sequence[Arrival]:
@@ -73,10 +65,7 @@ class Links(Protocol):
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Apply a link command to messages sent at t (s of run time) or later.
 
-        Raises
-        ------
-        ValueError
-            If the tree is no link command, or a value is wrong; then nothing has changed.
+        Raise ValueError if the tree is no link command, or a value is wrong; then nothing has changed.
         """
 
     def node_events(self, t: float) -> Sequence[tuple[str, str]]:

@@ -36,11 +36,8 @@ PERSISTENT = 50
 class Admission:
     """The valid epoch of each name, and the last numbers of its messages.
 
-    Parameters
-    ----------
-    rate : float, optional
-        Most messages of one sender per s of run time: a larger gap in the numbers is not counted as lost. In simulated
-        time numbers are ticks, and each is awaited.
+    `rate` is how many messages one sender sends at most per s of run time: a larger gap in the numbers is not counted
+    as lost. In simulated time numbers are ticks, and each is awaited.
     """
 
     def __init__(self, rate: float = inf) -> None:
@@ -65,15 +62,12 @@ class Admission:
         self.epochs[name] = epoch
 
     def release(self, name: str) -> None:
-        """Note that a name has no valid epoch any more, because its token is gone."""
         self.epochs.pop(name, None)
 
     def epoch(self, name: str) -> int | None:
-        """Return the valid epoch of a name; None if there is none."""
         return self.epochs.get(name)
 
     def lives(self, message: AnyMessage) -> bool:
-        """Whether a message has the valid epoch of its sender."""
         return self.epochs.get(message.sender) == message.epoch
 
     def check(self, message: AnyMessage) -> None:
@@ -91,10 +85,7 @@ class Admission:
     def take(self, message: AnyMessage) -> int:
         """Note the number of a message off the wire; return how many are missing between it and the last.
 
-        Raises
-        ------
-        RejectedError
-            If a later message has arrived before.
+        Raise RejectedError if a later message has arrived before.
         """
         name, seq, t = message.sender, message.seq, message.t
         missed = 0
@@ -194,7 +185,6 @@ class Membership:
         self.changes += 1
 
     def prefer(self, name: str, instance: str) -> None:
-        """Let one process of a name count as soon as its token is there."""
         self._preferred[name] = instance
         self._put_first(name)
         self._update(name)
@@ -207,10 +197,7 @@ class Membership:
     def meet(self, instance: str, nameplate: Nameplate) -> bool:
         """Take the answer of a process; return whether it is the first answer of a process that counts.
 
-        Raises
-        ------
-        RejectedError
-            If the process has no token, or its nameplate has changed.
+        Raise RejectedError if the process has no token, or its nameplate has changed.
         """
         name = nameplate.sender
         if instance not in self._instances.get(name, ()):
@@ -225,7 +212,6 @@ class Membership:
 
     @property
     def unmet(self) -> Iterator[tuple[str, str]]:
-        """Name and instance of the processes that have not answered."""
         every = ((name, instance) for name, instances in self._instances.items() for instance in instances)
         return (process for process in every if process not in self._answers)
 
@@ -237,7 +223,6 @@ class Membership:
         return unmet[begin : self._asked]
 
     def clear(self) -> None:
-        """Forget all members."""
         self.changes += 1
         for name in self.nameplates:
             self._admission.release(name)

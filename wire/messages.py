@@ -11,7 +11,7 @@ k and `t` is k T_c.
 from __future__ import annotations
 
 from math import inf
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 import msgspec
 
@@ -427,27 +427,9 @@ class Telemetry(Message, frozen=True, tag=True, forbid_unknown_fields=True, kw_o
 
 
 AnyMessage = (
-    Nameplate
-    | Measurement
-    | State
-    | Prepare
-    | Waiting
-    | Ready
-    | Stop
-    | Leave
-    | LinkReport
-    | Journal
-    | LinkRequest
-    | LinkAcknowledgement
-    | Command
-    | Answer
-    | AgentStatus
-    | Telemetry
-)
+    Nameplate | Measurement | State | Prepare | Waiting | Ready | Stop | Leave | LinkReport | Journal | LinkRequest
+    | LinkAcknowledgement | Command | Answer | AgentStatus | Telemetry
+)  # fmt: skip
 """Every type of message."""
 
-MESSAGES = (
-    Nameplate, Measurement, State, Prepare, Waiting, Ready, Stop, Leave, LinkReport, Journal, LinkRequest,
-    LinkAcknowledgement, Command, Answer, AgentStatus, Telemetry,
-)  # fmt: skip
-"""The types of `AnyMessage`, for documentation made from the code."""
+MESSAGES: tuple[type[Message], ...] = get_args(AnyMessage)

@@ -10,6 +10,7 @@ owns it in one thread and does
     for action in node.take_actions(): ...                  to perform the actions, in this order
     node.expire(now)                                        when `node.deadline` has passed
     node.lost(loss, now)                                    for messages and tokens that it has dropped unread
+    for line in node.take_rejects(): ...                    for its log
 
 until `node.finished`, the last actions included. `now` is the driver's clock (s).
 
@@ -25,19 +26,16 @@ from functools import partial
 from math import inf
 from typing import Any, NamedTuple, Protocol
 
-from gridpeers.wire.backlog import TOKENS, Loss, is_marked
-from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode
+from gridpeers.wire.codec import RejectedError, RejectedMessages, decode, encode, is_marked
 from gridpeers.wire.journal import JournalBuffer
-from gridpeers.wire.keys import Keys
+from gridpeers.wire.keys import Keys, epoch_of
 from gridpeers.wire.links import Links
 from gridpeers.wire.membership import Admission, Membership
-from gridpeers.wire.messages import AnyMessage, Journal, LinkReport, Message, Nameplate
+from gridpeers.wire.messages import PLANT, AnyMessage, Journal, LinkReport, Message, Nameplate
 from gridpeers.wire.traffic import Traffic
 
 
 class Publish(NamedTuple):
-    """Publish bytes on a key."""
-
     key: str
     payload: bytes
 
@@ -51,8 +49,6 @@ class Fetch(NamedTuple):
 
 
 class Listen(NamedTuple):
-    """Subscribe to a key, before any later request."""
-
     key: str
 
 
@@ -63,28 +59,28 @@ class WithdrawToken(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Write a line to the log."""
-
     text: str
 
 
 Action = Publish | Fetch | Listen | WithdrawToken
 
+TOKENS = "alive/**"
+"""Key under which all tokens that are dropped are counted, as there are as many of their own as anybody likes."""
 
-class RejectLines(Protocol):
-    """The log lines of rejected messages, as `RejectedMessages` has them."""
 
-    @property
-    def has_lines(self) -> bool: ...
-    def take_lines(self) -> tuple[str, ...]: ...
+class Loss(NamedTuple):
+    """Messages on one key, or tokens, that the driver has dropped unread."""
+
+    key: str
+    kind: str
+    """One of `gridpeers.wire.codec.KINDS`."""
+    text: str
+    """The problem of the first of them."""
+    number: int
 
 
 class Core(Protocol):
     """The part of a node that a driver uses; it asks `is_known` and `is_noted` in any thread."""
-
-    @property
-    def rejects(self) -> RejectLines:
-        """Rejected messages."""
 
     @property
     def tokens(self) -> tuple[str, ...]:
@@ -112,6 +108,7 @@ class Core(Protocol):
 
     def start(self, now: float) -> None: ...
     def take_actions(self) -> Sequence[Action | Log]: ...
+    def take_rejects(self) -> tuple[str, ...]: ...
     def appeared(self, key: str, now: float) -> None: ...
     def vanished(self, key: str, now: float) -> None: ...
     def received(self, key: str, payload: bytes, now: float) -> None: ...
@@ -165,7 +162,6 @@ class Node:
 
     @property
     def name(self) -> str:
-        """Name under which it sends."""
         return self._name
 
     @property
@@ -175,20 +171,24 @@ class Node:
 
     @property
     def tokens(self) -> tuple[str, ...]:
-        """Keys of the own tokens: one."""
         return (self.token,)
 
     @property
+    def watched(self) -> str:
+        return self.keys.any_alive
+
+    @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         raise NotImplementedError
 
     def take_actions(self) -> list[Action | Log]:
-        """Take out the actions to perform now, in this order."""
         if not self._actions:
             return []
         actions, self._actions = self._actions, []
         return actions
+
+    def take_rejects(self) -> tuple[str, ...]:
+        return self.rejects.take_lines()
 
     def received(self, key: str, payload: bytes, now: float) -> None:
         """Take a message; count and drop it if it cannot be used. After the end, ignore it."""
@@ -219,19 +219,13 @@ class Node:
             self.traffic.received(key, payload, now, rejected_as)
 
     def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of the sender of its key, in its epoch: `gridpeers.wire.backlog`.
-
-        Any thread may ask.
-        """
+        """Whether a message looks like one of the sender of its key, in its epoch; any thread may ask."""
         route = self.routes.get(key)
         epoch = None if route is None else self.admission.epochs.get(route.sender)
         return route is not None and epoch is not None and is_marked(payload, route.sender, epoch)
 
     def is_noted(self, key: str) -> bool:
-        """Whether the holder of a token is noted, so that its end must be known; see `gridpeers.wire.backlog`.
-
-        Any thread may ask.
-        """
+        """Whether the holder of a token is noted, so that its end must be known; any thread may ask."""
         match self.keys.parts(key):
             case ("alive", "agent", name, instance):
                 return self.members.notes(name, instance)
@@ -243,11 +237,6 @@ class Node:
         self.rejects.add(loss.kind, key, loss.text, count=loss.number)
         if self.traffic is not None:
             self.traffic.lost(key, loss.kind, loss.number, now)
-
-    @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
-        return self.keys.any_alive
 
     # ---------------------------------------------------------------- nameplates
 
@@ -262,7 +251,6 @@ class Node:
         return False
 
     def _ask(self, name: str, instance: str) -> None:
-        """Ask a process for its nameplate."""
         key = self.keys.nameplate(name, instance)
         self.routes[key] = Route(name, (Nameplate,), partial(self._on_nameplate, instance), early=True)
         self._actions.append(Fetch(key))
@@ -276,7 +264,6 @@ class Node:
         """Note the nameplate of an agent that counts from now on."""
 
     def _forget_process(self, name: str, instance: str) -> bool:
-        """Note that the token of a process is gone; return whether the process counted."""
         self.routes.pop(self.keys.nameplate(name, instance), None)
         return self.members.vanished(name, instance)
 
@@ -321,7 +308,6 @@ class Node:
             self._publish(key, encode(journal))
 
     def _take_journal(self, epoch: int, t: float, *, empty: bool = False) -> Iterator[Journal]:
-        """Take out the journal since the last part."""
         if self.journal is None:
             return
         for data in self.journal.take_parts() or ([b""] if empty else []):
@@ -331,7 +317,6 @@ class Node:
     def _publish_link_reports(
         self, key: str, links: Links | None, epoch: int, *, t: float = 0.0, instance: str = "", last: bool = False
     ) -> None:
-        """Publish the account of the emulated links into this node since the last report."""
         parts = () if links is None else links.report(last=last)
         for data in parts:
             final = last and bool(instance) and data is parts[-1]
@@ -339,7 +324,66 @@ class Node:
             self._publish(key, encode(report))
 
     def _say(self, text: str) -> None:
-        """Log a line."""
         if self.traffic is not None:
             self.traffic.line(text)
         self._actions.append(Log(f"{self._name}: {text}"))
+
+
+MOST_PLANTS = 64
+"""Plants of one run that may hold tokens: two, while one replaces another; some that a recorder has outlived."""
+
+
+class PlantFollower(Node):
+    """A node that follows the present plant that sends first, until its token is gone; an agent, or a recorder."""
+
+    def __init__(self, name: str, run: str, rate: float = inf) -> None:
+        super().__init__(name, run, rate)
+        self._plants: set[int] = set()
+        """Epochs of the present plants."""
+
+    def _plant_appeared(self, part: str) -> bool:
+        """Note a plant's token by its last part; return False if that is no epoch, or one of too many."""
+        epoch = epoch_of(part)
+        if epoch is None:
+            return False
+        if len(self._plants) >= MOST_PLANTS and epoch not in self._plants:
+            text = f"the token of one more plant; {MOST_PLANTS} hold tokens"
+            self.rejects.add("excess", self.keys.alive_plant(epoch), text)
+            return False
+        self._plants.add(epoch)
+        return True
+
+    def _plant_vanished(self, part: str) -> bool:
+        """Note that a plant's token is gone; return whether this node has no plant now."""
+        if (epoch := epoch_of(part)) not in self._plants:
+            return False
+        self._plants.discard(epoch)
+        followed = self.admission.epoch(PLANT)
+        if followed == epoch:
+            self.admission.release(PLANT)
+        return followed == epoch or not self._plants
+
+    def is_noted(self, key: str) -> bool:
+        match self.keys.parts(key):
+            case ("alive", "plant", part):
+                return epoch_of(part) in self._plants
+        return super().is_noted(key)
+
+    def is_known(self, key: str, payload: bytes) -> bool:
+        route = self.routes.get(key)
+        of_plant = route is not None and route.sender == PLANT
+        return super().is_known(key, payload) or (
+            of_plant and any(is_marked(payload, PLANT, epoch) for epoch in tuple(self._plants))
+        )
+
+    def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
+        """Check a message; first follow its plant if this node follows none."""
+        epoch = message.epoch
+        if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
+            self._check_certificate(PLANT)
+            self.admission.bind(PLANT, epoch)
+            self._follow(epoch)
+        super()._admit(route, message, now)
+
+    def _follow(self, epoch: int) -> None:
+        """Note the epoch of the plant that this node follows from now on."""

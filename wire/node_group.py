@@ -13,13 +13,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-from gridpeers.wire.backlog import Loss
-from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Publish, WithdrawToken
+from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Loss, Publish, WithdrawToken
 
 
 class GroupedNode(Core, Protocol):
-    """The part of an agent's node that its group uses."""
-
     session_broken: bool
 
     @property
@@ -45,8 +42,6 @@ class _Query(NamedTuple):
 
 
 class NodeGroup:
-    """Nodes behind one session, as one `Core`."""
-
     def __init__(self, nodes: Sequence[GroupedNode]) -> None:
         self.nodes = tuple(nodes)
         self.nameplates = dict(node.nameplate for node in nodes)
@@ -54,7 +49,6 @@ class NodeGroup:
         names = frozenset(node.name for node in nodes)
         for node in nodes:
             node.note_siblings(names)
-        self.rejects = _GroupRejects(self.nodes)
         self._now = 0.0
         self._start_anew()
 
@@ -74,17 +68,14 @@ class NodeGroup:
 
     @property
     def tokens(self) -> tuple[str, ...]:
-        """Keys of the own tokens."""
         return tuple(node.token for node in self._active)
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         return tuple(key for node in self.nodes for key in node.publications)
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the tokens are declared."""
         for node in self._active:
             for key in node.subscriptions:
                 self._listen(node, key)
@@ -94,7 +85,6 @@ class NodeGroup:
 
     @property
     def watched(self) -> str:
-        """Tokens to watch."""
         return self.nodes[0].watched
 
     @property
@@ -114,7 +104,6 @@ class NodeGroup:
 
     @property
     def deadline(self) -> float | None:
-        """The earliest deadline (s); None if no node has one."""
         return min((node.deadline for node in self._active if node.deadline is not None), default=None)
 
     def start(self, now: float) -> None:
@@ -135,31 +124,31 @@ class NodeGroup:
     def take_actions(self) -> list[Action | Log]:
         """Take out the actions of all nodes; what concerns the group alone is done on the way."""
         actions: list[Action | Log] = []
-        before = -1
-        while before != len(actions) or self._has_finished:
+        goes_on = True
+        while goes_on:  # what stays inside leads to further actions
             before = len(actions)
             for node in tuple(self._active):
                 for action in node.take_actions():
                     self._perform(node, action, actions)
-            self._let_go(actions)
+            goes_on = self._let_go(actions) or len(actions) > before
         return actions
 
+    def take_rejects(self) -> tuple[str, ...]:
+        return tuple(line for node in self.nodes for line in node.take_rejects())
+
     def appeared(self, key: str, now: float) -> None:
-        """Note a token from outside."""
         if key not in self.tokens:
             self._now = now
             for node in self._active:
                 node.appeared(key, now)
 
     def vanished(self, key: str, now: float) -> None:
-        """Note a lost token from outside."""
         if key not in self.tokens:
             self._now = now
             for node in self._active:
                 node.vanished(key, now)
 
     def received(self, key: str, payload: bytes, now: float) -> None:
-        """Take a message, or the answer to a query."""
         self._now = now
         query = self._open.pop(key, None)
         if query is not None:
@@ -169,7 +158,6 @@ class NodeGroup:
             node.received(key, payload, now)
 
     def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of the sender of its key, to any of the nodes."""
         return any(node.is_known(key, payload) for node in tuple(self._listeners.get(key, ())))
 
     def is_noted(self, key: str) -> bool:
@@ -180,7 +168,7 @@ class NodeGroup:
         return any(node.is_noted(key) for node in tuple(self._active))
 
     def lost(self, loss: Loss, now: float) -> None:
-        """Count messages and tokens that the driver has dropped unread; who waits for a lost answer asks again."""
+        """As `Node.lost`; who waits for a lost answer asks again."""
         query = self._open.pop(loss.key, None)
         if query is not None:
             self._queries.pop(loss.key.partition("#")[0], None)
@@ -188,12 +176,10 @@ class NodeGroup:
             node.lost(loss, now)
 
     def work(self, now: float) -> bool:
-        """Let every node do a piece of work; return whether one did."""
         self._now = now
         return any([node.work(now) for node in self._active])
 
     def expire(self, now: float) -> None:
-        """Let the nodes act whose deadline has passed."""
         self._now = now
         for node in self._active:
             if node.deadline is not None and now >= node.deadline:
@@ -239,35 +225,16 @@ class NodeGroup:
         else:
             query.askers.append(node)
 
-    @property
-    def _has_finished(self) -> bool:
-        return any(node.finished and not node.session_broken for node in self._active)
-
-    def _let_go(self, actions: list[Action | Log]) -> None:
-        """Withdraw the tokens of the nodes that have finished; to the others inside they are gone."""
-        for node in tuple(self._active):
-            if node.finished and not node.session_broken:
-                actions.extend(node.take_actions())
-                self._active.remove(node)
-                for listeners in self._listeners.values():
-                    if node in listeners:
-                        listeners.remove(node)
-                actions.append(WithdrawToken(node.token))
-                for other in self._active:
-                    other.vanished(node.token, self._now)
-
-
-class _GroupRejects:
-    """The rejected messages of all nodes, as the driver logs them."""
-
-    def __init__(self, nodes: Sequence[GroupedNode]) -> None:
-        self._all = [node.rejects for node in nodes]
-
-    @property
-    def has_lines(self) -> bool:
-        """Whether there are log lines to take."""
-        return any(rejects.has_lines for rejects in self._all)
-
-    def take_lines(self) -> tuple[str, ...]:
-        """Take out the log lines since the last call."""
-        return tuple(line for rejects in self._all for line in rejects.take_lines())
+    def _let_go(self, actions: list[Action | Log]) -> bool:
+        """Withdraw the tokens of nodes that have finished; to the others inside they are gone. Return if any has."""
+        ended = [node for node in self._active if node.finished and not node.session_broken]
+        for node in ended:
+            actions.extend(node.take_actions())
+            self._active.remove(node)
+            for listeners in self._listeners.values():
+                if node in listeners:
+                    listeners.remove(node)
+            actions.append(WithdrawToken(node.token))
+            for other in self._active:
+                other.vanished(node.token, self._now)
+        return bool(ended)

@@ -35,10 +35,7 @@ class TextFileError(ValueError):
 def text_of(data: bytes) -> str:
     """Return the text of a file, with line ends as Python has them.
 
-    Raises
-    ------
-    TextFileError
-        If its bytes do not tell the encoding.
+    Raise TextFileError if its bytes do not tell the encoding.
     """
     encoding = _encoding(data)
     try:
@@ -56,13 +53,7 @@ def text_of(data: bytes) -> str:
 
 
 def script_of(data: bytes) -> str:
-    """Return the text of a script of another program; bytes that are not UTF-8 are those of Windows.
-
-    Examples
-    --------
-    >>> [script_of("bus São".encode(encoding)) for encoding in ("latin-1", "utf-16", "utf-16-be", "utf-8-sig")]
-    ['bus São', 'bus São', 'bus São', 'bus São']
-    """
+    """Return the text of a script of another program; bytes that are not UTF-8 are those of Windows."""
     encoding = _encoding(data)
     try:
         return data.decode(encoding)
@@ -81,18 +72,11 @@ def _encoding(data: bytes) -> str:
 
 
 class TextTable(NamedTuple):
-    """A table of texts with one header line.
-
-    Attributes
-    ----------
-    header : list[str]
-        Names of the columns.
-    rows : list[tuple[int, list[str]]]
-        Line number and cells of each row that is not empty. Numbers have decimal points.
-    """
+    """A table of texts with one header line."""
 
     header: list[str]
     rows: list[tuple[int, list[str]]]
+    """Line number and cells of each row that is not empty. Numbers have decimal points."""
 
 
 def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str]) -> TextTable:
@@ -103,10 +87,7 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
 
     `known` are the columns that the table may have, `numbers` those of them that have numbers.
 
-    Raises
-    ------
-    TextFileError
-        If it is no text, no table, or a number has two meanings.
+    Raise TextFileError if it is no text, no table, or a number has two meanings.
     """
     text = text_of(data)
     lines = text.splitlines() or [""]

@@ -13,23 +13,12 @@ def time_of(tick: int, T_c: float) -> float:
 
     It is a product and not a running sum, so every process computes the same bits for the same tick; it is rounded to
     the nanosecond, like the plant's rows.
-
-    Examples
-    --------
-    >>> time_of(3, 0.02)
-    0.06
     """
     return round(tick * T_c, 9)
 
 
 def ticks_until(end: float, T_c: float) -> int:
-    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c.
-
-    Examples
-    --------
-    >>> ticks_until(7.0, 0.02)
-    350
-    """
+    """Return the number of control periods T_c (s) from 0 to `end` (s), which must be a multiple of T_c."""
     if T_c <= 0.0:
         raise ValueError(f"T_c: the control period must be positive, got {T_c:g} s")
     ticks = round(end / T_c)
@@ -39,28 +28,14 @@ def ticks_until(end: float, T_c: float) -> int:
 
 
 def rounded_up(t: float, T_c: float) -> float:
-    """Return the first end (s) of a run at or after t (s): a whole number of control periods T_c (s), one at least.
-
-    Examples
-    --------
-    >>> rounded_up(2.01, 0.02), rounded_up(2.02, 0.02), rounded_up(0.0, 0.02)
-    (2.02, 2.02, 0.02)
-    """
+    """Return the first end (s) of a run at or after t (s): a whole number of control periods T_c (s), one at least."""
     return time_of(max(1, math.ceil(t / T_c - 1e-6)), T_c)
 
 
 class Timer:
     """Due times of a periodic task, the first one now, a period apart (s of wall time).
 
-    Examples
-    --------
-    When it wakes too late, it skips the past due times and keeps its schedule:
-
-    >>> timer = Timer(0.5, now=10.0)
-    >>> timer.take(10.0), timer.due
-    (0, 10.5)
-    >>> timer.take(11.75), timer.due
-    (2, 12.0)
+    When it wakes too late, it skips the past due times and keeps its schedule.
     """
 
     def __init__(self, period: float, now: float) -> None:
@@ -70,17 +45,14 @@ class Timer:
 
     @property
     def due(self) -> float:
-        """Next due time (s)."""
         return self._start + self._n * self.period
 
     def take(self, now: float) -> int:
-        """Note that the task is done now (s); return the number of skipped due times."""
         past = max(0, int((now - self.due) / self.period))
         self._n += past + 1
         return past
 
     def shift(self, by: float) -> None:
-        """Move all further due times by so much (s)."""
         self._start += by
 
 
@@ -89,8 +61,6 @@ STOOD_STILL = 1.0
 
 
 class Awaited(NamedTuple):
-    """One message that a node waits for."""
-
     message: str
     """E.g. "State(41)"."""
     sender: str
@@ -115,12 +85,10 @@ class TickBarrier:
 
     @property
     def is_open(self) -> bool:
-        """Whether no message is missing."""
         return not self._awaited
 
     @property
     def messages_needed(self) -> int:
-        """Number of missing messages from outside; at least one."""
         return max(1, self._from_outside)
 
     def wait_for(self, awaited: dict[str, str], now: float) -> None:
@@ -130,20 +98,16 @@ class TickBarrier:
         self.renew(now)
 
     def awaits(self, name: str) -> bool:
-        """Whether a message of this sender is missing."""
         return name in self._awaited
 
     def came(self, name: str) -> None:
-        """Note that a sender has sent its message, or never will."""
         if self._awaited.pop(name, None) is not None and name not in self.siblings:
             self._from_outside -= 1
 
     def missing_messages(self) -> tuple[Awaited, ...]:
-        """Return the missing messages with their senders."""
         return tuple(Awaited(message, sender) for sender, message in self._awaited.items())
 
     def renew(self, now: float) -> None:
-        """Note progress: the deadline restarts from now."""
         self.deadline = now + self._timeout
 
     def is_over(self, now: float) -> bool:
@@ -160,7 +124,6 @@ class TickBarrier:
         return True
 
     def rest(self) -> None:
-        """Wait without a deadline."""
         self.deadline = None
 
     def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
@@ -185,15 +148,7 @@ LONGEST = 60.0
 
 
 class SessionDeadline:
-    """Measure how long each sender has been silent in this session.
-
-    Examples
-    --------
-    >>> patience = SessionDeadline(3.5)
-    >>> both, one = {"inv2": 0.0, "inv3": 0.0}, {"inv3": 0.0}
-    >>> [patience.lost(names, now) for names, now in [(both, 0.0), (one, 3.0), (one, 3.5)]]
-    ['', '', 'inv3']
-    """
+    """Measure how long (s) each sender has been silent in this session."""
 
     def __init__(self, patience: float = PATIENCE) -> None:
         self.whole = False
@@ -202,31 +157,16 @@ class SessionDeadline:
         self._since: dict[str, float] = {}
 
     def next(self) -> SessionDeadline:
-        """Return the patience of the next session: twice as long if this session never worked.
-
-        Examples
-        --------
-        >>> patience, silent = SessionDeadline(3.5).next(), {"inv3": 0.0}
-        >>> patience.lost(silent, 0.0), patience.lost(silent, 6.9), patience.lost(silent, 7.0)
-        ('', '', 'inv3')
-        """
+        """Return the patience of the next session: twice as long if this session never worked."""
         return SessionDeadline(PATIENCE if self.whole else min(2.0 * self._patience, LONGEST))
 
     def lost(self, silent: Mapping[str, float], now: float) -> str:
         """Note the senders that are wrongly silent now; return the first that has been so too long, else "".
 
-        Parameters
-        ----------
-        silent : Mapping[str, float]
-            Each silent sender, with the time (s) by which it may be silent longer than the patience.
-        now : float
-            s of wall time.
+        Each comes with the time (s) by which it may be silent longer than the patience.
         """
         self._since = {name: self._since.get(name, now) for name in silent}
-        return next(
-            (name for name, since in self._since.items() if now - since >= self._patience + silent[name]),
-            "",
-        )
+        return next((name for name, since in self._since.items() if now - since >= self._patience + silent[name]), "")
 
 
 BURST = 20

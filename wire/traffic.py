@@ -26,19 +26,9 @@ from gridpeers.wire.journal import (
 )
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Measurement, State
-from gridpeers.wire.timing import RateLimit
 
-SHOWN_PAYLOAD = 4_000
+SHOWN_PAYLOAD = 1_000
 """Most bytes that are noted of a message that was rejected."""
-
-REJECTED_OF_TICK = 20
-"""Rejected messages that are noted in one tick of simulated time; the others are only counted, by key and kind."""
-
-REJECTED, REJECTED_INTERVAL = 100, 0.05
-"""The same in wall-clock time, of each kind: how many at once, and the time (s) after which one more is noted."""
-
-STALE, STALE_INTERVAL = 2_000, 0.001
-"""The same of late messages, which links in bad order bring, and which the account of a link needs."""
 
 
 class Traffic(Protocol):
@@ -77,11 +67,8 @@ class TickTraffic:
             self._of_tick[keys.state(name)] = self._states
         self._elsewhere = {keys.telemetry, keys.request, *map(keys.report, names), *map(keys.journal, names)}
         """Keys whose messages the record has anyway, or, of recorders, has no use for."""
-        self._rejected = 0
-        """Messages rejected in this tick."""
 
     def sent(self, key: str, payload: bytes) -> None:
-        """Note a message that the node sends."""
         of_tick = self._of_tick.get(key)
         if of_tick is not None:
             of_tick.append(payload)
@@ -89,29 +76,21 @@ class TickTraffic:
             self._journal.add(SentMessage(None, key[self._cut :], payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
-        """Note a message off the wire, and the kind of its rejection, if it was rejected."""
         of_tick = self._of_tick.get(key)
         if of_tick is not None and not rejected:
             of_tick.append(payload)
         elif rejected:
-            self._rejected += 1
-            if self._rejected <= REJECTED_OF_TICK:
-                self._journal.add(ReceivedMessage(None, key[self._cut :], payload[:SHOWN_PAYLOAD], rejected))
-            else:
-                self.lost(key, rejected, 1, at)
+            self._journal.add_rejected(ReceivedMessage(None, key[self._cut :], payload[:SHOWN_PAYLOAD], rejected))
         elif key not in self._elsewhere:
             self._journal.add(ReceivedMessage(None, key[self._cut :], payload))
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
         self._journal.count(RejectedCount(None, key[self._cut :], kind, count))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
-        """Note a liveliness token that appeared or vanished."""
         self._journal.add(Token(None, key[self._cut :], appeared))
 
     def line(self, text: str) -> None:
-        """Note a line of the log."""
         self._journal.add(ProcessEvent(None, "line", text))
 
     def exchanged(self, tick: int, measurements: Sequence[Measurement], states: Sequence[State]) -> None:
@@ -123,8 +102,6 @@ class TickTraffic:
         self._add_exchange(tick, list(map(astuple, measurements)), list(map(astuple, states)))
 
     def ticked(self, tick: int) -> None:
-        """Note that tick k is complete, or that it ends as it is."""
-        self._rejected = 0
         self._add_exchange(tick, self._measurements, self._states)
         self._measurements.clear()
         self._states.clear()
@@ -148,65 +125,54 @@ class TimedTraffic:
         self._whole = whole
         self.now = 0.0
         """Time of the last call of the node (s, monotonic)."""
-        self._rejected, self._stale = RateLimit(REJECTED, REJECTED_INTERVAL), RateLimit(STALE, STALE_INTERVAL)
 
     def sent(self, key: str, payload: bytes) -> None:
-        """Note a message that the node sends."""
         name = key[self._cut :]
         if kind_of(name) not in _NOT_NOTED:
             self._journal.add(SentMessage(self.now, name, payload))
 
     def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
-        """Note a message off the wire, and the kind of its rejection, if it was rejected."""
         self.now = at
         name = key[self._cut :]
         kind = kind_of(name)
         needless = IN_TELEMETRY if self._arrivals else _NOT_NOTED
         if not (self._arrivals or self._whole) or (kind in needless and not rejected):
             return
-        if rejected and not self._is_noted(rejected):
-            self._journal.count(RejectedCount(at, name, rejected, 1))
-            return
+        entry: MessageReference | ReceivedMessage = ReceivedMessage(at, name, payload)
         if (
             kind in EACH_TICK
             and not self._whole
             and rejected in ("", "stale")  # any other may be of somebody who keeps no journal
             and (message := sound(payload)) is not None
         ):
-            self._journal.add(MessageReference(at, name, message.epoch, message.seq, rejected))
-            return
-        self._journal.add(ReceivedMessage(at, name, payload[:SHOWN_PAYLOAD] if rejected else payload, rejected))
-
-    def _is_noted(self, rejected: str) -> bool:
-        """Return whether a rejected message is noted; one of many is not, and their number is."""
-        limit = self._stale if rejected == "stale" else self._rejected
-        return limit.admit(rejected, self.now) is not None
+            entry = MessageReference(at, name, message.epoch, message.seq, rejected)
+        elif rejected:
+            entry = ReceivedMessage(at, name, payload[:SHOWN_PAYLOAD], rejected)
+        if rejected:
+            self._journal.add_rejected(entry)
+        else:
+            self._journal.add(entry)
 
     def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
         self.now = at
         if self._arrivals or self._whole:
             self._journal.count(RejectedCount(at, key[self._cut :], kind, count))
 
     def token(self, key: str, at: float, *, appeared: bool) -> None:
-        """Note a liveliness token that appeared or vanished."""
         self.now = at
         if self._arrivals:
             self._journal.add(Token(at, key[self._cut :], appeared))
 
     def woken(self, at: float, *, work: bool = False) -> None:
-        """Note that the node acts by its clock."""
         self.now = at
         if self._arrivals:
             self._journal.add(WakeUp(at, work))
 
     def process(self, kind: str, text: str, at: float) -> None:
-        """Note an event of the process."""
         self.now = at
         self._journal.add(ProcessEvent(at, kind, text))
 
     def line(self, text: str) -> None:
-        """Note a line of the log."""
         self._journal.add(ProcessEvent(self.now, "line", text))
 
 

@@ -1,9 +1,11 @@
-"""Words and texts for people: numbers of things, "did you mean", one printable line. Pure."""
+"""Words and texts for people: numbers of things, "did you mean", one printable line, packages to install. Pure."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from importlib.util import find_spec
+from traceback import walk_tb
 
 UNPRINTABLE = (
     "\x00-\x1f\x7f-\x9f\xad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\U000e0000-\U000e007f"
@@ -31,24 +33,11 @@ def printable(text: str, limit: int = 4000) -> str:
 
 
 def utf8(text: str) -> str:
-    r"""Return a text for a file: what Python keeps of bytes that are no UTF-8, as in names of files, is spelt out.
-
-    Examples
-    --------
-    >>> utf8(b"no such file: caf\xe9".decode("utf-8", "surrogateescape"))
-    'no such file: caf\\udce9'
-    """
+    """Return a text for a file: what Python keeps of bytes that are no UTF-8, as in names of files, is spelt out."""
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def counted(number: int, one: str, several: str = "") -> str:
-    """Return a number of things with its noun.
-
-    Examples
-    --------
-    >>> counted(1, "switch", "switches"), counted(2, "switch", "switches"), counted(0, "inverter")
-    ('1 switch', '2 switches', '0 inverters')
-    """
     return f"{number} {one if number == 1 else several or f'{one}s'}"
 
 
@@ -88,13 +77,7 @@ def suggestion(wrong: str, known: Iterable[str], what: str, also: Iterable[str] 
 
 
 def first_of(names: Sequence[str], most: int) -> str:
-    """Return the first names of a list, so many at the most, and how many more there are.
-
-    Examples
-    --------
-    >>> first_of(["inv1", "inv2", "inv3"], 2), first_of(["inv1", "inv2"], 2)
-    ('inv1, inv2 and 1 more', 'inv1, inv2')
-    """
+    """Return the first names of a list, so many at the most, and how many more there are."""
     beyond = len(names) - most
     return ", ".join(names[:most]) + (f" and {beyond} more" if beyond > 0 else "")
 
@@ -123,3 +106,62 @@ def is_no_path(text: str) -> bool:
     except UnicodeEncodeError:  # half a character
         return True
     return b"\0" in raw or len(raw) > 4000 or any(len(part) > 255 for part in raw.split(b"/"))
+
+
+DISTRIBUTIONS = {
+    "dss": "dss-python dss-python-backend",
+    "py_dss_interface": "py-dss-interface",
+    "zenoh": "eclipse-zenoh",
+}
+"""What pip calls a package, where it has another name there."""
+
+
+def damaged(module: str, reason: str, user: str) -> str:
+    """Return one line on a package that is installed, and cannot be imported for a reason."""
+    again = f"pip install --force-reinstall {DISTRIBUTIONS.get(module, module)}"
+    return f"{module} is installed, but cannot be imported ({' '.join(reason.split())}); {user} needs it: {again}"
+
+
+def not_importable(error: ImportError) -> str:
+    """Return one line on the package that an import of ours did not find or could not load, and what to install."""
+    module = ""
+    for frame, _ in walk_tb(error.__traceback__):  # the first that ours imports; what that imports is its own affair
+        root = str(frame.f_globals.get("__name__", "")).partition(".")[0]
+        if root == "gridpeers":
+            module = ""
+        elif not module and root not in ("importlib", "runpy", "__main__"):
+            module = root
+    module = module or (error.name or "").partition(".")[0]
+    if not module:
+        return f"a package cannot be imported ({error})"
+    try:
+        missing = find_spec(module) is None
+    except (ImportError, ValueError):
+        missing = True
+    if not missing:
+        return damaged(module, f"{type(error).__name__}: {error}", "gridpeers")
+    package = DISTRIBUTIONS.get(module, module)
+    return f"{package} is not installed; gridpeers needs it: pip install {requirement(module)}"
+
+
+def requirement(module: str) -> str:
+    """Return what pip is to install for a package: its version of ours, or the first extra of gridpeers that has it.
+
+    Examples
+    --------
+    >>> requirement("zenoh").startswith("'eclipse-zenoh"), requirement("pyarrow"), requirement("torch")
+    (True, "'gridpeers[sweep]'", 'torch')
+    """
+    from importlib import metadata  # it brings a mail reader; starts need none of this
+
+    package = DISTRIBUTIONS.get(module, module)
+    try:
+        required = metadata.requires("gridpeers") or []
+    except metadata.PackageNotFoundError:  # run from its sources
+        required = []
+    for text in required:
+        spec, _, marker = text.partition(";")
+        if re.split(r"[\[<>=~! ]", spec)[0].lower() == package.partition(" ")[0].lower():
+            extra = re.search(r"extra == [\"']([\w-]+)", marker)
+            return f"'gridpeers[{extra[1]}]'" if extra else f"'{spec.strip()}'"
+    return package

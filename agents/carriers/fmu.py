@@ -96,7 +96,6 @@ def _is_of_neighbour(name: str) -> bool:
 
 
 def named(description: Any, causality: str) -> dict[str, Any]:
-    """Return the variables of a causality, e.g. the inputs, by name."""
     return {variable.name: variable for variable in description.modelVariables if variable.causality == causality}
 
 
@@ -126,7 +125,6 @@ class FmuLaw(ProgramLaw):
         self._ask({"type": "load"}, ProgramReady, 0.0)
 
     def close(self) -> None:
-        """End its process, and remove what was unpacked."""
         super().close()
         shutil.rmtree(self._unpacked, ignore_errors=True)
 

@@ -18,7 +18,7 @@ from gridpeers.agents.carriers.fmu import NEIGHBOUR, OF_NEIGHBOUR, is_fmi3
 from gridpeers.agents.carriers.fmu import named as variables
 from gridpeers.agents.laws.call import LawError, decide, start_law
 from gridpeers.agents.laws.law import LIMITS, NOTHING_SHARED, Law, Neighbour, Own, SetPoints
-from gridpeers.wire.plugins.foreign_code import ANYTHING, named
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 
 class LoadedFmu(Law):
@@ -43,13 +43,11 @@ class LoadedFmu(Law):
         self._put, self._got = (fmu.setFloat64, fmu.getFloat64) if self._fmi3 else (fmu.setReal, fmu.getReal)
 
     def take(self, parameters: Mapping[str, Any]) -> None:
-        """Take the parameters of the scenario, those of every law too."""
         for name in LIMITS:
             setattr(self, name, float(parameters.get(name, getattr(Law, name))))
         self._given = {name: float(value) for name, value in parameters.items() if name in self._settable}
 
     def start(self, own: Own) -> None:
-        """Reset the FMU, set its parameters, and initialise it with the own inverter."""
         fmu = self._fmu
         if self._begun:
             fmu.terminate()
@@ -63,7 +61,6 @@ class LoadedFmu(Law):
         fmu.exitInitializationMode()
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Set the inputs, do one step, and get the outputs."""
         if len(neighbours) > self._room and self._room:
             raise LawError(f"it has room for {self._room} neighbours, and {own.name} hears {len(neighbours)}")
         self._set(self._inputs, self._values(own, neighbours, T))
@@ -74,7 +71,6 @@ class LoadedFmu(Law):
         return SetPoints(got["P_set"], got["V_set"], shared, got.get("send", 1.0) >= 0.5)
 
     def close(self) -> None:
-        """Free the FMU."""
         if self._begun:
             self._fmu.terminate()
         self._fmu.freeInstance()
@@ -98,7 +94,6 @@ class LoadedFmu(Law):
 
 
 def _instance(description: Any, folder: Path) -> Any:
-    """Return the instance of an FMU that is unpacked in a folder, by the version of FMI that it has."""
     if is_fmi3(description):
         from fmpy.fmi3 import FMU3Slave as Slave
     else:
@@ -114,7 +109,6 @@ def _instance(description: Any, folder: Path) -> Any:
 
 
 def main(path: str, folder: str) -> None:
-    """Answer each line of standard input until it ends."""
     lines, answers = sys.stdin.buffer, os.dup(1)
     os.dup2(2, 1)
     law, failed = None, ""

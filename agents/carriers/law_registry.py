@@ -46,7 +46,6 @@ LAWS: Registry[type[Law]] = Registry(
 
 
 def make_law(control: Control) -> Law:
-    """Return the law of one inverter; raise ValueError if there is no such law, or it cannot be made."""
     choice = control.law
     if choice.command:
         from gridpeers.agents.carriers.program import ProgramLaw

@@ -61,20 +61,17 @@ class ProcessGroup:
             raise
 
     def end_input(self) -> None:
-        """End the input of the program, by which it is asked to end."""
         assert self.program.stdin is not None
         with contextlib.suppress(OSError):
             self.program.stdin.close()
 
     def wait(self, seconds: float) -> int | None:
-        """Wait for the program to end; return its exit code, None if it still runs."""
         try:
             return self.program.wait(seconds)
         except subprocess.TimeoutExpired:
             return None
 
     def kill(self) -> None:
-        """End the program and all that it has started, at once."""
         self._end_group()
         self.program.wait()
 
@@ -94,15 +91,11 @@ EXAMPLE = '{"P_set": 0.5, "V_set": 1.0}'
 
 
 class ProgramReady(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to the line "start"."""
-
     type: Literal["ready"] = "ready"
     error: str = ""
 
 
 class Decision(msgspec.Struct, frozen=True, kw_only=True):
-    """Answer to the line "step"."""
-
     P_set: float | None = None
     V_set: float | None = None
     shared: dict[str, float] = {}
@@ -113,10 +106,7 @@ class Decision(msgspec.Struct, frozen=True, kw_only=True):
 class ProgramLaw(Law):
     """A law carried by a program; `name` is what people call it, `litter` a folder that is removed if the agent dies.
 
-    Raises
-    ------
-    ValueError
-        If the program cannot be started, or a limit among the parameters is wrong.
+    Raise ValueError if the program cannot be started, or a limit among the parameters is wrong.
     """
 
     def __init__(self, choice: LawChoice, name: str = "", litter: str = "") -> None:
@@ -139,11 +129,9 @@ class ProgramLaw(Law):
         self._patience = FIRST * choice.time_limit
 
     def start(self, own: Own) -> None:
-        """Send the line "start", and wait until the program is ready."""
         self._ask({"type": "start", "own": own._asdict(), "parameters": self._choice.parameters}, ProgramReady, own.t)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Send the line "step", and take the decision."""
         around = [other._asdict() | {"shared": dict(other.shared)} for other in neighbours]
         line = {"type": "step", "own": own._asdict(), "neighbours": around, "T": T}
         decision = self._ask(line, Decision, own.t)
@@ -154,7 +142,6 @@ class ProgramLaw(Law):
         return SetPoints(decision.P_set, decision.V_set, shared, decision.send)
 
     def end_input(self) -> None:
-        """Ask the program to end; `close` waits for it."""
         if self._group is not None and not self._input_ended:
             self._input_ended = monotonic()
             self._group.end_input()
@@ -191,7 +178,6 @@ class ProgramLaw(Law):
         return decoded
 
     def _says(self, error: str, what: str) -> str:
-        """Return what an error of the program's own is told as."""
         return f"{self._name} says: {printable(error, 200)} ({what})"
 
     def _put(self, line: bytes, what: str) -> None:
@@ -214,7 +200,6 @@ class ProgramLaw(Law):
             line = line[os.write(file, line) :]
 
     def _line(self, what: str) -> bytes:
-        """Return the next line of the program."""
         assert self._group is not None
         assert self._group.program.stdout is not None
         end, file = monotonic() + self._patience, self._group.program.stdout.fileno()
@@ -234,7 +219,6 @@ class ProgramLaw(Law):
         return line
 
     def _ended(self, what: str) -> str:
-        """Say how the program ended."""
         assert self._group is not None
         code = self._group.wait(LEAVING)
         self._group.kill()  # what it has started may still run

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import os
 import signal
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,17 +12,7 @@ from typing import Any
 
 from gridpeers.agents.laws.call import LawError
 from gridpeers.agents.laws.law import LIMITS, Law, Neighbour, Own, SetPoints, Terms
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
-
-_forks = threading.local()
-"""Forks of this process by each of its threads: `number`."""
-
-
-def _note_fork() -> None:
-    _forks.number = getattr(_forks, "number", 0) + 1
-
-
-os.register_at_fork(after_in_parent=_note_fork)
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 FIRST = 10.0
 """Times the time limit that a law may take to be made, or for its first answer: it may have to be loaded."""
@@ -35,32 +24,13 @@ class _OverError(BaseException):
 
 @contextmanager
 def limited(what: str, seconds: float, limit: str) -> Iterator[None]:
-    """Interrupt what is inside when it lasts longer than so many seconds (real time).
+    """Interrupt what is inside when it lasts longer than so many seconds (real time), and raise LawError.
 
     It is interrupted by SIGALRM: in the main thread of a process alone, and not while C code does not return. The error
     names `what` is inside, and the `limit` as a scenario calls it.
-
-    Raises
-    ------
-    LawError
-        If it took longer, or forked this process. The copy ends at once: it would go on as this program.
     """
-    before_forks, own = getattr(_forks, "number", 0), os.getpid()
-    try:
-        with _timed(what, seconds, limit):
-            yield
-    finally:
-        if os.getpid() != own:
-            os._exit(0)
-    if getattr(_forks, "number", 0) != before_forks:
-        raise LawError(f"{what} forked a process; start a program instead (subprocess)")
-
-
-@contextmanager
-def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
-        with foreign_code():
-            yield
+        yield
         return
     over = False
     interrupted: BaseException | None = None
@@ -74,8 +44,7 @@ def _timed(what: str, seconds: float, limit: str) -> Iterator[None]:
     try:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         try:
-            with foreign_code():
-                yield
+            yield
         finally:
             signal.setitimer(signal.ITIMER_REAL, 0.0)
     except BaseException as error:
@@ -110,17 +79,14 @@ class TimeLimited(Law):
         self._limit = f"time_limit_s = {time_limit:g} s"
 
     def start(self, own: Own) -> None:
-        """Begin as the law does."""
         with limited(f"start at t = {own.t:.6g} s", self._time_limit, self._limit):
             self.carried.start(own)
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide as the law does."""
         with limited(f"step at t = {own.t:.6g} s", self._time_limit, self._limit):
             return self.carried.step(own, neighbours, T)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms | None:
-        """Return the terms that the law names."""
         with limited(f"terms at t = {own.t:.6g} s", self._time_limit, self._limit):
             return self.carried.terms(own, neighbours, T)
 

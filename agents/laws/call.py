@@ -9,7 +9,7 @@ from typing import Any
 
 from gridpeers.agents.laws.law import NOTHING_SHARED, Law, Neighbour, Own, SetPoints
 from gridpeers.wire.bounds import MOST_SHARED, SHARED_LIMIT
-from gridpeers.wire.plugins.foreign_code import ANYTHING, line_of, named
+from gridpeers.wire.plugins.registry import ANYTHING, line_of, named
 from gridpeers.wire.wording import printable
 
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}")
@@ -62,7 +62,6 @@ def failed_at(law: Law, error: LawError, folder: str) -> str:
 
 
 def _within_limits(law: Law, result: Any, own: Own) -> SetPoints:
-    """Return a law's result within its limits; raise LawError if it is no decision."""
     if not isinstance(result, SetPoints):
         raise LawError(f"step at t = {own.t:.6g} s returned {_shown(result)}; return SetPoints(P_set=..., V_set=...)")
     P_set, V_set, shared, send = result.P_set, result.V_set, result.shared, result.send
@@ -96,7 +95,6 @@ def _number(name: str, value: Any, t: float) -> float:
 
 
 def _checked(shared: Any, t: float) -> Mapping[str, float]:
-    """Return the values that a law shares; raise LawError if a name or a value is not allowed."""
     if not isinstance(shared, Mapping) or len(shared) > MOST_SHARED:
         raise LawError(f"step at t = {t:.6g} s shares {_shown(shared)}; share at most {MOST_SHARED} numbers by name")
     checked = {}

@@ -44,12 +44,10 @@ class Centralised(Law):
         """Errors of frequency and voltage at its last step (pu)."""
 
     def start(self, own: Own) -> None:
-        """Set the integrals to the own set-points, for a bumpless start."""
         self._omega, self._E = own.m_p * own.P_set, own.V_set - 1.0
         self._errors = 0.0, 0.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Compute the corrections, or take over those of the centre."""
         if own.name == self.centre:
             error = self._mean_error(own, neighbours)
             self._omega -= self.k_i * T * own.e
@@ -63,7 +61,6 @@ class Centralised(Law):
         return SetPoints(own.P_set, own.V_set, {"V": own.V})
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the terms of both controllers at the centre, or the step to its corrections."""
         if own.name == self.centre:
             error, (e_before, error_before) = self._mean_error(own, neighbours), self._errors
             # Both are 0 but after a limit: the integrals go on beyond it, while the set-points stay.

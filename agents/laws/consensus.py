@@ -60,14 +60,8 @@ def P_set_step(
 ) -> float:
     """Return P_set (pu of own rating) after one control period T (s), (12) for a follower, (13) for a leader.
 
-    Parameters
-    ----------
-    P_set, y_bar : float
-        Own set-point (pu), and the weighted mean of the neighbours' m_p P_set (pu); without effect when `d` is 0.
-    d, e : float
-        Sum of c_ij over the neighbours that count, and own frequency error (pu).
-    kappa_c : float, optional
-        Gain of each unit of c_ij (1/s); by default the leader's kappa = m_p/k_p.
+    `y_bar` is the weighted mean of the neighbours' m_p P_set (pu), without effect when `d`, the sum of c_ij, is 0; `e`
+    is the own frequency error (pu), and `kappa_c` the gain of each unit of c_ij (1/s), by default kappa = m_p/k_p.
     """
     kappa = m_p / gains.k_p
     y = m_p * P_set

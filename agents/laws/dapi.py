@@ -40,7 +40,6 @@ class Dapi(Law):
     b: Annotated[float, Range(0, 1e3), "Weight of each neighbour's vars; 0 regulates voltage exactly."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide the set-points of one control period."""
         omega, weight = own.m_p * own.P_set, sum(other.weight for other in neighbours)
         apart = sum(other.weight * (omega - other.m_p * other.P_set) for other in neighbours)
         unequal = sum(other.weight * (own.z - other.m_q * other.Q) for other in neighbours)
@@ -50,7 +49,6 @@ class Dapi(Law):
         return SetPoints(omega / own.m_p, 1.0 + e)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the terms of both sums."""
         omega, weight = own.m_p * own.P_set, sum(other.weight for other in neighbours)
         P, V = _step(T * self.a / self.k, weight) / own.m_p, _step(T * self.b / self.kappa, weight)
         return Terms(

@@ -43,7 +43,6 @@ class EventTriggered(Consensus):
         self._started_at = 0.0
 
     def start(self, own: Own) -> None:
-        """Start with a broadcast."""
         self._last_broadcast, self._started_at = None, own.t
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
@@ -62,7 +61,6 @@ class EventTriggered(Consensus):
         return SetPoints(P_set, seen.V_set, send=send)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the paper's terms, from the last broadcast values, the own ones included."""
         P_hat, z_hat = self._last_broadcast or (own.P_set, own.z)
         P, V = super().terms(own._replace(P_set=P_hat, z=z_hat), neighbours, T)
         seen = P_hat + sum(term.value for term in P)

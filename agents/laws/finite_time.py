@@ -41,7 +41,6 @@ class FiniteTime(Law):
     alpha: Annotated[float, Range(0, 1e3), "Weight of a leader's voltage error beside that of one neighbour."] = 1.0
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide the set-points of one control period."""
         y, count = own.m_p * own.P_set, max(1, len(neighbours))
         change = sum(
             other.weight * self._move(other.m_p * other.P_set - y, T * self.c_P, 0.5 / count) for other in neighbours
@@ -55,7 +54,6 @@ class FiniteTime(Law):
         return SetPoints((y + change) / own.m_p, own.V_set + V_change)
 
     def terms(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> Terms:
-        """Return the terms of both sums."""
         y, most = own.m_p * own.P_set, 0.5 / max(1, len(neighbours))
         P = [
             Term("consensus", n.weight * self._move(n.m_p * n.P_set - y, T * self.c_P, most) / own.m_p, n.name)

@@ -89,8 +89,6 @@ class Neighbour(NamedTuple):
 
 
 class SetPoints(NamedTuple):
-    """Decision of a law."""
-
     P_set: float
     """Set-point of real power (pu of own rating); the agent limits it to P_set_min, P_set_max."""
     V_set: float
@@ -102,8 +100,6 @@ class SetPoints(NamedTuple):
 
 
 class Term(NamedTuple):
-    """One term of a law's step."""
-
     name: str
     """A word or two, such as "frequency error"."""
     value: float
@@ -124,10 +120,7 @@ class Terms(NamedTuple):
 class Law:
     """Base of all laws. Parameters are annotated attributes (`gridpeers.wire.schema.table_schema`; docs/laws.md).
 
-    Raises
-    ------
-    ValueError
-        If the value of a parameter is wrong, unknown or missing.
+    Raise ValueError if the value of a parameter is wrong, unknown or missing.
     """
 
     source: ClassVar[str] = ""
@@ -173,5 +166,4 @@ LIMITS = ("P_set_min", "P_set_max", "V_set_min", "V_set_max")
 
 
 def limits_in(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the limits among the parameters of a law."""
     return {name: value for name, value in parameters.items() if name in LIMITS}

@@ -65,11 +65,9 @@ class Resilient(Consensus):
         self._memory: dict[str, _Memory] = {}
 
     def start(self, own: Own) -> None:
-        """Trust everybody again."""
         self._memory = {}
 
     def step(self, own: Own, neighbours: Sequence[Neighbour], T: float) -> SetPoints:
-        """Decide the set-points of one control period from the neighbours that remain."""
         believed, self._memory = self._believed(own, neighbours, T)
         of_P, of_V = self._values(own)
         P_set = super().step(own, self._trimmed(believed, *of_P), T).P_set
@@ -91,7 +89,6 @@ class Resilient(Consensus):
 
     @staticmethod
     def _values(own: Own) -> tuple[tuple[float, Callable[[Neighbour], float]], ...]:
-        """Return the own value, and how a neighbour's is found, of what is shared: m_p P_set and m_q q (pu)."""
         return (own.m_p * own.P_set, lambda n: n.m_p * n.P_set), (own.z, lambda n: n.m_q * n.Q)
 
     def _trimmed(

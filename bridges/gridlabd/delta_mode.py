@@ -137,13 +137,7 @@ class NotImportableError(Exception):
 
 
 def gridlabd_package() -> ModuleType:
-    """Return the package gridlabd.
-
-    Raises
-    ------
-    NotImportableError
-        If it cannot be imported, or is another package of that name.
-    """
+    """Return the package gridlabd."""
     try:
         package = importlib.import_module("gridlabd")
         _ = package.DirectGridLabD, package.GLDErrorCode, package.__version__
@@ -155,12 +149,7 @@ def gridlabd_package() -> ModuleType:
 class Simulation:
     """A model whose delta steps are taken when they are asked for; GridLAB-D itself runs in a thread.
 
-    Parameters
-    ----------
-    model
-        Path of the GLM.
-    inverters
-        Name, bus, kind and phases of each.
+    `inverters` has the name, bus, kind and phases of each.
     """
 
     def __init__(self, model: str, inverters: list[tuple[str, str, str, str]]) -> None:

@@ -10,8 +10,7 @@ from time import monotonic
 from typing import Any
 
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
 """A message of the loader: file, line, text."""
@@ -83,20 +82,7 @@ class GridlabdError(RuntimeError):
 
 
 class DeltaModeProcess:
-    """GridLAB-D in a process of its own, which ends with this one.
-
-    Parameters
-    ----------
-    python
-        Interpreter that has the package gridlabd.
-    deadline
-        Longest wait for an answer (s).
-
-    Raises
-    ------
-    GridlabdError
-        If there is no such interpreter.
-    """
+    """GridLAB-D in a process of its own, which ends with this one; `deadline` is the longest wait for an answer (s)."""
 
     def __init__(self, python: str, deadline: float) -> None:
         self._python, self._deadline = python, deadline
@@ -114,27 +100,16 @@ class DeltaModeProcess:
         return self._process.pid
 
     def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> str:
-        """Load a model and take its first step; return GridLAB-D's version.
+        """Load the text of a model, take its first step, and return GridLAB-D's version.
 
-        Parameters
-        ----------
-        model
-            Text of the GLM.
-        inverters
-            Name, node, kind and phases of each inverter to read.
+        `inverters` has the name, node, kind and phases of each inverter to read.
         """
         path = self._folder.path / "feeder.glm"
         path.write_text(model, encoding="utf-8")
         return str(self._answer({"load": str(path), "inverters": inverters}, START_DEADLINE)["version"])
 
     def ask(self, **request: Any) -> dict[str, Any]:
-        """Return the answer to a request; see `delta_mode`.
-
-        Raises
-        ------
-        GridlabdError
-            If GridLAB-D cannot do it, does not answer in time, or has ended; with its own errors.
-        """
+        """Return the answer to a request (`delta_mode`); GridlabdError has GridLAB-D's own errors."""
         return self._answer(request, self._deadline)
 
     def close(self) -> None:

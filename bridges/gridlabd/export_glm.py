@@ -33,25 +33,9 @@ module powerflow {{
 def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: str) -> str:
     """Return a feeder as a GridLAB-D model: with inverters in delta mode, without any as a power flow.
 
-    Each inverter begins with the power of our operating point; GridLAB-D finds the set-points that belong to it.
-
-    Parameters
-    ----------
-    feeder
-        A feeder of our own tables, with the changes of its scenario.
-    settings
-        Parameters of the inverters, their first set-points, and the step.
-    seconds
-        Length of the run (s), 1 to 50.
-    voltages
-        Name of a CSV file into which GridLAB-D writes the voltages of the start.
-
-    Raises
-    ------
-    FeederError
-        With everything that the model cannot represent.
-    RuntimeError
-        If there is no operating point.
+    Each inverter begins with the power of our operating point; GridLAB-D finds the set-points that belong to it. The
+    run lasts 1 to 50 `seconds`, and GridLAB-D writes the voltages of its start to the CSV file `voltages`. FeederError
+    has all that the model cannot represent; without an operating point it is a RuntimeError.
     """
     problems = unrepresentable(feeder)
     for row in feeder.inverters:

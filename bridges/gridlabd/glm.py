@@ -146,27 +146,10 @@ def write_glm(
     h: float,
     seconds: int,
 ) -> str:
-    """Write a feeder with its inverters, spares left out.
+    """Write a feeder with its inverters, spares left out, from its tables in `folder` (plant/data/README.md).
 
-    Parameters
-    ----------
-    folder
-        Its tables; the layout is that of `plant/data/README.md`.
-    load_set
-        Which load table.
-    start
-        Power (VA) that each inverter delivers at the start.
-    parameters
-        Parameters of each inverter.
-    h
-        Step (s).
-    seconds
-        Length of the run (s).
-
-    Returns
-    -------
-    str
-        The model. Node `n13` is bus 13, `s13-152` the switch between 13 and 152; inverters keep their names.
+    Node `n13` is bus 13, `s13-152` the switch between 13 and 152; inverters keep their names. `start` has the power
+    (VA) of each at the start; `h` is the step (s), `seconds` the length of the run.
     """
     table = {path.stem: read_table(path) for path in sorted(folder.glob("*.csv"))}
     V_nom = {row["bus"]: float(row["V_nom_kV_LL"]) * 1e3 / sqrt(3) for row in table["buses"]}

@@ -38,23 +38,9 @@ def letters_of(phases: int) -> str:
 
 
 class GlmElements:
-    """Collects the linear elements and switches of a model.
+    """Collects the linear elements (`rows`) and switches of a model; notes in `problems` what cannot be represented.
 
-    Parameters
-    ----------
-    buses : list of dict
-        Buses as `gridlabd_power_flow` gives them.
-    wanted_switches : collection of str
-        Lines to make switches, by name or as `class.name`.
-    problems : list of str
-        Takes whatever cannot be represented.
-
-    Attributes
-    ----------
-    rows : list of LinearElement
-    switches : list of Switch
-    used_switches : set of str
-        Those of `wanted_switches` that were met.
+    `wanted_switches` are lines to make switches, by name or as `class.name`; `used_switches` those that were met.
     """
 
     def __init__(self, buses: list[dict[str, Any]], wanted_switches: Collection[str], problems: list[str]) -> None:
@@ -115,8 +101,6 @@ class GlmElements:
             ]
         return tuple(found)
 
-    # ---------------------------------------------------------------- switches
-
     def _add_switch(self, name: str, branch: dict[str, Any]) -> None:
         """Put ideal switches before a switch's impedance: one, or one a phase where their states differ."""
         letters, closed = letters_of(branch["phases"]), _closed(branch)
@@ -134,8 +118,6 @@ class GlmElements:
         self.switches.append(
             Switch(name=f"{bus}-{behind}", alias=short, from_bus=bus, to_bus=behind, phases=letters, closed=closed)
         )
-
-    # ---------------------------------------------------------------- matrices
 
     def _letters(self, branch: dict[str, Any], end: str) -> str:
         both = branch["phases"], self._buses[branch[end]]["phases"]
@@ -217,20 +199,7 @@ Without a limit, a dip at the islanding would be a collapse."""
 
 
 class BusLoads:
-    """Power, current and admittance that the objects at one bus of the solver take.
-
-    Parameters
-    ----------
-    bus : dict
-        The bus.
-    objects : list of dict
-        The objects connected there, the bus's own among them, with what each takes.
-
-    Attributes
-    ----------
-    of : dict
-        Power, current and admittance of each object, by class and name.
-    """
+    """Power, current and admittance that each object at one bus of the solver takes: `of`, by class and name."""
 
     def __init__(self, bus: Mapping[str, Any], objects: list[dict[str, Any]]) -> None:
         self._bus = bus

@@ -44,20 +44,10 @@ def network_blocks(
     *,
     ideal: bool = True,
 ) -> list[str]:
-    """Return the objects of a network.
+    """Return the objects of a network, from its tables and the nominal voltages (V) of its buses.
 
-    Parameters
-    ----------
-    table
-        Its tables.
-    load_set
-        Which of the load tables.
-    V_nom
-        Nominal voltages (V) of the buses.
-    leaders
-        Buses with a GFM.
-    ideal
-        Whether closed switches and regulators have no impedance, as here, or the default ones of GridLAB-D.
+    `leaders` are buses with a GFM. Closed switches and regulators have no impedance if `ideal`, as here, or else
+    GridLAB-D's default ones.
     """
     return [
         *_buses(table["buses"], V_nom, table["source"][0], leaders),

@@ -32,18 +32,7 @@ DEEPEST = 40
 
 
 class GlmText:
-    """A model and all that it includes, in whatever encoding they are.
-
-    Parameters
-    ----------
-    path
-        The model.
-
-    Attributes
-    ----------
-    problems : list of str
-        Commands that would run a program, with file and line.
-    """
+    """A model and all that it includes, in whatever encoding they are."""
 
     def __init__(self, path: Path) -> None:
         self.problems: list[str] = []

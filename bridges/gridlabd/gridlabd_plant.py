@@ -19,11 +19,11 @@ from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.feeder.limit_events import SetPointLimits
-from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
@@ -33,17 +33,7 @@ Write = tuple[str, str, Any]
 
 
 class GridlabdSchedule:
-    """Switches and available power of a run; all inverters are on the network.
-
-    Parameters
-    ----------
-    network
-        The feeder's network; it names switches and islands.
-    settings
-        Events, limits and the step.
-    parameters
-        Parameters of each inverter.
-    """
+    """Switches and available power of a run; all inverters are on the network."""
 
     def __init__(self, network: Network, settings: PlantSettings, parameters: Mapping[str, InverterParameters]) -> None:
         self._network, self._h, self._parameters = network, settings.h, parameters
@@ -119,29 +109,9 @@ REST = 0.5
 class GridlabdPlant:
     """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
 
-    Parameters
-    ----------
-    ours
-        Our plant of the same run, at its start. GridLAB-D's initialisation takes the powers of the inverters and
-        chooses set-points that give them; a scenario gives the set-points. So GridLAB-D begins its initial power flow
-        from the powers that our plant has found; what comes out after `REST` is its own.
-    settings
-        Everything that decides the numbers. Inverters that come and go have no counterpart in GridLAB-D.
-    T_c
-        Control period (s).
-    end
-        Duration of the run (s).
-    python
-        Interpreter that has the wheel `gridlabd`.
-    record_step
-        Distance of the recorded rows (s); None for every step.
-    deadline
-        Longest wait for GridLAB-D's next control period (s).
-
-    Raises
-    ------
-    GridlabdError
-        If the wheel is missing or the model does not run.
+    GridLAB-D's initialisation takes the powers of the inverters and chooses set-points that give them; a scenario gives
+    the set-points. So GridLAB-D begins its initial power flow from the powers of `ours`, our plant of the same run at
+    its start; what comes out after `REST` is its own. Periods are in s; `python` is an interpreter that has the wheel.
     """
 
     def __init__(
@@ -212,8 +182,6 @@ class GridlabdPlant:
         """End GridLAB-D's process."""
         self.process.close()
 
-    # ---------------------------------------------------------------- for agents
-
     def measure(self) -> dict[str, Reading]:
         """Read every inverter's sensors at t = tick * T_c."""
         island, fed = self._schedule.islands()
@@ -275,10 +243,7 @@ class GridlabdPlant:
     def advance(self) -> None:
         """Advance to the next tick, with the scheduled switches and limits on the way.
 
-        Raises
-        ------
-        GridlabdError
-            If GridLAB-D has ended or diverges, or if an inverter would trip, which GridLAB-D's cannot.
+        GridlabdError if GridLAB-D ends or diverges, or if an inverter would trip, which GridLAB-D's cannot.
         """
         step, last = self.tick * self._steps, (self.tick + 1) * self._steps
         while step < last:
@@ -297,8 +262,6 @@ class GridlabdPlant:
             self._watch(stop, steps)
             step = stop
         self.tick += 1
-
-    # ---------------------------------------------------------------- for the recorder
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
         """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
@@ -326,8 +289,6 @@ class GridlabdPlant:
             for value in self._in_units(name, reading)
         ]
         return (self._time(step), *values)
-
-    # ---------------------------------------------------------------- steps
 
     def _run(self, steps: int) -> NDArray[np.float64]:
         """Write the pending values, advance, and return the readings after each step: steps x inverters x values."""

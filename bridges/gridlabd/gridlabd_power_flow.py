@@ -170,17 +170,7 @@ KINDS = {"P": "power", "I": "current", "Y": "shunt"}
 
 
 class PowerFlowModel:
-    """A model of GridLAB-D, loaded; `solve` gives what the solver holds.
-
-    Parameters
-    ----------
-    path
-        The GLM; the working folder is its own.
-    scratch
-        Folder for what GridLAB-D writes by itself.
-    settles
-        Whether to go on until regulators and capacitors rest.
-    """
+    """A model of GridLAB-D, loaded; `solve` gives what the solver holds, at rest if it `settles`."""
 
     def __init__(self, path: str, scratch: Path, *, settles: bool) -> None:
         self._scratch, self._settles = scratch, settles
@@ -252,11 +242,8 @@ class PowerFlowModel:
     def _settle(self, moved: list[str]) -> dict[str, Any]:
         """Go on until the positions have been the same for longer than any control waits, or for an hour.
 
-        Returns
-        -------
-        dict
-            Whether the power flow was `solved` all the time; whether they `rest`; the `time` as GridLAB-D writes it,
-            and the `seconds` since the first moment; positions at the `first` moment and the `last`, by object.
+        Return whether the power flow was `solved` all the time and whether they `rest`, the `time` as GridLAB-D writes
+        it, the `seconds` since the first moment, and the positions at the `first` moment and the `last`, by object.
         """
         wait = 2.0 * max(
             (self._core.doubles(name, key)[0] for name in self._classes for key in DELAYS if self._core.has(name, key)),

@@ -14,8 +14,7 @@ from gridpeers.bridges.gridlabd.delta_mode_process import messages
 from gridpeers.bridges.gridlabd.glm_text import GlmText
 from gridpeers.plant.request_process import TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
 
@@ -28,15 +27,11 @@ LONGEST = 600.0
 
 
 def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
-    """Return what GridLAB-D's solver holds of a model (`gridpeers.bridges.gridlabd.gridlabd_power_flow`).
+    """Return what GridLAB-D's solver holds of a model (`gridlabd_power_flow`).
 
     Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
-    no solution on the way, its `solved` is false, and all else is of the first moment.
-
-    Raises
-    ------
-    FeederError
-        With GridLAB-D's own messages, each with its file and line, if it refuses the model or cannot solve it.
+    no solution on the way, its `solved` is false, and all else is of the first moment. FeederError has GridLAB-D's own
+    messages, each with its file and line.
     """
     if importlib.util.find_spec("gridlabd") is None:
         raise FeederError(path.name, (MISSING,))

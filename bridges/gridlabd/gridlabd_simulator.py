@@ -33,13 +33,7 @@ class GridlabdSimulator(Simulator):
     words = 'the plant of simulator "gridlabd"'
 
     def start(self, config: PlantConfig, feeder: Feeder) -> LivePlant:
-        """Start GridLAB-D on a feeder, with the powers of our operating point.
-
-        Raises
-        ------
-        RuntimeError
-            If there is no operating point, the wheel is missing, or GridLAB-D refuses the model.
-        """
+        """Start GridLAB-D on a feeder, with the powers of our operating point."""
         from gridpeers.bridges.gridlabd.export_glm import write_tables
         from gridpeers.bridges.gridlabd.gridlabd_plant import GridlabdPlant  # scenarios are checked without it
         from gridpeers.plant.feeder import Plant

@@ -65,14 +65,9 @@ UNGROUNDED = "ground a winding"
 def read_glm(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
 ) -> Feeder:
-    """Return the feeder of a model for GridLAB-D; `gridpeers.feeder.Feeder.from_glm` explains the parameters.
+    """Return the feeder of a model for GridLAB-D (`gridpeers.Feeder.from_glm`).
 
     Its `notes` list what was done instead of what the model says.
-
-    Raises
-    ------
-    FeederError
-        With everything that GridLAB-D refuses and everything that cannot be represented.
     """
     path = Path(path).absolute()
     refuse_if(path, path_problems(path))

@@ -11,7 +11,7 @@ from typing import Any
 from gridpeers.bridges.helics.helics_simulator import HelicsSettings, endpoint
 from gridpeers.bridges.helics.topics import Topic, Value
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess
-from gridpeers.wire.packages import damaged
+from gridpeers.wire.wording import damaged
 
 PROCESS = Path(__file__).with_name("federate_process.py")
 
@@ -39,20 +39,7 @@ class HelicsError(RuntimeError):
 
 
 class HelicsFederate:
-    """A federate in a process of its own (`federate_process.py`).
-
-    Parameters
-    ----------
-    settings
-        Its name, and its broker.
-    deadline
-        Longest wait (s of real time) for the others.
-
-    Raises
-    ------
-    HelicsError
-        If the wheel is missing, the broker cannot be reached or started, or the name is taken.
-    """
+    """A federate in a process of its own (`federate_process.py`); `deadline` is its longest wait (s) for the others."""
 
     def __init__(self, settings: HelicsSettings, deadline: float) -> None:
         self._settings, self._deadline = settings, deadline
@@ -84,10 +71,7 @@ class HelicsFederate:
     ) -> dict[str, list[str]]:
         """Register topics, publish what holds at t = 0, and wait until all federates are at t = 0.
 
-        Returns
-        -------
-        dict
-            "others": names of the other federates; "missing": keys of the subscriptions that nobody publishes.
+        Return the names of the `others`, and the keys of the subscriptions that nobody publishes (`missing`).
         """
         settings = self._settings
         wanted = f"the broker waits for {settings.federates} federates" if settings.federates else "are all started?"

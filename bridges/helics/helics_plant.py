@@ -14,9 +14,8 @@ from gridpeers.bridges.helics.federate import HelicsError, HelicsFederate
 from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.bridges.helics.topics import ACT, SENSORS, Value, number
 from gridpeers.plant.equipment import Feeder
-from gridpeers.plant.feeder.plant import Reading
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant, ReadingLike
+from gridpeers.plant.plant_interface import LivePlant, Reading
 from gridpeers.wire.bounds import NAME
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LoadSetting, PlantEvent
@@ -33,18 +32,6 @@ class HelicsPlant:
     At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
     agents' set-points. So a plant that steps from t on with what it finds at the end of its step has them in force from
     t, as ours has.
-
-    Parameters
-    ----------
-    config
-        Names, times and the federation; the scenario's events are the outside plant's to carry out.
-    feeder
-        Ratings of the inverters.
-
-    Raises
-    ------
-    HelicsError
-        If the federation does not begin, or topics are missing.
     """
 
     def __init__(self, config: PlantConfig, feeder: Feeder) -> None:
@@ -203,18 +190,6 @@ class BridgedPlant:
 
     At each record time t it publishes what it has at t. It asks for the first record time after a tick before it
     computes that tick: so set-points that are published between are in force from the tick on, as an agent's are.
-
-    Parameters
-    ----------
-    build
-        Builds the plant at t = 0.
-    config
-        Agents, times and the federation.
-
-    Raises
-    ------
-    HelicsError
-        If the federation does not begin.
     """
 
     def __init__(self, build: Callable[[], LivePlant], config: PlantConfig) -> None:
@@ -255,7 +230,7 @@ class BridgedPlant:
             plant.close()
             raise
 
-    def measure(self) -> Mapping[str, ReadingLike]:
+    def measure(self) -> Mapping[str, Reading]:
         """Read all sensors now."""
         return self._plant.measure()
 
@@ -333,7 +308,7 @@ class BridgedPlant:
             values |= {topic.key: value for topic, value in zip(keys, columns, strict=True)}
         return values
 
-    def _measured(self, readings: Mapping[str, ReadingLike]) -> dict[str, Value]:
+    def _measured(self, readings: Mapping[str, Reading]) -> dict[str, Value]:
         """Return the readings as values, flags and names only if they have changed."""
         values: dict[str, Value] = {}
         for name, r in readings.items():

@@ -54,21 +54,9 @@ class DssCircuit(NamedTuple):
 
 
 def read_circuit(request: ImportRequest, scratch: Path, tell: Callable[[str], None]) -> DssCircuit:
-    """Return the circuit of a script.
+    """Return the circuit of a script; FeederError has all that the engine refuses.
 
-    Parameters
-    ----------
-    request
-        What to read.
-    scratch
-        Folder that takes what the engine writes by itself.
-    tell
-        Takes what the engine is about to do, with file and line.
-
-    Raises
-    ------
-    FeederError
-        With everything that the engine refuses, or if what it made has no source that ours could be.
+    `scratch` takes what the engine writes by itself, `tell` what it is about to do, with file and line.
     """
     path, f_nom, leave_out, switches = request
     engine = DssEngine(tell)

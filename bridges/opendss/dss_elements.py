@@ -18,25 +18,10 @@ Complex = NDArray[np.complex128]
 
 
 class DssElements:
-    """Collects the linear elements, switches, source and buses of a circuit.
+    """Collects the linear elements (`rows`), switches, source (at most one) and buses of a solved circuit.
 
-    Parameters
-    ----------
-    engine : DssEngine
-        The circuit, solved.
-    wanted_switches : set of str
-        Lines (`Line.name`) that can be opened, beside those that the script calls switches.
-    problems : list of str
-        Takes whatever cannot be represented.
-
-    Attributes
-    ----------
-    rows : list of LinearElement
-    switches : list of Switch
-    source : list of Source
-        At most one.
-    used_switches : set of str
-        Those of `wanted_switches` that were met.
+    `wanted_switches` are lines that can be opened beside the script's own switches; `used_switches` those that were
+    met.
     """
 
     def __init__(self, engine: DssEngine, wanted_switches: set[str], problems: list[str]) -> None:
@@ -136,8 +121,6 @@ class DssElements:
                 )
         return tuple(found)
 
-    # ---------------------------------------------------------------- switches
-
     def _is_switch(self, name: str, element: Any) -> bool:
         line = self._engine.circuit.Lines
         line.Name = name.partition(".")[2]
@@ -169,8 +152,6 @@ class DssElements:
         if is_open:
             self._active(name).Open(1, 0)
             self._engine.execute("solve")
-
-    # ---------------------------------------------------------------- what they have in common
 
     def _active(self, name: str) -> Any:
         self._engine.circuit.SetActiveElement(name)

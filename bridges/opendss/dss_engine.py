@@ -90,23 +90,9 @@ DEEPEST = 40
 class DssScript:
     """A script of OpenDSS and all that it includes.
 
-    Parameters
-    ----------
-    execute : Execute
-        Runs one command in the engine.
-    may_solve : Callable[[], bool]
-        Whether a bare `solve` would solve one moment, and not a day or a year.
-
-    Attributes
-    ----------
-    problems : list of str
-        Every command that failed: file, line, the engine's message.
-    notes : list of str
-        Commands that failed, and on which the network does not depend.
-    not_run : dict of str to str
-        First place of each kind of command that was not run.
-    places : dict of str to str
-        First place of each element, and of each "bus NAME" that a property names (lower case).
+    Its `problems` are the commands that failed, its `notes` those on which the network does not depend; `not_run` has
+    the first place of each kind of command that was not run, `places` that of each element and "bus NAME" (lower case).
+    `may_solve` returns whether a bare `solve` would solve one moment, and not a day or a year.
     """
 
     def __init__(self, execute: Execute, may_solve: Callable[[], bool]) -> None:
@@ -323,22 +309,7 @@ SNAPSHOT = 0
 
 
 class DssEngine:
-    """One circuit in an engine of its own.
-
-    Parameters
-    ----------
-    tell : Callable[[str], None]
-        Takes what the engine is about to do, with file and line.
-
-    Attributes
-    ----------
-    circuit : dss.ICircuit
-        The engine's active circuit.
-    notes : list of str
-        What was not done as the script says.
-    places : dict of str to str
-        File and line of each element and "bus NAME" (lower case).
-    """
+    """One circuit in an engine of its own; `tell` takes what the engine is about to do, with file and line."""
 
     def __init__(self, tell: Callable[[str], None]) -> None:
         from dss import DSS
@@ -359,12 +330,7 @@ class DssEngine:
     def read(self, path: Path, scratch: Path | None = None) -> list[str]:
         """Run a script and solve its circuit; return all problems, each with its file and line.
 
-        Parameters
-        ----------
-        path
-            The script.
-        scratch
-            Folder that takes what the engine writes by itself (traces of controls); else the working folder.
+        `scratch` takes what the engine writes by itself (traces of controls).
         """
         if problems := path_problems(path):
             return problems

@@ -34,16 +34,10 @@ class Branches(NamedTuple):
 
 
 def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
-    """Return the branches of a load or generator.
+    """Return the branches of a load or generator, which is active.
 
-    Parameters
-    ----------
-    element : dss.ICktElement
-        The element, active.
-    kV
-        Its property `kV`: line-to-line in a delta and where a wye has two or three phases, else that of its phase.
-    is_delta
-        Whether its phases stand between its conductors, and not between each and the last one.
+    `kV` is line-to-line in a delta and where a wye has two or three phases, else that of its phase. Phases of a delta
+    are between its conductors, others between each and the last one.
     """
     phases, conductors = int(element.NumPhases), int(element.NumConductors)
     return Branches(

@@ -17,8 +17,7 @@ from typing import Any
 from gridpeers.bridges.opendss.dss_circuit import DssCircuit, ImportRequest
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
-from gridpeers.wire.packages import damaged
-from gridpeers.wire.wording import printable
+from gridpeers.wire.wording import damaged, printable
 
 MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 'gridpeers[opendss]'"
 
@@ -60,13 +59,7 @@ class DssProcess:
         self._process.send(request._asdict() | {"path": str(request.path)})
 
     def circuit(self, path: Path) -> DssCircuit:
-        """Return the circuit that was asked for.
-
-        Raises
-        ------
-        FeederError
-            With everything that the engine refuses; if it cannot be loaded, or crashes.
-        """
+        """Return the circuit that was asked for; FeederError if the engine refuses it, cannot be loaded, or crashes."""
         try:
             answer = self._process.answer(monotonic() + LONGEST)
         except ProcessEndedError as how:  # while it loads the engine, or somebody ended it
@@ -98,13 +91,7 @@ class DssProcess:
 
 @contextmanager
 def reading(request: ImportRequest) -> Iterator[DssProcess]:
-    """Let the engine read a script while the caller does other things; its process stays for the next one.
-
-    Raises
-    ------
-    FeederError
-        If the engine is not installed.
-    """
+    """Let the engine read a script while the caller does other things; its process stays for the next one."""
     if importlib.util.find_spec("dss") is None:
         raise FeederError("OpenDSS", (MISSING,))
     with _lock:

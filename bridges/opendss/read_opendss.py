@@ -32,14 +32,9 @@ UNGROUNDED = "ground a winding, or leave ppm_antifloat as it is"
 def read_opendss(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
 ) -> Feeder:
-    """Return the feeder of a script for OpenDSS; `gridpeers.feeder.Feeder.from_opendss` explains the parameters.
+    """Return the feeder of a script for OpenDSS (`gridpeers.Feeder.from_opendss`).
 
     Its `notes` list what was done instead of what the script says.
-
-    Raises
-    ------
-    FeederError
-        With everything that the engine refuses and everything that cannot be represented.
     """
     path = Path(path).absolute()
     with reading(ImportRequest(path, f_nom, list(leave_out), list(switches))) as engine:

@@ -145,17 +145,7 @@ MOST_GROUPS = 12
 
 
 def group_sizes(loads: Sequence[float], places: Sequence[int], count: int | None) -> list[list[int]]:
-    """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit.
-
-    Parameters
-    ----------
-    loads
-        Load of each section (W), in falling order.
-    places
-        Inverters for which each has a bus, one or more.
-    count
-        Inverters, or None for as many as the load needs.
-    """
+    """Return the sizes of the groups of the first sections; with `count` there are so many inverters, if they fit."""
     whole = ceil(count / GROUP) if count else MOST_GROUPS
     number = [1 for _ in loads[:whole]]
 
@@ -191,15 +181,6 @@ def phase_powers(feeder: Feeder, switch: str, head: str) -> NDArray[np.complex12
 
     It is without fixed generation. So loads between phases, behind transformers and on split-phase services count where
     they come from.
-
-    Parameters
-    ----------
-    feeder
-        The feeder; its power flow has a solution, else the result is empty.
-    switch
-        Name or alias of the closed switch.
-    head
-        Its bus away from the substation.
     """
     loads = tuple(part for part in feeder.load_parts if part.S.real >= 0.0)
     network = Network(replace(feeder, load_parts=loads, inverters=()))
@@ -273,13 +254,7 @@ class NoProposalError(ValueError):
 
 
 class NoSwitchError(NoProposalError):
-    """No switch cuts half of the load off the substation.
-
-    Attributes
-    ----------
-    lines : tuple of str
-        Lines near the substation that would make switches.
-    """
+    """No switch cuts half of the load off the substation."""
 
     def __init__(self, lines: Sequence[str]) -> None:
         self.lines = tuple(lines)
@@ -333,25 +308,12 @@ class Proposal(NamedTuple):
 
 
 def propose(feeder: Feeder, count: int | None = None) -> Proposal:
-    """Return where to island a feeder, and inverters that can then carry its load.
+    """Return where to island a feeder, and inverters that can then carry its load; its own are not considered.
 
     The switch is the one that cuts off most load. Each section between switches beyond it has a leader and followers,
     rated by its load and that of the heaviest phase, or by what its cables deliver, and spread over it in equal parts
-    of the load.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        The feeder; its own inverters are not considered.
-    count : int, optional
-        Inverters to propose; by default one group for each section. Sections of more load have more groups, and all
-        have more where an inverter would be larger than its voltage allows.
-
-    Raises
-    ------
-    NoProposalError
-        If no switch cuts off half of the load, no section beyond it has a three-phase bus for an inverter, or so many
-        inverters cannot carry the load at their voltage.
+    of the load. Without a count each section has one group; sections of more load have more groups, and all have more
+    where an inverter would be larger than its voltage allows.
     """
     try:
         return _propose(feeder, count)

@@ -54,17 +54,7 @@ class Unrest(NamedTuple):
 
 
 def unsteady(scenario: ScenarioModel, feeder: Tables, case: str) -> Unrest | None:
-    """Return what goes on after the last event on droop alone; None if the plant comes to rest.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        A checked scenario whose plant can start; its events are made to come early.
-    feeder : Feeder
-        Its feeder.
-    case : str
-        The case whose events are taken.
-    """
+    """Return what goes on after the last event on droop alone; None if the plant comes to rest."""
     config, _ = configs(scenario, feeder, case)
     settings = config.settings
     early = FIRST - min(_times(settings), default=FIRST)

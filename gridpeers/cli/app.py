@@ -22,15 +22,13 @@ def main() -> None:
     try:
         _main()
     except KeyboardInterrupt:  # before the command line is read
-        from gridpeers.cli.usage import INTERRUPTED
-
         _tell("interrupted before anything had begun")
-        sys.exit(INTERRUPTED)
+        sys.exit(130)
     except ImportError as error:
-        from gridpeers.wire.packages import not_importable
+        from gridpeers.wire.wording import not_importable
 
         _tell(not_importable(error))
-        sys.exit(2)  # as BAD_INPUT, whose module may be what cannot be imported
+        sys.exit(2)
     except SystemExit as end:
         leave(end.code if isinstance(end.code, int) else int(end.code is not None), _tell)
         raise
@@ -60,12 +58,11 @@ def _main() -> None:
 
 def _without_folder(error: OSError) -> str:
     """Return what is wrong if the present folder is gone, as a sentence; empty if it is there."""
-    if not isinstance(error, FileNotFoundError) or error.filename is not None:
-        return ""
     try:
         Path.cwd()
     except FileNotFoundError:
-        return "the present folder is gone; change to one that is there (cd), and give the command again"
+        if error.filename is None:
+            return "the present folder is gone; change to one that is there (cd), and give the command again"
     return ""
 
 
@@ -85,8 +82,6 @@ def _start_ahead(driver: Literal["processes", "inprocess", ""]) -> None:
 def driver_of(words: Sequence[str]) -> Literal["processes", "inprocess", ""]:
     """Return the driver of a command line that looks like a run; if it is none, what was started ends with it.
 
-    Examples
-    --------
     >>> driver_of(["run", "islanding"]), driver_of(["run", "islanding", "--driver=inprocess"])
     ('processes', 'inprocess')
     >>> driver_of(["run", "--help"]), driver_of(["check", "islanding"])

@@ -1,12 +1,124 @@
-"""The command `gridpeers` as typer has it. A command is imported when it is called, so that help comes at once."""
+"""The command `gridpeers` as typer has it. A command is imported when it is called, so that help comes at once.
+
+Installed distributions add commands by entry points of the group "gridpeers.commands": functions that typer can read.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from gridpeers.cli.lazy_commands import LazyCommands
+from gridpeers.cli.suggestions import Commands
+from gridpeers.wire.plugins.registry import PluginError, Registry
+
+
+class OwnCommand(NamedTuple):
+    """One command, without its module."""
+
+    reference: str
+    """`module:name` of a function that typer can read, or of a `typer.Typer` with commands below this one."""
+    summary: str
+    """Its line in the help of `gridpeers`: the first sentence of its docstring."""
+
+
+_HERE = "gridpeers.cli.commands"
+
+OWN_COMMANDS = {
+    name: OwnCommand(reference if reference.startswith("gridpeers.papers.") else f"{_HERE}.{reference}", summary)
+    for name, reference, summary in (
+        ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
+        ("list", "show:list_", "List the scenarios that come with gridpeers."),
+        ("check", "show:check", "Check a scenario file and its feeder for problems."),
+        ("doc", "show:doc", "Print a reference page that is made from the code."),
+        ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+        ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
+        ("metrics", "show:metrics", "Measure a run from its record, also one that was killed."),
+        ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
+        (
+            "reproduce",
+            "gridpeers.papers.singhal2022.reproduce.reproduce_command:reproduce",
+            "Run all experiments of the paper, and write one report.",
+        ),
+        (
+            "experiment",
+            "gridpeers.papers.singhal2022.experiment_command:experiment",
+            "Run an experiment on late, lossy or broken links.",
+        ),
+        ("plant", "start_commands:plant", "Run the plant of a scenario in this terminal, in real time."),
+        ("agent", "start_commands:agent", "Run the agent of an inverter, or of several, in this terminal."),
+        ("up", "start_commands:up", "Run the plant and all its agents at once, in real time."),
+        ("down", "live_commands:down", "End a run: its agents leave, its plant ends."),
+        ("status", "live_commands:status", "Look once at a run: time, pacing, agents, latest events."),
+        ("watch", "live_commands:watch", "Watch a run as a live table; q quits."),
+        ("stop", "live_commands:stop", "Have an agent leave properly: its inverter is switched off."),
+        ("event", "live_commands:event", "Open or close a switch of a running plant."),
+        ("load", "live_commands:load", "Set a load of a running plant."),
+        ("link", "link:link", "Hurt and heal links while a run goes on."),
+        ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
+        ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
+    )
+}
+"""All of them, by name."""
+
+COMMANDS: Registry[Callable[..., None]] = Registry(
+    "command",
+    "commands",
+    lambda it: "" if callable(it) else "it is no function",
+    own={name: command.reference for name, command in OWN_COMMANDS.items()},
+)
+"""Functions of all commands, or a `typer.Typer`, by name."""
+
+
+class LazyCommands(Commands):
+    """All commands by their names; the help reads the line of each from `OWN_COMMANDS`."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names: gridpeers' own first."""
+        return list(COMMANDS.names)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Import a command, one that says so when it is called if it cannot be; None if there is none of this name."""
+        if cmd_name not in self.commands and (cmd_name in COMMANDS.own or cmd_name in COMMANDS.names):
+            try:
+                found = COMMANDS.resolve(cmd_name)
+            except PluginError as error:
+                found = _broken(str(error))
+            self.commands[cmd_name] = _as_typer_has_it(cmd_name, found)
+        return self.commands.get(cmd_name)
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the names and what each command does."""
+        rows = []
+        for name in self.list_commands(ctx):
+            own = OWN_COMMANDS.get(name)
+            rows.append((name, own.summary if own else self.get_command(ctx, name).get_short_help_str(60)))
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
+
+def _broken(why: str) -> Callable[..., None]:
+    def command() -> None:
+        """Cannot be imported."""
+        from gridpeers.cli.usage import BAD_INPUT, fail
+
+        fail([why], BAD_INPUT)
+
+    return command
+
+
+def _as_typer_has_it(name: str, found: Any) -> Any:
+    """Return the command of a function, or of a `typer.Typer` with commands of its own."""
+    holder = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+    holder.callback()(lambda: None)  # so that a single command keeps its name
+    if isinstance(found, typer.Typer):
+        holder.add_typer(found, name=name)
+    else:
+        holder.command(name)(found)
+    group: Any = typer.main.get_command(holder)
+    return group.commands[name]
+
 
 app = typer.Typer(
     cls=LazyCommands,

@@ -21,18 +21,15 @@ _UsageError: type[BaseException] = BadParameter.__mro__[1]
 class Commands(TyperGroup):
     """Commands that report mistyped words in one line."""
 
-    def make_context(self, *words: Any, **extra: Any) -> Any:
-        """Read the options before the command."""
+    def make_context(self, *words: Any, **extra: Any) -> Any:  # noqa: D102
         with _in_one_line():
             return super().make_context(*words, **extra)
 
-    def invoke(self, ctx: Any) -> Any:
-        """Read what follows the command, and run it."""
+    def invoke(self, ctx: Any) -> Any:  # noqa: D102
         with _in_one_line():
             return super().invoke(ctx)
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """Find the command."""
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # noqa: D102
         if not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
             fail([f'no command "{args[0]}"; {suggestion(args[0], self.list_commands(ctx), "commands")}'], BAD_INPUT)
         return super().resolve_command(ctx, args)
@@ -53,10 +50,11 @@ def _line(error: Any) -> str:
     message = error.format_message().rstrip(".")
     more = command_line(*_words(error.ctx), "-h")
     param, kind = getattr(error, "param", None), type(error).__name__
-    if kind == "NoSuchOption" and _is_negative_time(error):
-        return 'TIME: must be at least 0 s, where a run begins, as 4.3; a word that begins with "-" is an option'
     if kind == "NoSuchOption":
-        known = [name for each in error.ctx.command.get_params(error.ctx) for name in each.opts if name[:2] == "--"]
+        params = error.ctx.command.get_params(error.ctx)
+        if re.match(r"-[\d.]", error.option_name) and any(each.metavar == "TIME" for each in params):
+            return 'TIME: must be at least 0 s, where a run begins, as 4.3; a word that begins with "-" is an option'
+        known = [name for each in params for name in each.opts if name[:2] == "--"]
         return f'no option "{error.option_name}"; {suggestion(error.option_name, known, "options")}'
     if kind == "MissingParameter" and param is not None:
         return f"{_name(param)} is missing; {more} shows what it is"
@@ -68,12 +66,6 @@ def _line(error: Any) -> str:
     if param is not None:
         return f"{_name(param)}: {_wrong_value(error, message)}"
     return f"{message[:1].lower()}{message[1:]}; {more} shows what can be given"
-
-
-def _is_negative_time(error: Any) -> bool:
-    """Return whether a number below 0 was read as an option by a command that takes a run time."""
-    params = error.ctx.command.get_params(error.ctx)
-    return bool(re.fullmatch(r"-[\d.]", error.option_name)) and any(each.metavar == "TIME" for each in params)
 
 
 def _words(ctx: Any) -> list[str]:
@@ -89,7 +81,6 @@ def _name(param: Any) -> str:
 
 
 def _wrong_value(error: Any, message: str) -> str:
-    """Return the problem of a value that was typed."""
     value, *choices = re.findall(r"'([^']*)'", message.partition(": ")[2]) or [""]
     ctx: dict[str, Any] = {}
     if details := getattr(error.__cause__, "errors", None):  # typer has values checked by pydantic since 0.29

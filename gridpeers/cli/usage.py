@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
 import sys
@@ -103,10 +102,10 @@ RUN = {
 
 
 def require(modules: dict[str, str], install: str = "") -> None:
-    """End with a clear line, and with advice, if a package that is needed is missing, or ZENOH_RUNTIME is wrong."""
+    """End with a clear line, and with advice, if a package that is needed is missing."""
     from importlib.util import find_spec
 
-    from gridpeers.wire.packages import DISTRIBUTIONS, requirement
+    from gridpeers.wire.wording import DISTRIBUTIONS, requirement
 
     missing = [name for name in modules if find_spec(name) is None]
     if missing:
@@ -114,18 +113,13 @@ def require(modules: dict[str, str], install: str = "") -> None:
         lines = [f"{packages[name]} is not installed; it is needed for {modules[name]}" for name in missing]
         again = f"install what is missing: pip install {' '.join(map(requirement, missing))}"
         fail([*lines, install or again], BAD_INPUT)
-    if "zenoh" in modules:
-        from gridpeers.wire.driver.zenoh_settings import RUNTIME, runtime_objection
-
-        if objection := runtime_objection(os.environ.get("ZENOH_RUNTIME", RUNTIME)):
-            fail([objection], BAD_INPUT)
 
 
 def require_loadable(module: str, user: str) -> None:
     """End with a clear line if a package with a library of its own, an extra by its name, is missing or damaged."""
     import subprocess
 
-    from gridpeers.wire.packages import damaged
+    from gridpeers.wire.wording import damaged
 
     require({module: user}, f"install it: pip install 'gridpeers[{module}]'")
     done = subprocess.run([sys.executable, "-P", "-c", f"import {module}"], capture_output=True, text=True, check=False)
@@ -150,9 +144,9 @@ def interruptible() -> Iterator[None]:
     Signals within a second are one request, those of Ctrl-C too, which `timeout` passes on twice.
     """
     from gridpeers.scenarios.results.run_files import TerminatedError
-    from gridpeers.wire.driver.ending import StopSignal, ctrl_c_or
+    from gridpeers.wire.driver.ending import StopSignal
 
-    terminate, numbers = StopSignal(ctrl_c_or(TerminatedError)), [signal.SIGTERM]
+    terminate, numbers = StopSignal(TerminatedError), [signal.SIGTERM]
     if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else a shell has it ignored, or another has it
         numbers.append(signal.SIGINT)
     if signal.getsignal(signal.SIGHUP) is signal.SIG_DFL:  # else nohup has asked that the run outlives its terminal

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 
 class _FromFolder:
-    """The part of a result that one case and all cases of a run share."""
+    """What one case and all cases of a run share."""
 
     def __init__(self, folder: RunFolder, spec: model.ScenarioModel, feeder: Feeder) -> None:
         self._folder, self._spec, self._feeder = folder, spec, feeder

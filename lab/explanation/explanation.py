@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
-from gridpeers.agents.laws.law import Neighbour
-from gridpeers.lab.explanation.last_decision import aftermath
+from gridpeers.agents.laws.law import Neighbour, Term
 from gridpeers.lab.explanation.law_step import LawStep, law_step
 from gridpeers.lab.explanation.unheard import absence, missed, reason, rejections, verdicts
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import NeighbourInput, RecordedDecision
 from gridpeers.scenarios.short_texts import short
-from gridpeers.wire.messages import PlantEvent
+from gridpeers.wire.messages import VALUES, PlantEvent
 
 RECENT = 1.0
 """Time (s) before the decision whose events are told."""
@@ -22,7 +23,6 @@ class NeighbourAccount:
     """An in-neighbour at a decision, and what became of it."""
 
     name: str
-    """Its name."""
     input: NeighbourInput | None
     """Its last state as heard; None if the agent had not met it."""
     seen: Neighbour | None
@@ -41,9 +41,7 @@ class Explanation:
     """Why an agent decided as it did. `str` gives the text of `gridpeers why`."""
 
     scenario: str
-    """Name of the scenario."""
     case: str
-    """Name of the case."""
     asked: float
     """Run time (s) that was asked for; the decision was in force then."""
     decision: RecordedDecision
@@ -61,7 +59,6 @@ class Explanation:
 
     @property
     def agent(self) -> str:
-        """Name of the agent."""
         return self.decision.agent
 
     @property
@@ -80,12 +77,6 @@ def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, .
     """Explain the decision of an agent that was in force at a run time (s).
 
     `events` are those of the record, if they are known already: to read them takes its whole file.
-
-    Raises
-    ------
-    RecordFileError
-        If there was no such agent, the time is outside of the record, the agent had not decided by then, or the record
-        has no decisions.
     """
     if agent not in record.agents:
         raise RecordFileError(f"{record.path}: there was no agent {agent!s:.64}; agents are {short(record.agents)}")
@@ -137,3 +128,119 @@ def _matters(event: PlantEvent, decision: RecordedDecision, asked: float) -> boo
     if decision.t - RECENT <= event.t <= decision.t + 1e-9:
         return True
     return event.subject == decision.agent and decision.t < event.t <= asked
+
+
+# -------------------------------------------------------------------- after the last decision
+
+
+SILENT = 10
+"""Control periods without a decision after which the inverter is looked at, though nothing says that its agent left."""
+
+
+def aftermath(
+    record: RunRecord, decision: RecordedDecision, asked: float, events: Sequence[PlantEvent]
+) -> tuple[str, ...]:
+    """Return in sentences what happened between a decision and a later run time (s) for which there is no other one.
+
+    Empty if the decision is of that time.
+    """
+    T_c = decision.config.T_c
+    if asked - decision.t <= 1.5 * T_c:
+        return ()
+    about = [
+        event
+        for event in events
+        if event.kind == "roster" and event.subject == decision.agent and decision.t - T_c < event.t <= asked + 1e-9
+    ]
+    last = f"it is the last decision before {asked:g} s"
+    if not about and asked - decision.t < SILENT * T_c:
+        return (last,)
+    left = f": {about[-1].text}" if about else ""
+    return last + left, *_inverter(record, decision, asked)
+
+
+def _inverter(record: RunRecord, decision: RecordedDecision, t: float) -> tuple[str, ...]:
+    """Return in a sentence what the inverter of an agent does at a run time (s); nothing if no row tells."""
+    values = _row(record, decision.agent, t)
+    if values is None:
+        return ()
+    _, P, Q, _, P_set, V_set = values
+    if P == Q == 0.0:  # the plant reports exactly no power of an inverter that is off the network
+        return (f"at {t:g} s its inverter is off the network",)
+    holds = (
+        "these set-points"
+        if (P_set, V_set) == decision.after
+        else f"P_set = {P_set / 1e3:.2f} kW, V_set = {V_set:.2f} V"
+    )
+    return (f"at {t:g} s its inverter is on the network, delivers {P / 1e3:.2f} kW, and keeps {holds}",)
+
+
+def _row(record: RunRecord, inverter: str, t: float) -> tuple[float, ...] | None:
+    """Return f, P, Q, V, P_set and V_set of an inverter in the last row up to a run time (s)."""
+    found: tuple[float, tuple[float, ...]] | None = None
+    for message in record.telemetry(since=max(0.0, t - 1.0), until=t):
+        if inverter in message.inverters:
+            start = 1 + VALUES * message.inverters.index(inverter)
+            for row in message.rows:
+                if row[0] <= t + 1e-9 and (found is None or row[0] > found[0]):
+                    found = row[0], row[start : start + VALUES]
+    return None if found is None else found[1]
+
+
+# -------------------------------------------------------------------- a value followed back
+
+
+Quantity = Literal["P_set", "V_set"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrailStep:
+    """One decision on the way back."""
+
+    decision: RecordedDecision
+    step: LawStep | None
+    """The step of its law; None if the law was on hold."""
+    largest: Term | None
+    """The largest term, which is followed if it comes from a neighbour; None if there is none."""
+    end: str
+    """Why the trail ends here; empty if it goes on to the neighbour of the largest term."""
+
+
+def trail(record: RunRecord, decision: RecordedDecision, quantity: Quantity, hops: int) -> tuple[TrailStep, ...]:
+    """Follow a set-point back: at each decision to the state behind the largest term of its step.
+
+    It ends where the largest term is of the agent's own inverter, where the law was on hold, or after `hops` decisions.
+    """
+    steps: list[TrailStep] = []
+    for hop in range(hops):
+        step = law_step(record, decision)
+        terms = () if step is None else getattr(step, quantity).terms
+        largest = max(terms, key=lambda term: abs(term.value), default=None)
+        before = None if largest is None else _behind(record, decision, largest)
+        if step is None:
+            end = decision.in_words
+        elif largest is None or largest.value == 0.0:
+            end = "no term moves it"
+        elif not largest.neighbour:
+            end = "the largest term is of the own inverter"
+        elif before is None:
+            end = f"the record has no decision of {largest.neighbour} behind that state"
+        else:
+            end = "" if hop + 1 < hops else f"{hops} decisions are shown"
+        steps.append(TrailStep(decision=decision, step=step, largest=largest, end=end))
+        if end or before is None:
+            break
+        decision = before
+    return tuple(steps)
+
+
+def _behind(record: RunRecord, decision: RecordedDecision, term: Term) -> RecordedDecision | None:
+    """Return the decision that the state behind a term came from."""
+    state = next((each.state for each in decision.neighbours if each.name == term.neighbour), None)
+    if state is None:
+        return None
+    try:
+        found = record.decision(state.sender, state.t)
+    except RecordFileError:  # of an agent that keeps no journal
+        return None
+    return found if found.state.seq == state.seq and found.state.epoch == state.epoch else None

@@ -8,9 +8,8 @@ from rich.console import Console, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, Quantity, TrailStep
 from gridpeers.lab.explanation.law_step import QuantityStep
-from gridpeers.lab.explanation.trail import Quantity, TrailStep
 from gridpeers.scenarios.console import text_of as printed_text
 
 SHOWN = 12

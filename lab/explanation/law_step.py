@@ -11,7 +11,7 @@ from gridpeers.agents.carriers.law_registry import make_law
 from gridpeers.agents.laws.law import Law, SetPoints, Term, Terms
 from gridpeers.scenarios.record.record_reader import RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision, limits_of
-from gridpeers.wire.plugins.foreign_code import ANYTHING, named
+from gridpeers.wire.plugins.registry import ANYTHING, named
 
 TOLERANCE = 1e-12
 """Largest difference (pu) between the step taken and the sum of its parts that rounding explains."""

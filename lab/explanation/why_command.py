@@ -34,9 +34,8 @@ def why(
     """
     require({"mcap": "the record of a run"})
 
-    from gridpeers.lab.explanation.explanation import explain
+    from gridpeers.lab.explanation.explanation import explain, trail
     from gridpeers.lab.explanation.explanation_text import show
-    from gridpeers.lab.explanation.trail import trail
     from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 
     if not isfinite(t):

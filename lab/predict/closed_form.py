@@ -31,25 +31,13 @@ DelayKind = Literal["neighbours", "disagreement", "local loop"]
 
 
 def laplacian(inverters: InverterGroup) -> Floats:
-    """Return Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only.
-
-    Examples
-    --------
-    >>> laplacian(InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))).tolist()
-    [[1.0, -1.0], [-1.0, 1.0]]
-    """
+    """Return Laplacian L = diag(A 1) - A (1) among those that run the law; links to others carry constants only."""
     A = inverters.A[np.ix_(inverters.acts, inverters.acts)]
     return np.asarray(np.diag(A.sum(axis=1)) - A)
 
 
 def groups(inverters: InverterGroup) -> tuple[tuple[str, ...], ...]:
-    """Return the connected parts of the graph of those that run the law, in the order of the names.
-
-    Examples
-    --------
-    >>> groups(InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=np.diag([1.0, 0.0], k=1)))
-    (('a', 'b'), ('c',))
-    """
+    """Return the connected parts of the graph of those that run the law, in the order of the names."""
     acting = [name for name, acts in zip(inverters.names, inverters.acts.tolist(), strict=True) if acts]
     count, label = connected_components(inverters.A[np.ix_(inverters.acts, inverters.acts)], directed=False)
     return tuple(tuple(name for name, of in zip(acting, label.tolist(), strict=True) if of == k) for k in range(count))
@@ -60,11 +48,9 @@ class Modes:
     """Rates of the two slow modes, and times by these rates. Infinite where there is no such mode."""
 
     links: int
-    """Number of links among those that run the law."""
     lambda_2: float
     """Second smallest eigenvalue of L (1), the Fiedler value; 0 when the graph is not connected."""
     lambda_max: float
-    """Largest eigenvalue of L (1)."""
     kappa: float
     """m_p / k_p (1/s), the mean where droops differ."""
     frequency_rate: float
@@ -93,13 +79,7 @@ class Modes:
 
 
 def settling(rate: float) -> float:
-    """Return the time (s) in which a mode falls to 2 %; infinite when it does not fall.
-
-    Examples
-    --------
-    >>> round(settling(4.0), 2)
-    1.0
-    """
+    """Return the time (s) in which a mode falls to 2 %; infinite when it does not fall."""
     return math.inf if rate <= ZERO else SETTLING / rate
 
 
@@ -111,27 +91,9 @@ def settling_in_ticks(spectral_radius: float, T_c: float) -> float:
 def modes(inverters: InverterGroup) -> Modes:
     """Return the modes of the secondary law of some inverters, by the continuous equations.
 
-    Raises
-    ------
-    ValueError
-        If nobody runs the law.
-
-    Notes
-    -----
     With unequal droops kappa n_L / N becomes n_L / sum(1/kappa_i), and kappa lambda the eigenvalues of K L: the left
     null vector of K L weighs each set-point with 1/kappa_i. Where some do not run the law, the frequency answers to
     the others by the sum of their w_i only.
-
-    Examples
-    --------
-    Nine alike, three leaders, everybody hears everybody:
-
-    >>> from gridpeers.agents.agent_config import Gains
-    >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
-    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
-    >>> found = modes(nine)
-    >>> round(found.lambda_2, 6), round(found.frequency_rate, 6), round(found.slowest_rate, 6)
-    (9.0, 4.0, 4.0)
     """
     acts = inverters.acts
     if not acts.any():
@@ -166,14 +128,6 @@ def delay_limit_closed(inverters: InverterGroup, kind: DelayKind) -> float:
     - "disagreement": pi / (2 kappa lambda_max), Olfati-Saber and Murray (2004).
     - "local loop": about pi / (2 slowest rate), as of one integrator with delay; pi N / (2 kappa n_L) when sharing is
       fast.
-
-    Examples
-    --------
-    >>> from gridpeers.agents.agent_config import Gains
-    >>> GFM, A, gains = np.arange(9) % 3 == 0, 1.0 - np.eye(9), Gains(k_p=0.01 / 12)
-    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=GFM, A=A, gains=gains)
-    >>> round(delay_limit_closed(nine, "disagreement"), 4), round(delay_limit_closed(nine, "local loop"), 4)
-    (0.0145, 0.3927)
     """
     found = modes(inverters)
     if kind == "neighbours":
@@ -186,13 +140,7 @@ def delay_limit_closed(inverters: InverterGroup, kind: DelayKind) -> float:
 
 
 def equivalent_delay(T: float, loss: float) -> float:
-    """Return mean additional age (s) of a neighbour's value when messages are lost and the last is held, T p / (1 - p).
-
-    Examples
-    --------
-    >>> [round(equivalent_delay(0.02, p), 4) for p in (0.5, 0.7, 0.9)]
-    [0.02, 0.0467, 0.18]
-    """
+    """Return how much older (s) a neighbour's value is on average where losses hold the last one: T p / (1 - p)."""
     if not 0.0 <= loss < 1.0:
         raise ValueError(f"loss is a probability from 0 to below 1, got {loss:g}; write 0.3 for 30 %")
     return T * loss / (1.0 - loss)

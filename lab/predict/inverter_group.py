@@ -20,20 +20,10 @@ from gridpeers.scenarios.schema.plugin_keys import graph_of
 
 @dataclass(frozen=True, kw_only=True)
 class InverterGroup:
-    """N inverters that share one frequency.
-
-    Examples
-    --------
-    Three alike, one of them a leader, on a path:
-
-    >>> A = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]])
-    >>> inverters = InverterGroup(names=("a", "b", "c"), GFM=np.array([True, False, False]), A=A)
-    >>> inverters.kappa.round(2).tolist(), inverters.weight.round(2).tolist()
-    ([14.29, 14.29, 14.29], [0.33, 0.33, 0.33])
-    """
+    """N inverters that share one frequency."""
 
     names: tuple[str, ...]
-    """Names, order of all arrays."""
+    """Order of all arrays."""
     GFM: Flags
     """Which are grid-forming: the leaders, g_i = 1."""
     A: Floats
@@ -51,7 +41,6 @@ class InverterGroup:
     gains: Gains = field(default_factory=Gains)
     """Of the law; its limits are not part of a linear model."""
     f_nom: float = F_NOM
-    """Nominal frequency (Hz)."""
     T_c: float = 0.02
     """Control period (s)."""
     parameters: tuple[InverterParameters, ...] = ()
@@ -71,7 +60,6 @@ class InverterGroup:
 
     @property
     def n(self) -> int:
-        """Number N of inverters."""
         return len(self.names)
 
     @property
@@ -88,7 +76,6 @@ class InverterGroup:
 
     @property
     def leads(self) -> Flags:
-        """Inverters that integrate the frequency error: GFM that run the law."""
         leads: Flags = self.GFM & self.acts
         return leads
 
@@ -110,7 +97,6 @@ class InverterGroup:
 
     @property
     def degree(self) -> Floats:
-        """Number d_i of neighbours that each listens to."""
         return np.asarray(self.heard.sum(axis=1))
 
     def part(self, which: NDArray[np.bool_]) -> InverterGroup:
@@ -136,25 +122,8 @@ def inverter_group_of(
 ) -> InverterGroup:
     """Return the inverters of one case of a scenario.
 
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        Checked.
-    feeder : Feeder
-        Its feeder.
-    case : str
-        Name of the case.
-    roster : Collection[str], optional
-        Inverters that take part in the run; the graph's rule is applied to these. Those of the start, if left out.
-    island : Collection[str], optional
-        Inverters of the island; the others are not heard. All of the roster, if left out.
-
-    Examples
-    --------
-    >>> from gridpeers.scenarios.schema import load_scenario
-    >>> inverters = inverter_group_of(*load_scenario("islanding"), "IV")
-    >>> inverters.n, inverters.A.sum(), inverters.leads.sum()
-    (9, np.float64(72.0), np.int64(3))
+    The graph's rule is applied to the roster, who takes part in the run: those of the start, if left out. Of an island,
+    the others are not heard.
     """
     rule = scenario.cases[case]
     present = {row.name for row in feeder.inverters} if roster is None else set(roster)

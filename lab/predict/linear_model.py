@@ -16,6 +16,7 @@ of a delay of p/(1-p) ticks. The model follows the means; how far one run strays
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -25,6 +26,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from gridpeers.agents.laws.consensus import towards
+from gridpeers.lab.predict.closed_form import DelayKind
 from gridpeers.lab.predict.inverter_group import InverterGroup
 from gridpeers.lab.predict.response import PlantModel, response
 from gridpeers.scenarios.results.history import Floats
@@ -82,16 +84,7 @@ class _Delays:
 
 @dataclass(frozen=True, kw_only=True)
 class Loop:
-    """Law and plant of some inverters under given delays.
-
-    Examples
-    --------
-    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
-    >>> Loop(inverters=nine).spectral_radius < 1.0
-    True
-    >>> Loop(inverters=nine, ticks=Ticks(measurement=40)).spectral_radius < 1.0
-    False
-    """
+    """Law and plant of some inverters under given delays."""
 
     inverters: InverterGroup
     ticks: Ticks = field(default_factory=Ticks)
@@ -101,7 +94,6 @@ class Loop:
 
     @cached_property
     def _delays(self) -> _Delays:
-        """The delays of every link and inverter, checked."""
         inverters, names, ticks = self.inverters, self.inverters.names, self.ticks
         found = _Delays(
             link=[[_of(ticks.link, (src, dst)) for src in names] for dst in names],
@@ -221,27 +213,15 @@ class Loop:
 
     @property
     def stable(self) -> bool:
-        """Whether every mode that moves decays."""
         return self.spectral_radius < 1.0 - 1e-12
 
     def run(self, ticks: int, start: Floats, load: float, *, islanding: bool = False) -> Path:
         """Step of the load: until t = 0 all stand still at nominal frequency, from then on the load is another.
 
-        Parameters
-        ----------
-        ticks : int
-            How many control periods to follow.
-        start : Floats
-            m_p P_set of each at the start (pu frequency).
-        load : float
-            From t = 0 on, in pu frequency: the mean m_p p that carries it.
-        islanding : bool, optional
-            Whether the island is new. Agents leave out states that were sent in another island than theirs (but at the
-            very tick of the change), so a link with n ticks of delay carries nothing at the ticks 2 to n + 1.
-
-        Notes
-        -----
-        The measurement of the event's own tick is taken before it, so the first that tells of it is the next one.
+        The start is m_p P_set of each, the load the mean m_p p that carries it (both pu frequency). Where the island is
+        new (`islanding`), agents leave out states that were sent in another island than theirs (but at the very tick of
+        the change), so a link with n ticks of delay carries nothing at the ticks 2 to n + 1. The measurement of the
+        event's own tick is taken before it, so the first that tells of it is the next one.
         """
         matrix, e_row, power_rows = self._built
         plant, inverters = response(self.inverters, self.plant), self.inverters
@@ -267,3 +247,71 @@ class Loop:
 
 def _of(value: float | Mapping[Any, Any], key: object) -> Any:
     return value.get(key, 0) if isinstance(value, Mapping) else value
+
+
+# -------------------------------------------------------------------- limits of delay
+
+
+ANGLES = 600
+"""Angles at which delay-independence is tried, between 1e-3 rad and pi, evenly in their logarithm."""
+
+
+def delay_limit(
+    inverters: InverterGroup, kind: DelayKind | str, *, plant: PlantModel = "lagged", longest_s: float = 3.0
+) -> float:
+    """Return the longest delay (s), the same for all, up to which the loop in discrete time is stable.
+
+    "neighbours" is from agent to agent with a fresh own value; in "disagreement" the own value is as late; "local loop"
+    is from the plant to an agent, or back, which are the same to the loop. The limit is a multiple n T_c (s): stable
+    with it, unstable with any more, as the next tick is then the first to use what comes. Infinite if none was found up
+    to `longest_s`, which for "neighbours" is mostly at any delay (`first_crossing`). Not a number if the loop is
+    unstable without delay.
+    """
+    ticks = {
+        "neighbours": lambda n: Ticks(link=n),
+        "disagreement": lambda n: Ticks(link=n, own=n),
+        "local loop": lambda n: Ticks(measurement=n),
+    }
+    if kind not in ticks:
+        raise ValueError(f'no kind of delay "{kind}"; kinds are {", ".join(ticks)}')
+    if not Loop(inverters=inverters, plant=plant).stable:
+        return math.nan
+    if kind != "local loop" and not inverters.heard.any():
+        return math.inf
+    first = 1.0
+    if kind == "neighbours":  # long delays make large matrices: begin where the sweep says that something happens
+        first = max(1.0, 0.9 * first_crossing(inverters, plant=plant) - 1.0)
+    unmoved = 1 if kind != "local loop" else 0  # every state takes one period in any case
+    last = round(longest_s / inverters.T_c)
+    for n in range(math.floor(min(first, last + 1.0)), last + 1):
+        if not Loop(inverters=inverters, ticks=ticks[kind](n), plant=plant).stable:
+            return (n - 1 + unmoved) * inverters.T_c
+    return math.inf
+
+
+def first_crossing(inverters: InverterGroup, *, plant: PlantModel = "lagged") -> float:
+    """Return shortest delay (control periods) of the neighbours' states, the same on all links, at which a mode stays.
+
+    With own values apart from the neighbours' the loop is F(z) y = z^{-n} S y. A mode can stand on the unit circle, z =
+    exp(j theta), only where an eigenvalue of F^{-1} S has magnitude 1; its angle then is n theta. Infinite if there is
+    none on `ANGLES` angles: then no delay destabilises the loop.
+
+    References
+    ----------
+    Chen, Latchman, IEEE Trans. Autom. Control 40(9), 1995: frequency sweeping tests, in continuous time.
+    """
+    acts, n, held = inverters.acts, inverters.n, response(inverters, plant)
+    a, b = Loop(inverters=inverters).gains
+    share = (a / np.maximum(inverters.degree, 1.0))[:, None] * inverters.heard
+    shortest, before = math.inf, np.zeros(int(acts.sum()))
+    for theta in np.geomspace(1e-3, math.pi, ANGLES):
+        z = np.exp(1j * theta)
+        x = np.linalg.solve(np.eye(len(held.A)) - held.A / z, held.B)
+        F = (z - 1.0) * np.eye(n) + np.diag(a) + np.outer(b, held.C @ x + held.D)
+        reach = np.linalg.eigvals(np.linalg.solve(F[np.ix_(acts, acts)], share[np.ix_(acts, acts)]))
+        reach = reach[np.argsort(np.abs(reach))]
+        crossed = (np.abs(reach) >= 1.0) != (before >= 1.0)
+        turns = np.mod(np.angle(reach[crossed]), 2.0 * math.pi) / theta
+        shortest = min(shortest, float(turns.min(initial=math.inf)))
+        before = np.abs(reach)
+    return shortest

@@ -25,13 +25,10 @@ class IslandStep:
     """One island after one event."""
 
     label: str
-    """Name of the event."""
     t_s: float
-    """When (s)."""
     roster: tuple[str, ...]
     """All inverters on the network then."""
     members: tuple[str, ...]
-    """Inverters of the island."""
     load: LoadStep | None
     """Their load before and after; None if they come from several islands."""
 
@@ -41,20 +38,7 @@ class LoadError(RuntimeError):
 
 
 def load_steps(scenario: ScenarioModel, feeder: Feeder) -> tuple[IslandStep, ...]:
-    """Return the islands without the grid after each event, and their steps of load.
-
-    Parameters
-    ----------
-    scenario : ScenarioModel
-        Checked.
-    feeder : Feeder
-        Its feeder.
-
-    Raises
-    ------
-    LoadError
-        If the plant has no solution.
-    """
+    """Return the islands without the grid after each event, and their steps of load."""
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     rating = {row.name: row.P_rated for row in inverters_of(scenario, feeder)}
     try:

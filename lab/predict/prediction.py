@@ -1,32 +1,54 @@
-"""Predictions by theory of a case before it is run (docs/theory.md), as tables and as the command's text."""
+"""Predictions by theory of the cases of a scenario before it is run (docs/theory.md): as numbers, tables and text."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from gridpeers.agents.carriers.law_check import PAPER
-from gridpeers.lab.predict.case_prediction import CasePrediction, predict_cases
-from gridpeers.lab.predict.closed_form import DelayKind
-from gridpeers.lab.predict.load_steps import LoadError
-from gridpeers.lab.predict.prediction_table import case_text
+from gridpeers.lab.predict.closed_form import (
+    SETTLING,
+    DelayKind,
+    Modes,
+    delay_limit_closed,
+    equivalent_delay,
+    groups,
+    modes,
+    settling_in_ticks,
+)
+from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
+from gridpeers.lab.predict.linear_model import Loop, delay_limit
+from gridpeers.lab.predict.load_steps import IslandStep, LoadError, load_steps
+from gridpeers.lab.predict.robustness import robustness
+from gridpeers.lab.predict.times import Times, predicted_times
+from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_response, var_spectral_radius
 from gridpeers.plant.equipment import Feeder
 from gridpeers.runs.choices import with_cases
 from gridpeers.scenario import Scenario, as_scenario
 from gridpeers.scenarios.run_request import BrokenRunError
-from gridpeers.scenarios.schema import ScenarioError
-from gridpeers.scenarios.schema import scenario_model as model
+from gridpeers.scenarios.schema import ScenarioError, ScenarioModel
+from gridpeers.scenarios.schema.participants import is_calm, netem_of
 from gridpeers.scenarios.schema.plugin_keys import law_of
 
-_LIMITS: dict[DelayKind, str] = {
+LIMITS: dict[DelayKind, str] = {
     "neighbours": "agent to agent",
     "disagreement": "agent to agent, own value as late",
     "local loop": "plant to agent or back",
 }
 """Names of the delays whose limit is known."""
+
+WIDTH = 100
+"""Columns of the text."""
+
+TextRow = tuple[str, str, str, str]
+"""Quantity, by the continuous law, by ours in discrete time, meaning."""
 
 
 def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True) -> Prediction:
@@ -52,7 +74,7 @@ def predict(scenario: Scenario | str | Path, case: str, *, voltage: bool = True)
     return predictions(with_cases(known.spec, [case]), known.feeder, voltage=voltage)[case]
 
 
-def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
+def predictions(spec: ScenarioModel, feeder: Feeder, *, voltage: bool) -> dict[str, Prediction]:
     """Predict all cases of a scenario; the plant is asked once for its loads."""
     others = {case: law.name for case in spec.cases if (law := law_of(spec, case)).name != PAPER}
     if others:
@@ -61,10 +83,63 @@ def predictions(spec: model.ScenarioModel, feeder: Feeder, *, voltage: bool) -> 
             for case, name in others.items()
         )
     try:
-        cases = predict_cases(spec, feeder, voltage=voltage)
+        steps, plant = load_steps(spec, feeder), var_response(spec, feeder) if voltage else None
     except LoadError as error:
         raise BrokenRunError(f"{spec.name}: {error}") from error
-    return {name: Prediction(case) for name, case in cases.items()}
+    found = {}
+    for name, rule in spec.cases.items():
+        title = f"{spec.name}, case {name}" + (f" {rule.title}" if rule.title else "")
+        if not is_calm(netem_of(spec, name)):
+            title += "; without its faults of links and nodes, which these numbers leave out"
+        islands = tuple(
+            (step, inverter_group_of(spec, feeder, name, roster=step.roster, island=step.members)) for step in steps
+        )
+        found[name] = Prediction(CasePrediction(title, inverter_group_of(spec, feeder, name), islands, plant))
+    return found
+
+
+@dataclass(frozen=True)
+class CasePrediction:
+    """Numbers of one case, each computed when it is first asked for."""
+
+    title: str
+    inverters: InverterGroup
+    """The inverters at the start."""
+    islands: tuple[tuple[IslandStep, InverterGroup], ...]
+    """Islands after each event, and their inverters."""
+    plant: VarResponse | None
+    """Response of voltage and vars; None leaves them out."""
+
+    @property
+    def has_law(self) -> bool:
+        """Any inverter runs the secondary law."""
+        return bool(self.inverters.acts.any())
+
+    @cached_property
+    def modes(self) -> Modes:
+        """The modes of the secondary law, if there is one."""
+        return modes(self.inverters)
+
+    @cached_property
+    def delay_limits(self) -> dict[DelayKind, tuple[float, float]]:
+        """Longest delays (s) for which the case is stable: by the continuous equations, and of our law in its steps."""
+        return {kind: (delay_limit_closed(self.inverters, kind), delay_limit(self.inverters, kind)) for kind in LIMITS}
+
+    @cached_property
+    def times(self) -> tuple[Times, ...]:
+        """Times after each event, by island; a note says why there are none."""
+        return tuple(self._times_of(step, island) for step, island in self.islands)
+
+    def _times_of(self, step: IslandStep, island: InverterGroup) -> Times:
+        if step.load is None:
+            note = "islands join, which is not predicted"
+        elif not island.GFM.any():
+            note = "no grid-forming inverter, so the island is de-energised"
+        elif not self.has_law:
+            note = "there is no secondary law"
+        else:
+            return predicted_times(island, load=step.load)
+        return Times(restore_s=None, share_s=None, stable=False, note=note)
 
 
 class Prediction:
@@ -91,7 +166,7 @@ class Prediction:
         Infinite: any delay; nan: unstable without one.
         """
         limits = self._case.delay_limits if self._case.has_law else {}
-        rows = {_LIMITS[kind]: pair for kind, pair in limits.items()}
+        rows = {LIMITS[kind]: pair for kind, pair in limits.items()}
         frame = pd.DataFrame.from_dict(rows, orient="index", columns=["continuous", "discrete"], dtype=float)
         frame.attrs["units"] = {"continuous": "s", "discrete": "s"}
         return frame.rename_axis("delay")
@@ -105,16 +180,8 @@ class Prediction:
         """
         numbers = ["restore_s", "share_s", "t_restore_s"]
         rows = [
-            (
-                step.label,
-                ", ".join(step.members),
-                times.restore_s,
-                times.share_s,
-                times.report_s,
-                times.stable,
-                times.note,
-            )
-            for (step, _), times in zip(self._case.islands, self._case.times, strict=True)
+            (step.label, ", ".join(step.members), it.restore_s, it.share_s, it.report_s, it.stable, it.note)
+            for (step, _), it in zip(self._case.islands, self._case.times, strict=True)
         ]
         frame = pd.DataFrame(rows, columns=["window", "island", *numbers, "stable", "note"])
         frame = frame.set_index(["window", "island"]).astype(dict.fromkeys(numbers, float))
@@ -127,3 +194,125 @@ class Prediction:
 
     def __repr__(self) -> str:
         return f"<Prediction {self.title}>"
+
+
+# -------------------------------------------------------------------- text
+
+
+def case_text(case: CasePrediction) -> str:
+    """Return all predictions of one case."""
+    if not case.has_law:
+        words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
+        return "\n".join([case.title, *_wrapped(words, "  ")])
+    lines = [case.title, *_wrapped(_words(case), "  ")]
+    lines += _aligned([("", "continuous", "our law", ""), *_rows(case)])
+    for (step, island), times in zip(case.islands, case.times, strict=True):
+        lines += _wrapped(f"{_event(step)}: {_sentence(step, island, times)}", "  ")
+    lines += _wrapped(f"Voltage and vars: {_vars(case)}.", "  ")
+    return "\n".join(lines)
+
+
+def _words(case: CasePrediction) -> str:
+    inverters, apart = case.inverters, groups(case.inverters)
+    leaders = [name for name, leads in zip(inverters.names, inverters.leads, strict=True) if leads]
+    acting = int(inverters.acts.sum())
+    text = f"{acting} of {inverters.n} inverters run the law; leaders {', '.join(leaders) or 'none'}; "
+    text += f"kappa {case.modes.kappa:.3g} 1/s; T_c {inverters.T_c:g} s. "
+    if not leaders:
+        text += "Nobody leads, so nobody corrects the frequency. "
+    if len(apart) > 1:
+        text += f"The graph is not connected; its {len(apart)} parts ({' | '.join(' '.join(part) for part in apart)}) "
+        text += "agree on power within themselves only, so sharing among all never comes. "
+    if idle := int((inverters.shares & ~inverters.acts).sum()):
+        text += f"The other {idle} with an agent keep their set-points and take no part in sharing. "
+    if agentless := [name for name, shares in zip(inverters.names, inverters.shares, strict=True) if not shares]:
+        text += f"{', '.join(agentless)} without an agent: droop alone, and the sharing index leaves them out. "
+    return text.rstrip()
+
+
+def _rows(case: CasePrediction) -> list[TextRow]:
+    inverters, found, loop = case.inverters, case.modes, Loop(inverters=case.inverters)
+    slowest = settling_in_ticks(loop.spectral_radius, inverters.T_c) if loop.stable else math.inf
+
+    def limits(kind: DelayKind) -> tuple[str, str]:
+        continuous, discrete = case.delay_limits[kind]
+        return _s(continuous, "any"), _limit(discrete)
+
+    return [
+        ("links", f"{found.links}", "", "undirected, among those that run the law"),
+        ("lambda_2", f"{found.lambda_2:.3f}", "", "algebraic connectivity; 0 when parts are not linked"),
+        ("lambda_max", f"{found.lambda_max:.3f}", "", "largest eigenvalue of the Laplacian"),
+        ("robustness", *_robustness(inverters)),
+        ("frequency mode", f"{found.frequency_rate:.2f} 1/s", "", "kappa n_L/N: rate if sharing were at once"),
+        ("sharing mode", _rate(found.sharing_rate), "", "kappa lambda_2: rate at which powers agree"),
+        ("slowest mode", _rate(found.slowest_rate), _rate(SETTLING / slowest), "exact, of law and plant together"),
+        ("2 % settling", _s(found.frequency_settling_s, "never"), _s(slowest, "never"), "four time constants of it"),
+        ("sharing 2 %", _s(found.sharing_settling_s, "never"), "", "the same of the sharing mode"),
+        ("largest step", _s(found.euler_step_s, "any"), "any", "longest T_c; continuous: as explicit Euler"),
+        ("delay: links", *limits("neighbours"), "agent to agent, own value fresh"),
+        ("delay: both", *limits("disagreement"), "own value as late as neighbours'"),
+        ("delay: plant", *limits("local loop"), "f as measured, or P_set, late"),
+        ("loss 50 %", "", _s(equivalent_delay(inverters.T_c, 0.5), ""), "held: as so much more delay on the links"),
+        ("loss 90 %", "", _s(equivalent_delay(inverters.T_c, 0.9), ""), "the same; T_c p/(1 - p)"),
+    ]
+
+
+def _robustness(inverters: InverterGroup) -> tuple[str, str, str]:
+    found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
+    return str(found), "", f"of the graph; W-MSR bears F = {found.F} liars around each agent"
+
+
+def _event(step: IslandStep) -> str:
+    where = "" if set(step.members) == set(step.roster) else f" ({', '.join(step.members)})"
+    return f"{step.label} at {step.t_s:g} s{where}"
+
+
+def _sentence(step: IslandStep, island: InverterGroup, times: Times) -> str:
+    if step.load is None or not island.GFM.any():
+        return times.note
+    if times.report_s is not None:
+        text = (
+            f"restored in {times.report_s:.2f} s (abs(f - f_nom) < 0.01 Hz for good in {times.restore_s:.2f} s, "
+            f"MPSI < 0.01 in {times.share_s:.2f} s)"
+        )
+    elif times.restore_s is not None:
+        text = f"frequency back in {times.restore_s:.2f} s, equal power never: {times.note}"
+    else:
+        text = f"not restored: {times.note}"
+    return f"load {step.load.start_pu:.3f} -> {step.load.load_pu:.3f} pu of the ratings: {text}"
+
+
+def _vars(case: CasePrediction) -> str:
+    inverters, plant = case.inverters, case.plant
+    if plant is None:
+        return "left out by --no-vars"
+    if not all(name in plant.names for name in inverters.names):
+        return "not predicted with spare inverters"
+    radius, limit = var_spectral_radius(inverters, plant), var_delay_limit(inverters, plant)
+    if radius >= 1.0:
+        return f"unstable on a plant without lags, spectral radius {radius:.4f}"
+    delays = "with any delay up to 1 s" if math.isinf(limit) else f"up to {_limit(limit)} of delay"
+    return (
+        f"slowest mode to 2 % in {settling_in_ticks(radius, inverters.T_c):.2f} s; stable {delays} of measurement or "
+        "set-point (on a plant without lags; right to about one control period)"
+    )
+
+
+def _rate(rate: float) -> str:
+    return "none" if math.isinf(rate) else f"{rate:.2f} 1/s"
+
+
+def _s(seconds: float, without: str) -> str:
+    return without if math.isinf(seconds) else f"{seconds * 1e3:.1f} ms" if seconds < 0.0995 else f"{seconds:.2f} s"
+
+
+def _limit(seconds: float) -> str:
+    return "unstable" if math.isnan(seconds) else _s(seconds, "any")
+
+
+def _aligned(rows: Sequence[TextRow]) -> list[str]:
+    return [f"  {name:15}{left:>12}{right:>12}   {words}".rstrip() for name, left, right, words in rows]
+
+
+def _wrapped(text: str, indent: str) -> list[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent + "  ")

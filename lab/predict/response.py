@@ -62,13 +62,7 @@ class Response:
 
 
 def response(inverters: InverterGroup, plant: PlantModel = "lagged") -> Response:
-    """Return the plant of some inverters, over one control period with set-points held.
-
-    Raises
-    ------
-    ValueError
-        If no inverter is grid-forming: such an island has no voltage.
-    """
+    """Return the plant of some inverters, over one control period with set-points held."""
     if not inverters.GFM.any():
         raise ValueError(f"no GFM among {', '.join(inverters.names)}: their island has no voltage; give it one")
     return _quasi_steady(inverters) if plant == "quasi-steady" else _lagged(inverters)

@@ -7,12 +7,18 @@ sets, neither empty, one at least is r-reachable (LeBlanc et al., IEEE J. Sel. A
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import ceil
 from typing import NamedTuple
 
 import numpy as np
 
+from gridpeers.agents.laws.resilient import Resilient
+from gridpeers.lab.predict.inverter_group import inverter_group_of
+from gridpeers.plant.equipment import Feeder
 from gridpeers.scenarios.results.history import Floats
+from gridpeers.scenarios.schema.plugin_keys import law_of
+from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 
 EXACT = 16
 """Most agents for which all pairs of sets are tried: 3^16 pairs, by a recursion over 2^16 sets."""
@@ -25,9 +31,7 @@ class Robustness(NamedTuple):
     """Bounds of r, equal where it is exact."""
 
     least: int
-    """The graph is at least so robust."""
     most: int
-    """It is no more robust."""
 
     @property
     def F(self) -> int:
@@ -35,34 +39,15 @@ class Robustness(NamedTuple):
         return max(0, (self.least - 1) // 2)
 
     def __str__(self) -> str:
-        """Return it as tables and sentences have it.
-
-        Examples
-        --------
-        >>> print(Robustness(5, 5), Robustness(2, 4))
-        r 5 r 2..4
-        """
         return f"r {self.least}" if self.least == self.most else f"r {self.least}..{self.most}"
 
 
 def robustness(A: Floats, exact: int = EXACT) -> Robustness:
-    """Return the largest r for which a graph is r-robust.
+    """Return the largest r for which a graph is r-robust, by its adjacency (1), row = receiver.
 
-    For more than `EXACT` agents these are bounds. Above: nobody hears more agents than it has neighbours, and of two
+    For more than `exact` agents these are bounds. Above: nobody hears more agents than it has neighbours, and of two
     sets one has at most half of all agents. Below, if all links go both ways: at least lambda_2 |S| |V - S| / |V| links
     leave a set S, so in the smaller one of two sets, which is at most half, someone hears lambda_2 / 2 agents outside.
-
-    Parameters
-    ----------
-    A : Floats
-        Adjacency (1), row = receiver.
-    exact : int, optional
-        Most agents for which it is exact.
-
-    Examples
-    --------
-    >>> robustness(np.ones((9, 9)) - np.eye(9)), robustness(np.eye(9, k=1) + np.eye(9, k=-1))
-    (Robustness(least=5, most=5), Robustness(least=1, most=1))
     """
     links = np.asarray(A) > 0.0
     np.fill_diagonal(links, val=False)
@@ -98,3 +83,22 @@ def _exact(links: np.ndarray[tuple[int, int], np.dtype[np.bool_]]) -> int:
     whole = (1 << n) - 1
     proper = sets[1:whole]
     return int(np.maximum(reach[proper], least[whole ^ proper]).min())
+
+
+def robustness_notes(scenario: ScenarioModel, feeder: Feeder) -> Iterator[str]:
+    """Yield a sentence for each case with the law "resilient" whose F is more than its graph bears for certain.
+
+    It is for `gridpeers check`: robustness is of the graph, the rest of a prediction of the paper's law alone.
+    """
+    for case in scenario.cases:
+        law = law_of(scenario, case)
+        F = int(law.parameters.get("F", Resilient.F)) if law.use == "resilient" else 0
+        if not F:
+            continue
+        inverters = inverter_group_of(scenario, feeder, case)
+        found = robustness(inverters.A[np.ix_(inverters.acts, inverters.acts)])
+        if found.F < F:
+            yield (
+                f"case {case}: W-MSR with F = {F} asks for a graph with r {2 * F + 1}, and this one has {found}: even "
+                f"without liars its agents may never agree; take more links, or F = {found.F} (docs/hostile.md)"
+            )

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from msgspec.structs import replace
 
-from gridpeers.lab.predict.delay_limits import delay_limit
 from gridpeers.lab.predict.inverter_group import InverterGroup, inverter_group_of
-from gridpeers.lab.predict.linear_model import Loop, Ticks
+from gridpeers.lab.predict.linear_model import Loop, Ticks, delay_limit
 from gridpeers.lab.predict.load_steps import load_steps
 from gridpeers.lab.predict.times import LoadStep, Times, predicted_times, sharing_index
 from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_growth, var_response

@@ -74,32 +74,9 @@ def predicted_times(
 ) -> Times:
     """Return the times to restore and to share after a step of the load, and whether the loop is stable.
 
-    Parameters
-    ----------
-    inverters : InverterGroup
-        From `inverter_group_of(scenario, feeder, case)`.
-    link_delay_s : float or Mapping[(src, dst), float], optional
-        Delay of the states from agent to agent (s); links that a mapping leaves out have none.
-    measurement_delay_s, setpoint_delay_s : float or Mapping[name, float], optional
-        Delay from the plant to an agent, and back (s).
-    loss : float or Mapping[(src, dst), float], optional
-        Probability that a state is lost; the last one is held.
-    load : LoadStep, optional
-        The event; the paper's event 1 if left out. `gridpeers.lab.predict.load_steps.load_steps` has those of a
-        scenario.
-    plant : {"lagged", "quasi-steady"}, optional
-        With the inverters' filters, or as docs/theory.md has it.
-
-    Raises
-    ------
-    ValueError
-        If a delay is negative, a loss no probability, or the island without GFM.
-
-    Examples
-    --------
-    >>> nine = InverterGroup(names=tuple("abcdefghi"), GFM=np.arange(9) % 3 == 0, A=1.0 - np.eye(9))
-    >>> predicted_times(nine).stable, predicted_times(nine, measurement_delay_s=1.0).stable
-    (True, False)
+    Delays (s) are those of states from agent to agent, by (src, dst), and from the plant to an agent and back, by name;
+    what a mapping leaves out has none. `loss` is the probability that a state is lost, when the last one is held. The
+    load is that of the paper's event 1 if left out; `load_steps` has those of a scenario.
     """
     step = LoadStep() if load is None else load
     T_c = inverters.T_c

@@ -75,13 +75,7 @@ class VarResponse:
         return np.asarray(self.v.sum(axis=0))
 
     def columns_of(self, inverters: InverterGroup) -> list[int]:
-        """Return the places of some inverters in rows and columns.
-
-        Raises
-        ------
-        ValueError
-            If an inverter is not among them.
-        """
+        """Return the places of some inverters in rows and columns; ValueError if one is not there."""
         unknown = [name for name in inverters.names if name not in self.names]
         if unknown:
             raise ValueError(f"no response of {', '.join(unknown)}; there are {', '.join(self.names)}")
@@ -89,13 +83,7 @@ class VarResponse:
 
 
 def var_response(scenario: ScenarioModel, feeder: Feeder) -> VarResponse:
-    """Return the response of the plant on droop alone at the end of the first event's window.
-
-    Raises
-    ------
-    LoadError
-        If the plant has no solution there.
-    """
+    """Return the response of the plant on droop alone at the end of the first event's window."""
     config, _ = configs(scenario, feeder, next(iter(scenario.cases)))
     end = scenario.events[1].t_s if len(scenario.events) > 1 else scenario.time.end_s
     names, count = tuple(row.name for row in feeder.inverters), round(LENGTH / config.T_c)
@@ -129,31 +117,8 @@ def _advance(plant: Plant, ticks: int) -> None:
 def var_spectral_radius(inverters: InverterGroup, plant: VarResponse, *, local: int = 0) -> float:
     """Return the largest magnitude of an eigenvalue (1) of the law for voltage and vars; below 1 it is stable.
 
-    Eigenvalues of set-points that the law never moves are left out.
-
-    Parameters
-    ----------
-    inverters : InverterGroup
-        Its inverters must be among those of the response.
-    plant : VarResponse
-        From `var_response`.
-    local : int, optional
-        Delay of measurement or set-point (control periods).
-
-    Raises
-    ------
-    ValueError
-        If an inverter is not among them.
-
-    Examples
-    --------
-    Two terminals whose vars answer to the difference of their set-points:
-
-    >>> pair = InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
-    >>> S, H = np.array([[5.0, -5.0], [-5.0, 5.0]]), np.full((2, 2), 0.5)
-    >>> plant = VarResponse(names=("a", "b"), q=S[None], v=H[None])
-    >>> var_spectral_radius(pair, plant) < 1.0 < var_spectral_radius(pair, plant, local=50)
-    True
+    `local` is the delay of measurement or set-point (control periods). Eigenvalues of set-points that the law never
+    moves are left out.
     """
     at, free = plant.columns_of(inverters), np.ix_(inverters.acts, inverters.acts)
     S, H = plant.S[np.ix_(at, at)], plant.H[np.ix_(at, at)]
@@ -202,32 +167,7 @@ def _mean_of_neighbours(inverters: InverterGroup) -> Floats:
 
 
 def var_growth(inverters: InverterGroup, plant: VarResponse, *, link_delay_s: float = 0.0) -> float:
-    """Return the rate (1/s) at which the law for voltage and vars grows over late links; negative where it decays.
-
-    Parameters
-    ----------
-    inverters : InverterGroup
-        Its inverters must be among those of the response.
-    plant : VarResponse
-        From `var_response`.
-    link_delay_s : float, optional
-        Delay of all agent-agent links (s).
-
-    Raises
-    ------
-    ValueError
-        If an inverter is not among them.
-
-    Examples
-    --------
-    Two terminals whose vars answer at once to the difference of their set-points agree:
-
-    >>> pair = InverterGroup(names=("a", "b"), GFM=np.array([True, False]), A=1.0 - np.eye(2))
-    >>> at_once = np.zeros((100, 2, 2))
-    >>> at_once[0] = 5.0 * np.array([[1.0, -1.0], [-1.0, 1.0]])
-    >>> var_growth(pair, VarResponse(names=("a", "b"), q=at_once, v=0.1 * np.abs(at_once))) < 0.0
-    True
-    """
+    """Return the rate (1/s) at which the law for voltage and vars grows over late links; negative where it decays."""
     at = plant.columns_of(inverters)
     n, K, T = inverters.n, len(plant.q), inverters.T_c
     late = max(0, math.ceil(link_delay_s / T - 1e-9) - 1)  # a state takes one period in any case

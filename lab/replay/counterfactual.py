@@ -19,6 +19,7 @@ from gridpeers.lab.replay.recorded_process import ReplayError
 from gridpeers.lab.replay.replay import ComparedRows, Difference, record_of
 from gridpeers.lab.replay.replayed_process import MakePlant, start_plant_of
 from gridpeers.plant.build import start_plant
+from gridpeers.runs.comparison import Comparison
 from gridpeers.runs.result import Result, shown_in_notebooks
 from gridpeers.runs.run_folder import RunFolder, new_home
 from gridpeers.runs.running import read, warn_of_laws
@@ -34,7 +35,6 @@ from gridpeers.scenarios.run_request import Other, Progress
 from gridpeers.scenarios.schema.scenario_model import ScenarioModel
 from gridpeers.scenarios.schema.scenario_writing import to_toml
 from gridpeers.scenarios.versions import versions
-from gridpeers.studies.comparison import Comparison
 from gridpeers.wire.messages import Telemetry
 
 if TYPE_CHECKING:

@@ -19,7 +19,6 @@ from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 from gridpeers.scenarios.drivers.telemetry_client import with_recorder
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.record.record_info import LIVE, RecordInfo
-from gridpeers.wire.backlog import Loss
 from gridpeers.wire.codec import KINDS, encode, sound
 from gridpeers.wire.journal import (
     EACH_TICK,
@@ -34,6 +33,7 @@ from gridpeers.wire.journal import (
 )
 from gridpeers.wire.links import Links
 from gridpeers.wire.messages import PLANT, Measurement, State
+from gridpeers.wire.node import Loss
 
 MakePlant = Callable[[PlantConfig], LivePlant]
 """Starts the plant of a configuration."""

@@ -92,15 +92,7 @@ class PerfettoTrace:
 
 
 def write_perfetto_trace(record: RunRecord, path: Path) -> int:
-    """Write the whole record as a Perfetto trace; return the number of arrows.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written.
-    RecordFileError
-        If the record cannot be read.
-    """
+    """Write the whole record as a Perfetto trace; return the number of arrows."""
     trace = PerfettoTrace()
     for number, name in enumerate(("run", PLANT, *in_order(record.agents)), 1):
         trace.track(name, process=number)

@@ -24,21 +24,7 @@ WIDTH, ROW = 7.4, 0.38
 def space_time_diagram(
     flows: Sequence[Flow], nodes: Sequence[str], since: float, until: float, usual: float, title: str
 ) -> Figure:
-    """Draw the messages between some nodes.
-
-    Parameters
-    ----------
-    flows : Sequence[Flow]
-        Messages; those from or to other nodes are left out.
-    nodes : Sequence[str]
-        Names, from top to bottom.
-    since, until : float
-        Window (s of run time).
-    usual : float
-        Time (s) that a message usually takes, for the slope of lost ones.
-    title : str
-        Words above it.
-    """
+    """Draw the messages between some nodes."""
     place = {name: -i for i, name in enumerate(nodes)}
     shown = [flow for flow in flows if flow.src in place and flow.dst in place]
     with mpl.rc_context(PAGE):

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import msgspec
 
 from gridpeers.netem.draws import Stream
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, class_objection, made
-from gridpeers.wire.plugins.registry import Registry
+from gridpeers.wire.plugins.registry import ANYTHING, Registry, named
 from gridpeers.wire.schema.table_reading import parameter_values
 from gridpeers.wire.wording import printable
 
@@ -120,8 +119,7 @@ def judge_of(plugin: Plugin, src: str, dst: str, stream: Stream, tell: Callable[
             return 0.0
         why = ""
         try:
-            with foreign_code():
-                added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
+            added = fault.judge(LinkMessage(src, dst, seq, t, size), MessageDraws(stream, seq))
             if added is None:
                 return None
             if not isinstance(added, bool) and isfinite(added) and 0.0 <= added <= LONGEST:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from statistics import median
 
-from gridpeers.benchmarks import MPSI_BAND, Findings, Settling, Steady
+from gridpeers import Findings
+from gridpeers.measures import MPSI_BAND, Settling, Steady
 from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, seconds
 from gridpeers.papers.singhal2022.tables import (
     FEW_LINKS,

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from gridpeers.benchmarks import UNITS, Claim, Findings, Judge, Quantity, label
+from gridpeers import Claim, Findings, Judge
+from gridpeers.measures import UNITS, Quantity, label
 from gridpeers.papers.singhal2022.tables import TABLE, V_RELATIVE, Cell, TableNumber, tables_of
 
 

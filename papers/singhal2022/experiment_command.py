@@ -84,10 +84,9 @@ def _from_sweep(source: FromSweep, folder: Path, jobs: int | None, dask: str, ag
     import pandas as pd
 
     from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
-    from gridpeers.sweep_files import read_sweep
 
     try:
-        plan = read_sweep(source.sweep)
+        plan = gp.sweep_files.read_sweep(source.sweep)
     except gp.ScenarioError as error:
         refuse(error)
     summary = finish(source.sweep, plan, folder, jobs, dask, again)
@@ -121,6 +120,7 @@ def _from_scenario(source: FromScenario, folder: Path) -> ExperimentResult:
 def _title(source: FromSweep | FromScenario) -> str:
     """Return the title of the file that is run."""
     from gridpeers.papers.singhal2022.experiments import FromScenario
-    from gridpeers.sweep_files import sweep_title
 
-    return gp.load(source.scenario).title if isinstance(source, FromScenario) else sweep_title(source.sweep)
+    if isinstance(source, FromScenario):
+        return gp.load(source.scenario).title
+    return gp.sweep_files.sweep_title(source.sweep)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from gridpeers.figures import PAGE
+import gridpeers as gp
 from gridpeers.papers.singhal2022.communication_claims import TREE, GraphRun, medians
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, tables_of
@@ -27,7 +27,7 @@ def topologies(runs: Sequence[GraphRun]) -> Figure:
     """A mark for each graph, another for those in parts, and the median of the connected ones by number of links."""
     connected = tuple(run for run in runs if run.connected)
     in_parts = tuple(run for run in runs if not run.connected)
-    with mpl.rc_context(PAGE):
+    with mpl.rc_context(gp.figures.PAGE):
         figure = Figure(figsize=(7.4, 3.4), layout="constrained")
         left, right = figure.subplots(1, 2)
         for some, marks in ((connected, _CONNECTED), (in_parts, _IN_PARTS)):
@@ -80,7 +80,7 @@ def var_sharing(ours: Mapping[str, EventValues]) -> Figure:
     """
     cells = [cell for table in tables_of("islanding") for cell in table.cells if cell.quantity == "MQSI"]
     paper = {(cell.case, cell.event): cell.paper for cell in cells}
-    with mpl.rc_context(PAGE):
+    with mpl.rc_context(gp.figures.PAGE):
         figure = Figure(figsize=(7.4, 3.6), layout="constrained")
         (panels,) = figure.subplots(1, len(EVENTS), sharey=True, squeeze=False)
         for panel, event in zip(panels, EVENTS, strict=True):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gridpeers.benchmarks import Findings, Quantity
+from gridpeers import Findings
+from gridpeers.measures import Quantity
 from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, ratio, seconds
 from gridpeers.papers.singhal2022.tables import F_NONE, FIVE_TIMES, IDLE, IV_MQSI, WITHIN
 

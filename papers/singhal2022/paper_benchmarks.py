@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple
 
-from gridpeers.benchmarks import Benchmark, Claim, Findings
+from gridpeers import Benchmark, Claim, Findings
 from gridpeers.papers.singhal2022 import communication_claims, islanding_claims, plant_claims
 from gridpeers.papers.singhal2022.tables import MQSI_FACTOR, V_RELATIVE, Cell, PaperTable, tables_of
 

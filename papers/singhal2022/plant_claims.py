@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from gridpeers.benchmarks import F_BAND, MPSI_BAND, Findings
+from gridpeers import Findings
+from gridpeers.measures import F_BAND, MPSI_BAND
 from gridpeers.papers.singhal2022.experiment_claims import ExperimentClaims, listed, seconds
 from gridpeers.papers.singhal2022.tables import (
     AT_LIMIT,

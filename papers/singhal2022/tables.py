@@ -8,7 +8,8 @@ from typing import Literal
 
 import msgspec
 
-from gridpeers.benchmarks import DIGITS, Published, Quantity
+from gridpeers import Published
+from gridpeers.measures import DIGITS, Quantity
 
 TableNumber = Literal["I", "II", "III", "IV", "V"]
 

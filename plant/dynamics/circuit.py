@@ -10,11 +10,9 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
-from gridpeers.plant.dynamics.kernel.compiled import A120
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.solve import COLUMNS, limited_currents, limited_tangents
 
 
@@ -25,10 +23,7 @@ class PlantError(RuntimeError):
 class NoSolutionError(PlantError):
     """Islands of a network have no solution with the present injections.
 
-    Attributes
-    ----------
-    islands : tuple of int
-        Their numbers in the network's reduction.
+    `islands`: their numbers in the network's reduction.
     """
 
     def __init__(self, islands: tuple[int, ...]) -> None:
@@ -39,10 +34,7 @@ class NoSolutionError(PlantError):
 class NoPowerFlowError(PlantError):
     """No operating point at the start.
 
-    Attributes
-    ----------
-    weak : dict of int to float
-        Load branches that the network cannot feed even alone, and their short-circuit powers (VA).
+    `weak`: load branches that the network cannot feed even alone, and their short-circuit powers (VA).
     """
 
     def __init__(self, weak: dict[int, float]) -> None:
@@ -50,18 +42,13 @@ class NoPowerFlowError(PlantError):
         self.weak = weak
 
 
-PHASES = np.array([1.0, A120.conjugate(), A120])
-"""Balanced set of phasors, phase A at 0."""
-
-_ONTO_A = np.array([1.0, A120, A120**2])
-"""Factors that turn the phases of a balanced set onto phase A."""
+PHASES = np.array([1.0, A120.conjugate(), A120])  # balanced set of phasors, phase A at 0
+_ONTO_A = np.array([1.0, A120, A120**2])  # factors that turn the phases of a balanced set onto phase A
 
 
 def aligned_sum(V: Complex) -> Complex:
     """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence.
 
-    Examples
-    --------
     >>> float(abs(aligned_sum(240.0 * PHASES)).round(9)), float(abs(aligned_sum(240.0 * PHASES[::-1])).round(9))
     (720.0, 0.0)
     """
@@ -72,17 +59,14 @@ def aligned_sum(V: Complex) -> Complex:
 class LoadLaw:
     """The law of m load branches, as parallel arrays."""
 
-    S: Complex
-    """Constant power of each (VA)."""
-    I0: Complex
-    """Constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)."""
-    limited_at: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    S: Complex  # constant power of each (VA)
+    I0: Complex  # constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)
+    limited_at: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Branches with a `LoadPart`'s law; their S and I0 are 0."""
     law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))
     """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
 
     def __add__(self, others: LoadLaw) -> LoadLaw:
-        """Return the law of these branches and then of the others."""
         return LoadLaw(
             S=np.concatenate([self.S, others.S]),
             I0=np.concatenate([self.I0, others.I0]),
@@ -90,8 +74,7 @@ class LoadLaw:
             law=np.concatenate([self.law, others.law]),
         )
 
-    def of(self, branches: NDArray[np.int64]) -> LoadLaw:
-        """Return the law of some of the branches."""
+    def of(self, branches: Integers) -> LoadLaw:
         place = np.full(self.S.size, -1, np.int64)
         place[branches] = np.arange(branches.size)
         at = place[self.limited_at]
@@ -131,22 +114,18 @@ class Circuit:
     Y: sp.csc_array
     """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that are merged
     into another are empty."""
-    sources: NDArray[np.int64]
-    """Nodes held by an ideal source; may be empty."""
-    source_voltage: NDArray[np.complex128]
-    """Their phasors (V)."""
-    terminals: NDArray[np.int64]
+    sources: Integers  # nodes held by an ideal source; may be empty
+    source_voltage: Complex
+    terminals: Integers
     """Inverter terminals: n_inv x 3 nodes, phases A, B, C; of a single-phase inverter its one node three times."""
     C: sp.csc_array
     """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
     I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
-    loads: LoadLaw
-    """Law of the currents that the branches draw."""
-    V_branch: NDArray[np.complex128]
-    """Nominal phasor of each branch (V): where the first solution starts."""
-    reference: NDArray[np.int64] | None = None
+    loads: LoadLaw  # law of the currents that the branches draw
+    V_branch: Complex  # nominal phasor of each branch (V): where the first solution starts
+    reference: Integers | None = None
     """Node from which each node's voltage counts, -1: earth; None: all from earth. It counts from earth itself."""
-    neutrals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(0, np.int64))
+    neutrals: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Nodes of neutral conductors; their voltages count from earth."""
 
     def __deepcopy__(self, memo: object) -> Circuit:
@@ -154,7 +133,7 @@ class Circuit:
         return self
 
     @cached_property
-    def copies(self) -> NDArray[np.bool_]:
+    def copies(self) -> Flags:
         """Which terminals are copies, n_inv x 3: the second and the third of a single-phase inverter.
 
         The models have three phases. To them a single-phase inverter is one with three equal phases: its copies have
@@ -166,12 +145,12 @@ class Circuit:
         return copies
 
     @cached_property
-    def turn(self) -> NDArray[np.complex128]:
+    def turn(self) -> Complex:
         """Factors from each terminal's node to the terminal, n_inv x 3: 1, and `PHASES` of a copy."""
         return np.where(self.copies, PHASES, 1.0 + 0.0j)
 
     @cached_property
-    def returns(self) -> NDArray[np.int64]:
+    def returns(self) -> Integers:
         """Node to which each inverter returns, -1: earth."""
         none = np.full(self.terminals.shape[0], -1, np.int64)
         return none if self.reference is None else self.reference[self.terminals[:, 0]]
@@ -181,15 +160,14 @@ class Circuit:
         """Whether each branch is between two nodes at most, or a node and earth."""
         return bool(np.max(np.diff(self.C.tocsc().indptr), initial=0) <= 2)
 
-    def to_earth(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def to_earth(self, V: Complex) -> Complex:
         """Return the voltages of all nodes to earth (V) from those to their references."""
         return V if self.reference is None else V + np.where(self.reference >= 0, V[self.reference], 0.0)
 
     def without_source(self) -> Circuit:
-        """Return the same network with its substation disconnected."""
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 
-    def components(self) -> tuple[int, NDArray[np.int64]]:
+    def components(self) -> tuple[int, Integers]:
         """Return the number of electrical islands and the label of each node.
 
         The three terminals of an inverter belong together even where the phases of the network are

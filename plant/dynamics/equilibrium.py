@@ -10,11 +10,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, PlantError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droop
 
 
@@ -22,50 +21,28 @@ from gridpeers.plant.dynamics.power_flow_at_rest import PowerFlow, solve_by_droo
 class OperatingPoint:
     """Injections and voltages of an equilibrium, n_inv x 3 each."""
 
-    J: Complex
-    """Norton injections (A)."""
-    V: Complex
-    """Terminal voltages (V)."""
+    J: Complex  # Norton injections (A)
+    V: Complex  # terminal voltages (V)
     I: Complex  # noqa: E741  # the paper's symbol for current
     """Currents out of the inverters (A)."""
-    V_branch: Complex
-    """Voltages of the live load branches (V)."""
-    on_droop: NDArray[np.bool_]
+    V_branch: Complex  # voltages of the live load branches (V)
+    on_droop: Flags
     """Inverters whose voltage is V_set - m_q q; the others are within a dead band, or at the limit of their Q."""
-    on_edge: NDArray[np.bool_]
+    on_edge: Flags
     """Inverters on the edge of a dead band: there is no rest, and Q will hunt around that of this point."""
 
 
 def equilibrium(
-    circuit: Circuit,
-    units: Inverters,
-    P: Real,
-    Q: Real,
-    V_set: Real | None,
-    *,
-    swing_voltage: Complex = PHASES,
+    circuit: Circuit, units: Inverters, P: Real, Q: Real, V_set: Real | None, *, swing_voltage: Complex = PHASES
 ) -> OperatingPoint:
     """Return the operating point of section 7.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    units
-        The inverters; disconnected ones take no part.
-    P
-        Real power of each (pu); ignored for a swing.
-    Q
-        Reactive power of each (pu), or the first guess where `V_set` is given.
-    V_set
-        Voltage set-point of each (pu), from which Q follows by droop and dead band; None to keep Q.
-    swing_voltage
-        Phasors that a swing holds on its three phases (pu of nominal).
+    `units`: the inverters; disconnected ones take no part; `P`: real power of each (pu); ignored for a swing; `Q`:
+    reactive power of each (pu), or the first guess where `V_set` is given; `V_set`: voltage set-point of each (pu),
+    from which Q follows by droop and dead band; None to keep Q; `swing_voltage`: phasors that a swing holds on its
+    three phases (pu of nominal).
 
-    Raises
-    ------
-    PlantError
-        If there is no such point.
+    PlantError if there is no such point.
     """
     n, online = len(units), units.connected
     _, label = circuit.components()
@@ -110,28 +87,19 @@ def equilibrium(
     return OperatingPoint(J=J, V=V, I=I_out, V_branch=flow.V_b, on_droop=on_droop, on_edge=on_edge)
 
 
-def _swings(units: Inverters, forming: NDArray[np.int64]) -> NDArray[np.int64]:
+def _swings(units: Inverters, forming: Integers) -> Integers:
     """Return the swings among the GFM of an island: the first with three phases, else the first on each phase."""
     whole = forming[~units.single[forming]]
     return whole[:1] if whole.size else forming[np.unique(units.phase[forming], return_index=True)[1]]
 
 
-def set_equilibrium(
-    units: Inverters, point: OperatingPoint, online: NDArray[np.bool_], P: Real, V_set: Real | None
-) -> None:
+def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: Real, V_set: Real | None) -> None:
     """Set the inverters' set-points and controller states so that they rest at an operating point.
 
-    Parameters
-    ----------
-    units
-        The inverters; written.
-    point
-        Operating point.
-    online
-        Inverters that deliver; the others keep their states, with `P` and `V_set` as set-points.
-    P, V_set
-        Real powers and set-points of the point (pu). Without `V_set` a GFL rests at its voltage and its reactive power,
-        V_set := v, Q_set := q; else all the reactive power comes from the droop, within dead band and limit.
+    `units`: the inverters; written; `online`: inverters that deliver; the others keep their states, with `P` and
+    `V_set` as set-points; `P`, `V_set`: real powers and set-points of the point (pu). Without `V_set` a GFL rests at
+    its voltage and its reactive power, V_set := v, Q_set := q; else all the reactive power comes from the droop, within
+    dead band and limit.
     """
     S, v = units.measured(point.V, point.I)
     held = units.regulated(point.V, point.I)
@@ -149,7 +117,7 @@ def set_equilibrium(
         units.rest(i, S[i], v[i])
 
 
-def require_within_limits(units: Inverters, online: NDArray[np.bool_]) -> None:
+def require_within_limits(units: Inverters, online: Flags) -> None:
     """Raise PlantError if the start is no equilibrium: a GFM that forms an island must be within its limits."""
     for k, i in enumerate(units.gfm_at.tolist()):
         if not online[i]:

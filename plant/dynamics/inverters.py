@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.circuit import PHASES, aligned_sum
+from gridpeers.plant.dynamics.circuit import aligned_sum
 from gridpeers.plant.dynamics.kernel import gfl as gfl_model
 from gridpeers.plant.dynamics.kernel import gfm as gfm_model
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import FeedForward
 from gridpeers.plant.equipment import F_NOM
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmParameters
@@ -21,29 +21,18 @@ from gridpeers.plant.plant_config import Method
 
 @dataclass(frozen=True, kw_only=True)
 class Inverter:
-    """One inverter at a circuit's terminal."""
-
     name: str
-    """Name, for messages."""
     kind: Literal["GFM", "GFL"]
-    phases: str = "ABC"
-    """Phases of its terminal: all three, or one."""
-    S_b: float
-    """Rating, base of its per-unit quantities (VA)."""
-    V_b: float
-    """Nominal voltage (V, line-to-neutral)."""
-    m_p: float
-    """P-f droop (pu per pu)."""
-    m_q: float
-    """Q-V droop (pu per pu)."""
-    parameters: GfmParameters | GflParameters
-    """Parameters of its kind."""
-    f_nom: float = F_NOM
-    """Nominal frequency (Hz), base of its per-unit frequency; one for all inverters of a circuit."""
+    phases: str = "ABC"  # phases of its terminal: all three, or one
+    S_b: float  # rating, base of its per-unit quantities (VA)
+    V_b: float  # nominal voltage (V, line-to-neutral)
+    m_p: float  # P-f droop (pu per pu)
+    m_q: float  # Q-V droop (pu per pu)
+    parameters: GfmParameters | GflParameters  # parameters of its kind
+    f_nom: float = F_NOM  # nominal frequency (Hz), base of its per-unit frequency; one for all inverters of a circuit
 
     @property
     def single(self) -> bool:
-        """Whether it has one phase."""
         return len(self.phases) == 1
 
     @property
@@ -55,59 +44,30 @@ class Inverter:
 class Inverters:
     """All inverters of a circuit, in the order of its terminals.
 
-    Parameters
-    ----------
-    units
-        Description of each.
-    connected
-        Whether each is switched on; by default all are.
-    method
-        Of time stepping.
-
-    Attributes
-    ----------
-    f_nom : float
-        Nominal frequency (Hz).
-    forming : bool[n]
-        Whether each is a GFM.
-    gfm, gfm_at, gfm_state
-        Records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs to, and their states.
-    gfl, gfl_at, gfl_state
-        The same for `gridpeers.plant.dynamics.kernel.gfl`.
-    S_b, V_b, m_p, m_q : float64[n]
-        Ratings (VA), nominal voltages (V) and droops (pu per pu).
-    single : bool[n]
-        Single-phase inverters. To the models they have three equal phases
-        (`gridpeers.plant.dynamics.circuit.Circuit.copies`).
-    S_3 : float64[n]
-        Base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter.
-    phase : int64[n]
-        Phase of the first terminal: 0, 1, 2 for A, B, C.
-    positive_sequence, direct : bool[n]
-        Whether each is a GFM that measures the positive sequence, and one without voltage controller (section 3.8).
-    balanced : bool[n]
-        Whether each is a GFL of balanced power.
-    S_max, Q_min, Q_max : float64[n]
-        Limits of apparent and of reactive power (pu); infinite for a GFM, whose limiters act in time.
-    db_UV, db_OV : float64[n]
-        Dead bands of volt-var below and above V_set (pu); 0 for a GFM, infinite for a GFL without volt-var.
-    from_edge : bool[n]
-        Whether volt-var begins at the edge of its dead band.
-    y_f : complex128[n]
-        Filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
-        "second-order", which solves its filter together with its current controller.
-    feed_forward : FeedForward
-        What that solution needs.
-    connected : bool[n]
-        Inverters switched on; they deliver only in a live island.
-    P_set_lim, V_set_min, V_set_max : float64[n]
-        Bounds of the set-points that `hold` takes (pu).
-    set_points : float64[n, 3]
-        P_set, V_set, Q_set (pu); may be written between steps.
-    J, V, I : complex128[n, 3]
-        Norton injections (A), terminal voltages (V) and currents out of the inverters (A).
-    limiting : bool[n]
-        Inverters whose phase currents were limited in the last network solution.
+    `forming`: whether each is a GFM;
+    `gfm`, `gfm_at`, `gfm_state`: records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs
+    to, and their states;
+    `gfl`, `gfl_at`, `gfl_state`: the same for `gridpeers.plant.dynamics.kernel.gfl`;
+    `S_b`, `V_b`, `m_p`, `m_q`: ratings (VA), nominal voltages (V) and droops (pu per pu);
+    `single`: single-phase inverters. To the models they have three equal phases
+    (`gridpeers.plant.dynamics.circuit.Circuit.copies`);
+    `S_3`: base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter;
+    `phase`: phase of the first terminal: 0, 1, 2 for A, B, C;
+    `positive_sequence`, `direct`: whether each is a GFM that measures the positive sequence, and one without voltage
+    controller (section 3.8);
+    `balanced`: whether each is a GFL of balanced power;
+    `S_max`, `Q_min`, `Q_max`: limits of apparent and of reactive power (pu); infinite for a GFM, whose limiters act in
+    time;
+    `db_UV`, `db_OV`: dead bands of volt-var below and above V_set (pu); 0 for a GFM, infinite for a GFL without
+    volt-var;
+    `from_edge`: whether volt-var begins at the edge of its dead band;
+    `y_f`: filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
+    "second-order", which solves its filter together with its current controller;
+    `feed_forward`: what that solution needs;
+    `P_set_lim`, `V_set_min`, `V_set_max`: bounds of the set-points that `hold` takes (pu);
+    `set_points`: P_set, V_set, Q_set (pu); may be written between steps (n, 3);
+    `J`, `V`, `I`: Norton injections (A), terminal voltages (V) and currents out of the inverters (A) (n, 3);
+    `limiting`: inverters whose phase currents were limited in the last network solution.
     """
 
     def __init__(
@@ -165,17 +125,10 @@ class Inverters:
         theta[self.gfm_at] = self.gfm_state["theta"]
         return theta
 
-    def nominal_angle(self) -> Real:
-        """Return the angle of every first terminal in the balanced set (rad): 0, or that of a single phase."""
-        return np.asarray(np.angle(PHASES)[self.phase])
-
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
         """Return the powers and voltages (pu) that the controllers measure (sections 3.2, 3.8).
 
-        Parameters
-        ----------
-        V, I
-            Terminal voltages (V) and currents out of the inverters (A), n x 3.
+        `V`, `I`: terminal voltages (V) and currents out of the inverters (A), n x 3.
         """
         V_1, I_1 = aligned_sum(V) / 3.0, aligned_sum(I) / 3.0
         S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_3
@@ -183,13 +136,7 @@ class Inverters:
         return S, v
 
     def regulated(self, V: Complex, I: Complex) -> Real:  # noqa: E741  # the paper's symbol
-        """Return the voltages (pu) that V_set - m_q q is at rest: measured ones, or E without voltage controller.
-
-        Parameters
-        ----------
-        V, I
-            As for `measured`.
-        """
+        """Return the voltages (pu) that V_set - m_q q is at rest: measured ones, or E without voltage controller."""
         v = self.measured(V, I)[1]
         i = self.direct
         v[i] = np.abs(I[i, 0] / self.y_f[i] + V[i, 0]) / self.V_b[i]
@@ -198,14 +145,7 @@ class Inverters:
     def rest(self, i: int, S: complex, v: float) -> None:
         """Set an inverter's controller to rest at its present J, V and I.
 
-        Parameters
-        ----------
-        i
-            The inverter.
-        S
-            The power that it measures (pu).
-        v
-            The voltage that it measures (pu).
+        `S`: the power that it measures (pu); `v`: the voltage that it measures (pu).
         """
         if self.forming[i]:
             k = int(np.searchsorted(self.gfm_at, i))
@@ -229,22 +169,16 @@ class Inverters:
     def limit_power(self, i: int, P_max: float) -> None:
         """Bound a grid-following inverter's P reference (W) from the next step on.
 
-        Raises
-        ------
-        ValueError
-            If the inverter is grid-forming: the network determines its power, not a reference.
+        ValueError if the inverter is grid-forming: the network determines its power, not a reference.
         """
         if self.forming[i]:
             raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
         self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
 
-    def readings(self, online: NDArray[np.bool_]) -> Real:
+    def readings(self, online: Flags) -> Real:
         """Return f (Hz), P (W), Q (var), V (V) of the last solution, n x 4, before the first step.
 
-        Parameters
-        ----------
-        online
-            Inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.
+        `online`: inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[self.single] /= 3.0

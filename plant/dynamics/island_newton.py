@@ -14,33 +14,26 @@ from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.threads import one_thread
 
-ITERATIONS = 40
-"""Of Newton's method; it takes 4 to 10."""
-SHORTEST_STEP = 2.0**-10
-"""Smallest part of a Newton step, and of the load in the continuation."""
-TOLERANCE = 2e-12
-"""Largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here."""
+ITERATIONS = 40  # of Newton's method; it takes 4 to 10
+SHORTEST_STEP = 2.0**-10  # smallest part of a Newton step, and of the load in the continuation
+TOLERANCE = 2e-12  # largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here
 ROUNDING, STALL = 1e-8, 4
 """Largest step (pu) that may be rounding, and how many such steps in a row that do not halve end the search. Next to a
 very small impedance steps stay above 1e-11 pu."""
-NOISE = 1e-12
-"""Residual (pu) below which it need not shrink: it is rounding."""
+NOISE = 1e-12  # residual (pu) below which it need not shrink: it is rounding
 
 
 class IslandEquations(Protocol):
     """The equations of one island, F(V) = 0."""
 
-    without_load: Complex
-    """Voltages (V) without load, where the continuation begins."""
-    V_nom: Real
-    """Nominal magnitudes (V)."""
+    without_load: Complex  # voltages (V) without load, where the continuation begins
+    V_nom: Real  # nominal magnitudes (V)
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
         """Return F and its size (pu) with this part of the load."""
@@ -52,28 +45,18 @@ class IslandEquations(Protocol):
 class DenseIsland:
     r"""An island by the impedances between its load branches, :math:`F(V) = V - E + Z I_b(V)`.
 
-    Parameters
-    ----------
-    Z
-        Impedance between its branches (ohm), with the inverters' filters.
-    loads
-        What they draw.
-    nominal
-        Nominal phasor of each (V).
-    E
-        Their voltages without load (V).
+    `Z`: impedance between its branches (ohm), with the inverters' filters; `nominal`: nominal phasor of each (V); `E`:
+    their voltages without load (V).
     """
 
     def __init__(self, Z: Complex, loads: LoadLaw, nominal: Complex, E: Complex) -> None:
         self._Z, self._loads, self.V_nom, self.without_load = Z, loads, np.abs(nominal), E
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        """Return F (V) and its size (pu) with this part of the load."""
         F = V - self.without_load + part * (self._Z @ self._loads.currents(V))
         return F, float(np.max(np.abs(F) / self.V_nom, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
         A, B = self._loads.tangent(V)
         ZA, ZB = part * self._Z * A, part * self._Z * B
         real: Real = np.block([[(ZA + ZB).real, (ZB - ZA).imag], [(ZA + ZB).imag, (ZA - ZB).real]])
@@ -91,12 +74,7 @@ class DenseIsland:
 def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
     """Return the voltages (V) of an island, or None if there are none.
 
-    Parameters
-    ----------
-    island
-        Its equations.
-    guess
-        Where to begin (V), e.g. the last voltages.
+    `guess`: where to begin (V), e.g. the last voltages.
     """
     if not np.isfinite(island.without_load).all():
         return None
@@ -147,22 +125,13 @@ def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | N
     return None
 
 
-def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: NDArray[np.float64]) -> dict[int, float]:
+def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: Real) -> dict[int, float]:
     r"""Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
 
     A power S behind an impedance Z has a solution where :math:`V^2 \geq 2 (|Z S| + Re(Z S^*))`. It is the one to which
     a network comes from no load where also the impedance of the load, V^2 / S, is the greater one.
 
-    Parameters
-    ----------
-    Y
-        Admittances between the nodes of unknown voltage (S), regular.
-    C
-        Incidence of the branches at these nodes.
-    loads
-        Their law.
-    V_nom
-        Their nominal voltages (V).
+    `Y`: admittances between the nodes of unknown voltage (S), regular; `C`: incidence of the branches at these nodes.
     """
     S, rows = loads.S.astype(complex), loads.law
     S[loads.limited_at] = np.where((rows[:, 3] == 0.0) & (rows[:, 4] == 0.0), rows[:, 0] + 1j * rows[:, 1], 0.0)

@@ -13,17 +13,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Real, Reduced, SparseMaps
+from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Reduced, SparseMaps
 from gridpeers.plant.dynamics.kernel.step import run_steps_unlocked
 from gridpeers.plant.dynamics.threads import each_on_a_core
 
-PART = 1000
-"""Nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters."""
+PART = 1000  # nodes from which on a part is large enough: 0.3 MB of factors, and some 50 inverters
 
-Integers = NDArray[np.int64]
 
 _OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
 _OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
@@ -31,8 +29,7 @@ _OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")
 _ADVANCED = ("gfm_state", "gfl_state", "J", "V", "I", "limiting")
 """Arrays of the inverters that the steps advance; of the others they only read, or need the room."""
 
-Which = Integers | slice
-"""Some of the inverters: a slice where they are neighbours, which needs no copy."""
+Which = Integers | slice  # some of the inverters: a slice where they are neighbours, which needs no copy
 
 
 @dataclass(frozen=True)
@@ -40,29 +37,22 @@ class Part:
     """Some islands of a network: their arrays, and where these stand in the network's."""
 
     net: Reduced
-    branches: Integers
-    """Its live branches."""
+    branches: Integers  # its live branches
     nodes: int
-    """Number of its nodes."""
     size: int
-    """Number of its inverters."""
     inverters: Which
-    gfm: Which
-    """Its grid-forming inverters, among all of them."""
-    gfm_at: Integers
-    """The inverter of the part that each is."""
+    gfm: Which  # its grid-forming inverters, among all of them
+    gfm_at: Integers  # the inverter of the part that each is
     gfl: Which
     gfl_at: Integers
 
     def take(self, units: Units) -> Units:
-        """Return its inverters, with copies of what the steps advance."""
         own: dict[str, Any] = {"gfm_at": self.gfm_at, "gfl_at": self.gfl_at}
         for which, names in ((self.gfm, _OF_GFM), (self.gfl, _OF_GFL), (self.inverters, _OF_INVERTERS)):
             own |= {name: getattr(units, name)[which] for name in names}
         return units._replace(**own | {name: own[name].copy() for name in _ADVANCED})
 
     def put(self, own: Units, units: Units) -> None:
-        """Write its inverters back after the steps."""
         units.gfm_state[self.gfm], units.gfl_state[self.gfl] = own.gfm_state, own.gfl_state
         units.J[self.inverters], units.V[self.inverters], units.I[self.inverters] = own.J, own.V, own.I
         units.limiting[self.inverters] = own.limiting
@@ -71,14 +61,8 @@ class Part:
 class IslandParts:
     """The parts of a network at one tangent of its loads.
 
-    Parameters
-    ----------
-    net
-        The network, by sparse factors.
-    node_island
-        Island of each of its nodes, in the order of the factors.
-    units
-        The inverters; only which of them are of which kind is read.
+    `net`: the network, by sparse factors; `node_island`: island of each of its nodes, in the order of the factors;
+    `units`: the inverters; only which of them are of which kind is read.
     """
 
     def __init__(self, net: Reduced, node_island: Integers, units: Units) -> None:
@@ -112,7 +96,6 @@ class IslandParts:
 
 
 def is_large(net: Reduced) -> bool:
-    """Return whether a network may have several parts."""
     return bool(net.sparse.constant.size // 2 >= 2 * PART)
 
 
@@ -136,7 +119,7 @@ def _parts(net: Reduced, node_island: Integers, units: Units) -> Iterator[Part]:
         yield _part(net, islands[part_of[islands] == k], part_of == k, node_island, units)
 
 
-def _part(net: Reduced, islands: Integers, of_part: NDArray[np.bool_], node_island: Integers, units: Units) -> Part:
+def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers, units: Units) -> Part:
     """Return one part. Inverters of dead islands belong to it as those of live ones: they are off."""
     maps, f = net.sparse, net.sparse.factored
     nodes = np.flatnonzero(of_part[node_island])

@@ -10,11 +10,11 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, Complex, Integers, Real, add_tangent
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, add_tangent
 
 MOST_NEIGHBOURS = 8
 """Neighbours up to which taking a node out makes the matrix smaller: it couples all of them with each other."""
@@ -23,22 +23,12 @@ WEAK = 1e-6
 """Part of a node's largest coupling below which its own admittance is no pivot: what is in series there cancels."""
 
 
-def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int64], sp.csc_array]:
+def eliminated(Y: sp.csr_array, keep: Flags) -> tuple[Integers, sp.csc_array]:
     """Take out nodes that need not be kept, those of fewest neighbours first.
 
-    Parameters
-    ----------
-    Y
-        Admittances (S), symmetric or not.
-    keep
-        Nodes to keep: those with a load, a terminal or a link to a source. Weak ones are kept, too.
+    `keep`: nodes to keep: those with a load, a terminal or a link to a source. Weak ones are kept, too.
 
-    Returns
-    -------
-    kept : int64[k]
-        The nodes that are left, ascending.
-    Y_kept : csc_array, complex, k x k
-        What they see of the network, to rounding; terms that cancel leave no entry.
+    Return what they see of the network, to rounding; terms that cancel leave no entry.
     """
     n = Y.shape[0]
     rows = [
@@ -80,17 +70,10 @@ def eliminated(Y: sp.csr_array, keep: NDArray[np.bool_]) -> tuple[NDArray[np.int
     return kept, reduced
 
 
-def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:
+def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> Integers:
     """Return the order of the nodes, by minimum degree, in which elimination couples few of the others.
 
     Those without an own admittance come last: elimination of the others gives them one.
-
-    Parameters
-    ----------
-    Y
-        Admittances between the nodes (S).
-    C
-        Incidence of the load branches.
     """
     link = _links(Y, C)
     link = link + sp.diags_array(np.full(link.shape[0], float(link.shape[0])))  # regular, whatever the admittances
@@ -106,19 +89,11 @@ def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> NDArray[np.int64]:
 class BlockPattern:
     """The matrix of a network as blocks [Re; Im] of its nodes, with room for its factors.
 
-    Parameters
-    ----------
-    Y
-        Admittances between the nodes (S), in the order of elimination; neither symmetric nor without stored zeros.
-    C
-        Incidence of the load branches, real: at most two nodes each.
+    `Y`: admittances between the nodes (S), in the order of elimination; neither symmetric nor without stored zeros;
+    `C`: incidence of the load branches, real: at most two nodes each.
 
-    Attributes
-    ----------
-    first, second : int64[m]
-        Nodes of each branch, or -1.
-    a_first, a_second : float64[m]
-        Ratios with which their voltages count in the branch's.
+    `first`, `second`: nodes of each branch, or -1; `a_first`, `a_second`: ratios with which their voltages count in
+    the branch's.
     """
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array) -> None:
@@ -132,12 +107,7 @@ class BlockPattern:
     def matrix(self, A: Complex, B: Complex, y: Complex | None = None) -> BlockFactors:
         """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place.
 
-        Parameters
-        ----------
-        A, B
-            Of each branch (S).
-        y
-            Of each node (S).
+        `A`, `B`: of each branch (S); `y`: of each node (S).
         """
         f = self._Y._replace(D=self._Y.D.copy(), L=self._Y.L.copy(), U=self._Y.U.copy())
         if y is not None:
@@ -145,7 +115,7 @@ class BlockPattern:
         add_tangent(f, self.first, self.second, self._across, self.a_first, self.a_second, A, B)
         return f
 
-    def _entry(self, i: NDArray[np.int64], j: NDArray[np.int64]) -> NDArray[np.int64]:
+    def _entry(self, i: Integers, j: Integers) -> Integers:
         """Return the entries of `later` that couple these nodes."""
         n = self.start.size - 1
         owner = np.repeat(np.arange(n), np.diff(self.start))
@@ -210,34 +180,14 @@ class KeptNetwork:
 
     The filters of inverters are not in it, so it serves whatever of the inverters is connected.
 
-    Parameters
-    ----------
-    circuit
-        The network.
-    unknown
-        Nodes whose voltage is unknown.
-    C
-        Incidence of the live branches.
-    to_ground
-        Admittance added at each node (S).
+    `to_ground`: admittance added at each node (S).
 
-    Attributes
-    ----------
-    nodes : int64[k]
-        The kept nodes.
-    place : int64[n]
-        Position of each node among them, or -1.
-    Y : csc_array, complex, k x k
-        Admittances between them (S).
-    Y_S, Y_S_whole : sparse, complex, k x s and u x s
-        Admittances between them, or all unknown nodes, and the sources (S).
-    C, C_whole, C_S : sparse
-        Incidence of the branches at them, at all unknown nodes, and at the sources.
-    pattern : BlockPattern
-        Where the factors have entries.
+    `place`: position of each node among them, or -1; `Y`: admittances between them (S); `Y_S`, `Y_S_whole`:
+    admittances between them, or all unknown nodes, and the sources (S); `C`, `C_whole`, `C_S`: incidence of the
+    branches at them, at all unknown nodes, and at the sources.
     """
 
-    def __init__(self, circuit: Circuit, unknown: NDArray[np.int64], C: sp.csc_array, to_ground: Real) -> None:
+    def __init__(self, circuit: Circuit, unknown: Integers, C: sp.csc_array, to_ground: Real) -> None:
         n = circuit.Y.shape[0]
         Y_whole = circuit.Y + sp.diags_array(to_ground) if to_ground.any() else circuit.Y
         rows, by_node = Y_whole.tocsr()[unknown], C.tocsr()
@@ -262,7 +212,7 @@ _made: WeakKeyDictionary[Circuit, dict[tuple[bytes, ...], KeptNetwork]] = WeakKe
 
 
 def kept_network(
-    circuit: Circuit, unknown: NDArray[np.int64], branches: NDArray[np.int64], C: sp.csc_array, to_ground: Real
+    circuit: Circuit, unknown: Integers, branches: Integers, C: sp.csc_array, to_ground: Real
 ) -> KeptNetwork:
     """Return the network of these unknown nodes and live branches, which is made once for a circuit."""
     made = _made.setdefault(circuit, {})

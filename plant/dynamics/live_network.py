@@ -2,103 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator
-from typing import Generic, TypeVar
+from collections.abc import Callable, Hashable
+from typing import TypeVar
 
 import numpy as np
 
-from gridpeers.plant.dynamics.circuit import Circuit, NoSolutionError
+from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.island_parts import IslandParts, is_large
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import Units
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
 
-ROOM = 64
-"""Values that are foreseen that are kept: a factored network of 123 nodes has 1 MB."""
-
-OTHERS = 8
-"""Values that are not foreseen that are kept: a person who switches to and fro needs a few. With 64 a plant grew by
-10 MB in an hour in which loads were set to ever new powers."""
+KEPT = 32
+"""Circuits, and their factors, that are kept: each event of a schedule has one, and a person who switches to and fro a
+few. A factored network of 123 nodes has 1 MB."""
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
 
 
-class ForeseenCache(Generic[K, V]):
-    """Values by key; of more than `OTHERS` that are not foreseen the one goes that was not asked for for longest.
-
-    The first `ROOM` values that are foreseen stay. Further ones, as of a schedule with hundreds of events, count as
-    others: none may keep an unbounded part of the memory.
-
-    Examples
-    --------
-    >>> cache = ForeseenCache()
-    >>> cache.get("event", lambda: [1], foreseen=True)
-    [1]
-    >>> for number in range(OTHERS + 1):
-    ...     kept = cache.get(number, lambda: [2])
-    >>> "event" in cache, 0 in cache, 1 in cache
-    (True, False, True)
-    """
-
-    def __init__(self) -> None:
-        self._foreseen: dict[K, V] = {}
-        self._others: dict[K, V] = {}
-
-    def __iter__(self) -> Iterator[K]:
-        yield from self._foreseen
-        yield from self._others
-
-    def get(self, key: K, make: Callable[[], V], *, foreseen: bool = False) -> V:
-        """Return the value of a key; make it if it is not there.
-
-        Parameters
-        ----------
-        key
-            What it is for.
-        make
-            Makes it.
-        foreseen
-            Whether an event to come needs it, so that it stays.
-        """
-        if key in self._foreseen:
-            return self._foreseen[key]
-        stays = foreseen and len(self._foreseen) < ROOM
-        value = self._others.pop(key) if key in self._others else make()
-        if not stays and len(self._others) == OTHERS:
-            del self._others[next(iter(self._others))]
-        (self._foreseen if stays else self._others)[key] = value
-        return value
+def recent(kept: dict[K, V], key: K, make: Callable[[], V]) -> V:
+    """Return the value of a key, made if it is not there; of more than `KEPT` the one used longest ago goes."""
+    value = kept.pop(key) if key in kept else make()
+    if len(kept) == KEPT:
+        del kept[next(iter(kept))]
+    kept[key] = value
+    return value
 
 
 TOLERANCE = 1e-11
 """Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
 
-WORTH = 40
-"""Iterations of a network solution that cost as much time as new sparse factors."""
+WORTH = 40  # iterations of a network solution that cost as much time as new sparse factors
 
 
 class LiveNetwork:
     """The network between the inverters, from one switching to the next.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    inverters
-        One per row of its terminals. `solve` reads their injections and writes their voltages.
+    `inverters`: one per row of its terminals. `solve` reads their injections and writes their voltages.
 
-    Attributes
-    ----------
-    reduction : Reduction
-        Reduction of the present circuit and its connected inverters.
-    net : Reduced
-        Its arrays for the inner loop, linearised; set by the first `solve`.
-    x : float64[2 m]
-        [Re; Im] of the live branches' voltages (V), each in its island's frame: the next solution's first guess.
+    `reduction`: reduction of the present circuit and its connected inverters; `net`: its arrays for the inner loop,
+    linearised; set by the first `solve`; `x`: [Re; Im] of the live branches' voltages (V), each in its island's frame:
+    the next solution's first guess (2 m).
     """
 
     net: Reduced
@@ -106,33 +55,28 @@ class LiveNetwork:
 
     def __init__(self, circuit: Circuit, inverters: Inverters) -> None:
         self._inverters = inverters
-        self._reductions: ForeseenCache[tuple[Circuit, bytes], Reduction] = ForeseenCache()
-        self._unsourced: ForeseenCache[Circuit, Circuit] = ForeseenCache()
+        self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
+        self._unsourced: dict[Circuit, Circuit] = {}
         self.substation_on = True
         """Whether the ideal sources are connected; `gridpeers.plant.dynamics.switching` disconnects them."""
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self._noted: Complex = circuit.V_branch.astype(complex)
-        self._steps_since = False
-        """Whether steps were taken since `V_branch` was written."""
+        self._steps_since = False  # whether steps were taken since `V_branch` was written
         self._excess = 0
         self._parts: IslandParts | None = None
 
     @property
     def source_voltage(self) -> Complex:
-        """Phasors of the connected ideal sources (V)."""
         return self.reduction.circuit.source_voltage
 
-    def reduced(self, circuit: Circuit, *, foreseen: bool = False) -> Reduction:
-        """Factor a circuit, once; call it ahead of a scheduled event (`foreseen`) to save this work in its step."""
+    def reduced(self, circuit: Circuit) -> Reduction:
+        """Factor a circuit, once; call it ahead of a scheduled event to save this work in its step."""
         units = self._inverters
         if not self.substation_on:
-            circuit = self._unsourced.get(circuit, circuit.without_source, foreseen=foreseen)
-        return self._reductions.get(
-            (circuit, units.connected.tobytes()),
-            lambda: reduce_network(circuit, units.y_f, units.forming, units.connected),
-            foreseen=foreseen,
-        )
+            circuit = recent(self._unsourced, circuit, circuit.without_source)
+        key = circuit, units.connected.tobytes()
+        return recent(self._reductions, key, lambda: reduce_network(circuit, units.y_f, units.forming, units.connected))
 
     def change(self, circuit: Circuit) -> None:
         """Take another circuit, or the same with other connected inverters; call `solve` next."""
@@ -150,10 +94,7 @@ class LiveNetwork:
     def solve(self) -> None:
         """Linearise at the solution of the present injections, by Newton's method with a fresh tangent each time.
 
-        Raises
-        ------
-        NoSolutionError
-            If islands have no solution; the terminal voltages are then as before.
+        NoSolutionError if islands have no solution; the terminal voltages are then as before.
         """
         units, branches = self._inverters, self.reduction.branches
         V_b, theta, V = self.V_branch[branches], units.theta(), units.V.copy()
@@ -179,10 +120,7 @@ class LiveNetwork:
     def renew(self) -> None:
         """Linearise again at the solution of the present injections, starting from the present voltages.
 
-        Raises
-        ------
-        NoSolutionError
-            If islands have no solution.
+        NoSolutionError if islands have no solution.
         """
         self._linearise(self._solve_islands(self._branch_voltages()))
 
@@ -191,11 +129,6 @@ class LiveNetwork:
 
         A tangent at the present voltages needs one iteration a solution. Dense matrices are never renewed for their
         speed: a new inverse costs more than it saves.
-
-        Parameters
-        ----------
-        iterations, solutions
-            Of the steps since the last call.
         """
         if self.net.sparse.constant.size:
             self._excess += max(iterations - 2 * solutions, 0)
@@ -253,7 +186,7 @@ class LiveNetwork:
 
     def _island_angle(self) -> Real:
         """Return the angle (rad) of each branch's island frame; 0 where the island has a source or no GFM."""
-        theta = self._inverters.theta() - self._inverters.nominal_angle()
+        theta = self._inverters.theta() - np.angle(PHASES)[self._inverters.phase]
         angle = np.array([theta[k] if k >= 0 else 0.0 for k in self.reduction.leader])
         C = self.circuit.C.tocsc()
         first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
@@ -265,16 +198,8 @@ def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> i
 
     Nothing but the work arrays of `net` is changed.
 
-    Parameters
-    ----------
-    net
-        Linearised at the present angles: all frames stand at 0.
-    units
-        Of which a network solution within the current limits has failed.
-    x
-        Where that solution began (V), [Re; Im] of all branches.
-    tolerance
-        Of a network solution (V).
+    `net`: linearised at the present angles: all frames stand at 0; `units`: of which a network solution within the
+    current limits has failed; `x`: where that solution began (V), [Re; Im] of all branches.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
     I_b, work = np.empty(x.size // 2, complex), np.empty(12 * len(J) + 3 * x.size)

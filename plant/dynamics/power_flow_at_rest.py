@@ -11,13 +11,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import root
 
 from gridpeers.plant.dynamics.circuit import Circuit, NoPowerFlowError, PlantError
 from gridpeers.plant.dynamics.inverters import Inverters
 from gridpeers.plant.dynamics.island_newton import weak_branches
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
 from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.dynamics.threads import one_thread
@@ -26,21 +26,19 @@ MOST_ROUNDS = 500
 """Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:
 near the largest power that a network carries a round leaves most of an error."""
 
-NEAR = 4
-"""Rounds after which the voltages are near enough to the solution for a tangent that serves to the end."""
+NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
 
 
 class PowerFlow:
     """Fixed point between the network and inverters of constant power."""
 
-    def __init__(self, circuit: Circuit, units: Inverters, held: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, units: Inverters, held: Flags) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
         self.reduction = reduce_network(circuit, y, units.forming, units.connected)
         self.circuit, self.units, self.y = circuit, units, y
         self.V_b = circuit.V_branch[self.reduction.branches].astype(complex)
-        self.I_b = np.empty(self.V_b.size, complex)
-        """Currents of the live load branches (A), of the last solution."""
+        self.I_b = np.empty(self.V_b.size, complex)  # currents of the live load branches (A), of the last solution
         self.net = self._linearise()
         self._near = False
 
@@ -55,7 +53,7 @@ class PowerFlow:
             raise self._no_power_flow()
         self.net = self._linearise()
 
-    def solve(self, J: Complex, P: Real, Q: Real, frozen: NDArray[np.bool_]) -> tuple[Complex, Complex]:
+    def solve(self, J: Complex, P: Real, Q: Real, frozen: Flags) -> tuple[Complex, Complex]:
         """Return injections and voltages where every inverter that is not frozen delivers P + jQ (pu)."""
         units, m = self.units, self.V_b.size
         J, V = J.copy(), np.empty(J.shape, complex)
@@ -118,21 +116,16 @@ AT_ONCE = 8
 class VoltVarAtRest(NamedTuple):
     """Droops and bands of inverters, and the set-points and limits at rest; arrays over the inverters."""
 
-    V_set: Real
-    """pu."""
-    m_q: Real
-    """pu per pu."""
-    db_UV: Real
-    """Dead bands below V_set (pu); 0 for a GFM, infinite without volt-var."""
-    db_OV: Real
-    """The same above V_set."""
-    from_edge: NDArray[np.bool_]
+    V_set: Real  # pu
+    m_q: Real  # pu per pu
+    db_UV: Real  # dead bands below V_set (pu); 0 for a GFM, infinite without volt-var
+    db_OV: Real  # the same above V_set
+    from_edge: Flags
     """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
-    Q_min: Real
-    """Limits of reactive power (pu)."""
+    Q_min: Real  # limits of reactive power (pu)
     Q_max: Real
 
-    def first_places(self) -> NDArray[np.int64]:
+    def first_places(self) -> Integers:
         """Return where the search begins: inside of every band at whose edges the characteristic jumps."""
         return np.where(((self.db_UV > 0.0) | (self.db_OV > 0.0)) & ~self.from_edge, INSIDE, DROOP)
 
@@ -145,7 +138,7 @@ class VoltVarAtRest(NamedTuple):
         """Return the vars within the band (pu): none, unless the limits exclude that."""
         return np.clip(np.zeros(self.m_q.size), self.Q_min, self.Q_max)
 
-    def mismatch(self, place: NDArray[np.int64], v: Real, Q: Real) -> Real:
+    def mismatch(self, place: Integers, v: Real, Q: Real) -> Real:
         """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
         low = self.V_set - v
         wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
@@ -153,17 +146,11 @@ class VoltVarAtRest(NamedTuple):
         off = np.where(place == UNDER, low - self.db_UV, off)
         return np.where(place == OVER, low + self.db_OV, off)
 
-    def next_places(self, place: NDArray[np.int64], v: Real, Q: Real, rounds: int) -> NDArray[np.int64]:
+    def next_places(self, place: Integers, v: Real, Q: Real, rounds: int) -> Integers:
         """Return where inverters belong that rest with Q at v; the same places once they are right.
 
-        Parameters
-        ----------
-        place
-            Where they were taken to be.
-        v, Q
-            Voltages and reactive powers with which they rest there (pu).
-        rounds
-            How often places have changed before.
+        `place`: where they were taken to be; `v`, `Q`: voltages and reactive powers with which they rest there (pu);
+        `rounds`: how often places have changed before.
         """
         low = self.V_set - v
         within = (-self.db_OV < low) & (low < self.db_UV) & ~self.from_edge
@@ -198,38 +185,20 @@ MOST_PLACE_ROUNDS = 100
 
 
 class DroopPowers(NamedTuple):
-    """Injections, voltages and reactive powers at rest, and where each inverter rests on its characteristic."""
-
-    J: Complex
-    """Norton injections (A)."""
-    V: Complex
-    """Terminal voltages (V)."""
-    Q: Real
-    """pu."""
-    on_droop: NDArray[np.bool_]
-    """Inverters whose voltage is V_set - m_q q."""
-    on_edge: NDArray[np.bool_]
-    """Inverters on the edge of a dead band."""
+    J: Complex  # Norton injections (A)
+    V: Complex  # terminal voltages (V)
+    Q: Real  # pu
+    on_droop: Flags  # inverters whose voltage is V_set - m_q q
+    on_edge: Flags  # inverters on the edge of a dead band
 
 
-def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: NDArray[np.bool_]) -> DroopPowers:
+def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags) -> DroopPowers:
     """Find the Q that each characteristic gives at its terminal's voltage.
 
-    Parameters
-    ----------
-    flow
-        The power flow of constant powers.
-    J, Q
-        First guesses of the injections (A) and reactive powers (pu).
-    P, V_set
-        Real powers and voltage set-points (pu).
-    swing
-        Inverters that hold their voltage, whatever their droop.
+    `J`, `Q`: first guesses of the injections (A) and reactive powers (pu); `P`, `V_set`: real powers and voltage
+    set-points (pu); `swing`: inverters that hold their voltage, whatever their droop.
 
-    Raises
-    ------
-    PlantError
-        If there are none.
+    PlantError if there are none.
     """
     units = flow.units
     free = ~swing & flow.reduction.online
@@ -254,14 +223,7 @@ def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, s
 
 
 def _at_places(
-    flow: PowerFlow,
-    J: Complex,
-    P: Real,
-    Q: Real,
-    at_rest: VoltVarAtRest,
-    place: NDArray[np.int64],
-    free: NDArray[np.int64],
-    swing: NDArray[np.bool_],
+    flow: PowerFlow, J: Complex, P: Real, Q: Real, at_rest: VoltVarAtRest, place: Integers, free: Integers, swing: Flags
 ) -> tuple[Complex, Complex, Real]:
     """Find the Q at which the free inverters rest at these places of their characteristics."""
     if not free.size:  # swings alone: they hold their voltage, and nothing is left to find

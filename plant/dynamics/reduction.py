@@ -19,36 +19,22 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import SuperLU, splu
 
 from gridpeers.plant.dynamics.circuit import Circuit, LoadLaw
 from gridpeers.plant.dynamics.island_newton import ROUNDING, DenseIsland, solve_island
 from gridpeers.plant.dynamics.kept_network import WEAK, BlockPattern, kept_network
-from gridpeers.plant.dynamics.kernel.network_arrays import (
-    COPY,
-    Complex,
-    Real,
-    Reduced,
-    SparseMaps,
-    factorise_blocks,
-    solve_blocks,
-)
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import COPY, Reduced, SparseMaps, factorise_blocks, solve_blocks
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.dynamics.threads import one_thread
 
 
 class DenseReduction(SwitchState):
-    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation.
-
-    Parameters
-    ----------
-    circuit, y_f, forming, online
-        As for `SwitchState`.
-    """
+    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation."""
 
     @one_thread()
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         super().__init__(circuit, y_f, forming, online)
         unknown, place, G, Y, C, held = self.unknown, self.place, self.terminals, self.Y, self.C, self.held
         C_U = C.tocsr()[unknown].toarray()
@@ -82,17 +68,7 @@ class DenseReduction(SwitchState):
                 self._G_S[row, np.flatnonzero(circuit.sources == node)[0]] = turn[row]
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        """Return branch voltages (V) by Newton's method, and the islands that have no solution, which keep the guess.
-
-        Parameters
-        ----------
-        J
-            Injections (A), n_inv x 3, in the common frame.
-        source_voltage
-            Phasors of the ideal sources (V).
-        guess
-            Where to begin (V, live branches).
-        """
+        """Return branch voltages (V) by Newton's method, and the islands without solution, which keep the guess."""
         at_branches, at_terminals = self.without_load(J, source_voltage)
         V_b, failed = guess.copy(), []
         for k in np.flatnonzero(self.live).tolist():
@@ -125,14 +101,7 @@ class DenseReduction(SwitchState):
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
         """Return the inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
 
-        Parameters
-        ----------
-        V_b
-            Point of linearisation.
-        source_voltage
-            Phasors of the ideal sources (V).
-        theta
-            Angle of every inverter at that point (rad).
+        `V_b`: point of linearisation; `theta`: angle of every inverter at that point (rad).
         """
         net = self.at_tangent(V_b, theta)
         s_b, s_G = self.source_parts(source_voltage)
@@ -150,7 +119,6 @@ class DenseReduction(SwitchState):
 
     @one_thread()
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return every node's voltage (V), 0 in dead islands, for injections J (n_inv x 3, A) and currents I_b (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         Z_G, Z_C, Z_S = self._columns
         V[self.unknown] = Z_G @ J.T.ravel() - Z_C @ I_b + Z_S @ source_voltage
@@ -173,15 +141,9 @@ def _stack(V: Complex) -> Real:
 
 
 class SparseReduction(SwitchState):
-    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers.
+    """A switch state by its sparse admittances; what it offers is what `DenseReduction` offers."""
 
-    Parameters
-    ----------
-    circuit, y_f, forming, online
-        As for `SwitchState`.
-    """
-
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         super().__init__(circuit, y_f, forming, online)
         self._kept = kept = kept_network(circuit, self.unknown, self.branches, self.C, self.to_ground)
         self._at, self._whole_at = (
@@ -197,7 +159,6 @@ class SparseReduction(SwitchState):
         self._lu: SuperLU | None = None
 
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        """Return the inner loop's arrays; see `DenseReduction.linearise`."""
         net = self.at_tangent(V_b, theta)
         kept = self._kept
         from_sources = kept.C_S.T @ source_voltage
@@ -222,7 +183,7 @@ class SparseReduction(SwitchState):
                 scratch=np.empty(4 * constant.size),
                 increments=np.zeros((4, 2 * V_b.size)),
                 rate=np.array([1.0, 1.0 / np.min(np.abs(V_b), initial=np.inf)]),
-            ),
+            )
         )
 
     def _without_unknowns(self, net: Reduced, from_sources: Complex, source_voltage: Complex) -> Reduced:
@@ -239,7 +200,6 @@ class SparseReduction(SwitchState):
         )
 
     def solve_islands(self, J: Complex, source_voltage: Complex, guess: Complex) -> tuple[Complex, tuple[int, ...]]:
-        """Return branch voltages by Newton's method; see `DenseReduction.solve_islands`."""
         V_b, failed, C = guess.copy(), [], self._kept.C
         from_sources = self._kept.C_S.T @ source_voltage
         right = self._injected(J, self._at, self._Y.shape[0]) - self._kept.Y_S @ source_voltage
@@ -269,11 +229,9 @@ class SparseReduction(SwitchState):
         return np.asarray(splu(sp.csc_matrix(Y)).solve(constant))
 
     def terminal_voltages(self, J: Complex, V_b: Complex, source_voltage: Complex) -> Complex:
-        """Return terminal voltages (V), n_inv x 3; see `DenseReduction.terminal_voltages`."""
         return self.circuit.turn * self.node_voltages(J, V_b, source_voltage)[self.circuit.terminals]
 
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return the voltage of every node (V) from injections (A), n_inv x 3, and branch currents (A)."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         if self.unknown.size:
             if self._lu is None:
@@ -283,7 +241,7 @@ class SparseReduction(SwitchState):
         V[self.circuit.sources] = source_voltage
         return V
 
-    def _injected(self, J: Complex, at: NDArray[np.int64], size: int) -> Complex:
+    def _injected(self, J: Complex, at: Integers, size: int) -> Complex:
         """Currents (A) that the inverters inject at these positions into so many nodes."""
         right = np.zeros(size, complex)
         feeding = (at >= 0) & self._feeds[:, None]
@@ -300,18 +258,8 @@ class SparseReduction(SwitchState):
 class SparseIsland:
     r"""An island by its node voltages, :math:`F(V) = Y V + C I_b(C^T V + c) - J`.
 
-    Parameters
-    ----------
-    Y
-        Admittances between its unknown nodes (S).
-    C
-        Incidence of its load branches.
-    loads
-        What they draw.
-    from_sources
-        What sources contribute to the branches' voltages, c (V).
-    right
-        Currents (A) into the nodes, J: of inverters, and from sources.
+    `from_sources`: what sources contribute to the branches' voltages, c (V); `right`: currents (A) into the nodes, J:
+    of inverters, and from sources.
     """
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
@@ -329,7 +277,6 @@ class SparseIsland:
         return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
 
     def step(self, V: Complex, F: Complex, part: float) -> tuple[Complex, bool] | None:
-        """Return Newton's step (V), and whether V is on the branch of high voltage; None if there is none."""
         A, B = self._loads.tangent(self._C.T @ V + self._c)
         matrix = self._pattern.matrix(part * A, part * B)
         # without load the determinant is that of a complex matrix, squared in magnitude: positive
@@ -349,11 +296,10 @@ def _interleaved(V: Complex) -> Real:
 
 Reduction = DenseReduction | SparseReduction
 
-MOST_DENSE = 30
-"""Load branches up to which dense matrices are faster: their cost grows with the square of it."""
+MOST_DENSE = 30  # load branches up to which dense matrices are faster: their cost grows with the square of it
 
 
-def reduce_network(circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> Reduction:
+def reduce_network(circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> Reduction:
     """Return a switch state as it is solved; arguments as for `gridpeers.plant.dynamics.switch_state.SwitchState`.
 
     Never dense with a neutral: where nothing earths it, the impedance of its insulation is in each entry, and what

@@ -12,8 +12,8 @@ from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError
 from gridpeers.plant.dynamics.equilibrium import OperatingPoint, equilibrium, set_equilibrium
 from gridpeers.plant.dynamics.inverters import Inverter, Inverters
 from gridpeers.plant.dynamics.island_parts import is_large
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real
 from gridpeers.plant.dynamics.kernel.controller_pass import READING, Units
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real
 from gridpeers.plant.dynamics.kernel.second_order_step import Slopes, run_second_order_steps
 from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_unlocked
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
@@ -26,28 +26,10 @@ MOST_RENEWALS = 20
 class Dynamics:
     """Inverters and network, stepped with fixed h.
 
-    Parameters
-    ----------
-    circuit
-        The network at the start.
-    inverters
-        One per row of `circuit.terminals`.
-    h
-        Step (s).
-    connected
-        Whether each inverter is switched on at the start; by default all are.
-    method
-        Of time stepping.
+    `inverters`: one per row of `circuit.terminals`.
 
-    Attributes
-    ----------
-    inverters : Inverters
-        Their state; set-points may be written between runs.
-    network : LiveNetwork
-        Network between them.
+    `inverters`: their state; set-points may be written between runs; `network`: network between them.
 
-    Notes
-    -----
     Call `start` once; then `run` and, at switching, `connect` or `switch_inverter`.
     """
 
@@ -61,8 +43,7 @@ class Dynamics:
     ) -> None:
         self.h, self._method = h, method
         self.inverters = Inverters(inverters, connected, method)
-        self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))
-        """Of a network solution (V)."""
+        self._tolerance = TOLERANCE * float(self.inverters.V_b.max(initial=1.0))  # of a network solution (V)
         self.network = LiveNetwork(circuit, self.inverters)
         self._single = np.flatnonzero(self.inverters.single)
         self._trips: list[switching.Trip] = []
@@ -83,10 +64,7 @@ class Dynamics:
         With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a
         GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop and its dead band.
 
-        Raises
-        ------
-        PlantError
-            If there is no such equilibrium.
+        PlantError if there is no such equilibrium.
         """
         units, network = self.inverters, self.network
         first = np.zeros(P.size) if Q is None else Q
@@ -97,15 +75,12 @@ class Dynamics:
         return point
 
     def connect(self, circuit: Circuit) -> None:
-        """Continue with another network; see `gridpeers.plant.dynamics.switching.connect`."""
         self._trips += switching.connect(self.inverters, self.network, circuit)
 
     def switch_inverter(self, i: int, on: bool) -> None:
-        """Connect or disconnect an inverter; see `switch_inverters`."""
         self.switch_inverters((i,), on)
 
     def switch_inverters(self, which: Sequence[int], on: bool) -> None:
-        """Connect or disconnect inverters, all at once; see `gridpeers.plant.dynamics.switching.switch_inverters`."""
         self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
@@ -146,7 +121,8 @@ class Dynamics:
                     continue
                 except NoSolutionError as error:
                     islands = set(error.islands)
-            self._return()
+            units = self.inverters  # go back to the start of the step that failed
+            units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
             network.note()
             self.deenergise(sorted(islands), step)
             begin, renewed = 2 * step, -1
@@ -204,11 +180,6 @@ class Dynamics:
             network.x,
             out,
         )
-
-    def _return(self) -> None:
-        """Go back to the start of the step that failed."""
-        units = self.inverters
-        units.gfm_state[:], units.gfl_state[:], units.J[:] = self._gfm_0, self._gfl_0, self._J_0
 
     def voltages(self) -> Complex:
         """Return the voltages to earth of all nodes (V); 0 in dead islands and at nodes without any admittance."""

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex, Real, Reduced
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
+from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 
 FLOATING = 1e-12
 """Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it
@@ -31,34 +31,16 @@ leave their voltages undetermined."""
 class SwitchState:
     """The island structure of a circuit, and its admittances with the inverters' filters.
 
-    Parameters
-    ----------
-    circuit
-        The network.
-    y_f
-        Filter admittance of each inverter (S per phase); 0 for a current source.
-    forming
-        Which inverters are GFM.
-    online
-        Which inverters are connected; the others neither inject nor load the network.
+    `y_f`: filter admittance of each inverter (S per phase); 0 for a current source; `online`: which inverters are
+    connected; the others neither inject nor load the network.
 
-    Attributes
-    ----------
-    unknown : int64[u]
-        Nodes whose voltage is unknown: in live islands, of any admittance, not held by a source.
-    place : int64[n]
-        Position of each node among them, or -1.
-    Y : csr_array, complex, n x n
-        Admittances with the connected inverters' filters (S).
-    C : csc_array, n x m
-        Incidence of the live branches.
-    terminals : int64[3 n_inv]
-        Nodes of the terminals: all A, then all B, then all C.
-    earthing : tuple of int
-        Inverters that earth their neutral, because nothing else does in an island of theirs (IEC 60364-5-551).
+    `unknown`: nodes whose voltage is unknown: in live islands, of any admittance, not held by a source (u); `place`:
+    position of each node among them, or -1; `Y`: admittances with the connected inverters' filters (S);
+    `terminals`: nodes of the terminals: all A, then all B, then all C (3 n_inv); `earthing`: inverters that earth their
+    neutral, because nothing else does in an island of theirs (IEC 60364-5-551).
     """
 
-    def __init__(self, circuit: Circuit, y_f: Complex, forming: NDArray[np.bool_], online: NDArray[np.bool_]) -> None:
+    def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
         self.circuit = circuit
         n_inv = circuit.terminals.shape[0]
         n = circuit.Y.shape[0]
@@ -69,10 +51,8 @@ class SwitchState:
         fed[self.label[circuit.sources]] = True
         self.has_source = fed.copy()
         fed[self.inverter_island[forming & online]] = True
-        self.live = fed
-        """Whether each island has a source or a GFM."""
-        self.online = online & fed[self.inverter_island]
-        """Inverters that are connected and in a live island."""
+        self.live = fed  # whether each island has a source or a GFM
+        self.online = online & fed[self.inverter_island]  # inverters that are connected and in a live island
         self.leader = np.full(self.count, -1, np.int64)
         for i in reversed(range(n_inv)):
             if forming[i] and self.online[i] and not self.has_source[self.inverter_island[i]]:
@@ -89,11 +69,9 @@ class SwitchState:
 
         C = circuit.C.tocsc()
         first = C.indices[C.indptr[:-1]] if C.shape[1] else np.zeros(0, np.int64)
-        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first
-        """Branches in live islands."""
+        self.branches = np.flatnonzero(fed[self.label[first]]) if C.shape[1] else first  # branches in live islands
         self.branch_island = self.label[first[self.branches]]
-        self.loads = circuit.loads.of(self.branches)
-        """Law of the live branches."""
+        self.loads = circuit.loads.of(self.branches)  # law of the live branches
 
         self.terminals = G = circuit.terminals.T.ravel()
         injects = np.tile(self.online, 3) & ~circuit.copies.T.ravel()
@@ -101,8 +79,7 @@ class SwitchState:
         np.add.at(y_diagonal, G, np.where(injects, np.tile(y_f, 3), 0.0))
         whole = np.bincount(self.label[circuit.sources], minlength=self.count) >= 3
         whole[self.inverter_island[forming & self.online & ~circuit.copies[:, 1]]] = True
-        self.to_ground = np.zeros(n)
-        """Admittance added at each node (S), so that nothing floats."""
+        self.to_ground = np.zeros(n)  # admittance added at each node (S), so that nothing floats
         if (on_few_phases := fed & ~whole).any():
             self.to_ground = np.where(on_few_phases[self.label], FLOATING * np.abs(circuit.Y.diagonal()), 0.0)
             y_diagonal += self.to_ground
@@ -121,7 +98,7 @@ class SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
         return self
 
-    def _earthing(self, formers: NDArray[np.int64], no_earth: sp.csr_array) -> Iterator[int]:
+    def _earthing(self, formers: Integers, no_earth: sp.csr_array) -> Iterator[int]:
         """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
 
         A filter of `no_earth` earths nothing: it is that of a GFL, which injects its current whatever the voltage is.
@@ -163,12 +140,8 @@ class SwitchState:
     def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:
         """Return the inner loop's arrays but those of the network: the loads' tangent, the islands' frames.
 
-        Parameters
-        ----------
-        V_b
-            Voltages of the live branches at the point of linearisation (V).
-        theta
-            Angle of every inverter there (rad).
+        `V_b`: voltages of the live branches at the point of linearisation (V); `theta`: angle of every inverter there
+        (rad).
         """
         A, B = self.loads.tangent(V_b)
         return Reduced(

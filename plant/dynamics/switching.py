@@ -6,24 +6,20 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import PHASES, Circuit, NoSolutionError, aligned_sum
 from gridpeers.plant.dynamics.inverters import Inverters
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.dynamics.live_network import LiveNetwork
 
 
 class Trip(NamedTuple):
     """Inverters, and perhaps the substation, disconnected because their island has no solution."""
 
-    step: int
-    """Number of steps of the present `Dynamics.run` before it."""
-    inverters: tuple[int, ...]
-    """Disconnected inverters."""
-    substation: bool
-    """Whether the substation was disconnected too."""
-    V_min: float
-    """Their lowest terminal voltage before (pu); inf where only the substation was left."""
+    step: int  # number of steps of the present `Dynamics.run` before it
+    inverters: tuple[int, ...]  # disconnected inverters
+    substation: bool  # whether the substation was disconnected too
+    V_min: float  # their lowest terminal voltage before (pu); inf where only the substation was left
 
 
 def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Trip]:
@@ -57,7 +53,7 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Tr
             network.change(circuit)
 
 
-def _solve_without(away: NDArray[np.bool_], units: Inverters, network: LiveNetwork) -> None:
+def _solve_without(away: Flags, units: Inverters, network: LiveNetwork) -> None:
     """Find the voltages at the open terminals of inverters that are about to return.
 
     Behind its filter an inverter is at zero current where its internal voltage is that of its open terminal, in each
@@ -80,14 +76,7 @@ def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], s
     An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
     `switch_inverters` reconnects inverters; the substation stays off.
 
-    Parameters
-    ----------
-    units, network
-        The inverters and the network between them.
-    islands
-        Their numbers in the present reduction.
-    step
-        Number of steps of the present run before; the trips repeat it.
+    `step`: number of steps of the present run before; the trips repeat it.
     """
     trip = _trip(units, network, islands, step)
     return [trip, *(later._replace(step=step) for later in connect(units, network, network.circuit))]
@@ -157,5 +146,4 @@ def _rest_voltage(units: Inverters, i: int) -> float:
 
 
 def _mean_voltage(units: Inverters, i: int) -> float:
-    """Return the mean terminal voltage of inverter i (pu)."""
     return float(np.mean(np.abs(units.V[i]))) / float(units.V_b[i])

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import threading
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from threading import Thread
 from typing import TypeVar
 
 import scipy.linalg  # noqa: F401 - the controller knows the libraries that are loaded when it is made
@@ -16,8 +15,7 @@ from gridpeers.wire.driver.machine import usable_cores
 
 _LIBRARIES = ThreadpoolController().select(user_api="blas").lib_controllers
 _lock = threading.Lock()
-_before: list[int] = []
-"""Threads of each library before the first run."""
+_before: list[int] = []  # threads of each library before the first run
 _inside = 0
 
 
@@ -48,36 +46,13 @@ def _set(threads: list[int]) -> None:
 T = TypeVar("T")
 R = TypeVar("R")
 
-MOST_THREADS = 4
-"""Threads, as far as there are cores: more of them share one path to the memory."""
+MOST_THREADS = 4  # threads, as far as there are cores: more of them share one path to the memory
 
 
 def each_on_a_core(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Return what `work` gives for each item, in their order; raise the first item's error, if any.
+    """Return the result of `work` for each item, in their order; raise the first item's error, if any.
 
-    Threads pay where `work` spends its time without Python's lock. What it gives must not depend on the other items.
+    Threads pay where `work` spends its time without Python's lock. No result may depend on the other items.
     """
-    waiting = deque(range(len(items)))
-    results: dict[int, R] = {}
-    errors: dict[int, BaseException] = {}
-
-    def take() -> None:
-        while waiting:
-            try:
-                k = waiting.popleft()
-            except IndexError:  # another thread was faster
-                return
-            try:
-                results[k] = work(items[k])
-            except BaseException as error:
-                errors[k] = error
-
-    threads = [Thread(target=take, daemon=True) for _ in range(min(usable_cores(), MOST_THREADS, len(items)) - 1)]
-    for thread in threads:
-        thread.start()
-    take()
-    for thread in threads:
-        thread.join()
-    if errors:
-        raise errors[min(errors)]
-    return [results[k] for k in range(len(items))]
+    with ThreadPoolExecutor(min(usable_cores(), MOST_THREADS)) as pool:
+        return list(pool.map(work, items))

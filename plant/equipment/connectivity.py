@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Hashable, Iterable, Iterator
+from typing import TypeVar
 
 from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Line, Regulator, Switch, Transformer
 from gridpeers.wire.wording import suggestion
@@ -17,13 +18,7 @@ def switch_names(feeder: Feeder) -> dict[str, str]:
 
 
 def switch_name(feeder: Feeder, text: str) -> str:
-    """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables.
-
-    Raises
-    ------
-    ValueError
-        If no switch has this name.
-    """
+    """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in the tables."""
     known = switch_names(feeder)
     if text not in known:
         shown = [switch.alias or switch.name for switch in feeder.switches]
@@ -33,32 +28,31 @@ def switch_name(feeder: Feeder, text: str) -> str:
 
 
 def bus_islands(feeder: Feeder, closed: Collection[str]) -> tuple[frozenset[str], ...]:
-    """Return the sets of buses joined by branches and these closed switches, in the order of their first buses.
+    """Return the sets of buses joined by branches and these closed switches, in the order of their first buses."""
+    joined = [(one, other) for one, other, _ in feeder.branches()]
+    joined += [(switch.from_bus, switch.to_bus) for switch in feeder.switches if switch.name in closed]
+    return connected((bus.name for bus in feeder.buses), joined)
 
-    Parameters
-    ----------
-    feeder
-        Its tables.
-    closed
-        Names of the closed switches, as in the tables.
-    """
-    above = {bus.name: bus.name for bus in feeder.buses}
 
-    def root(bus: str) -> str:
-        while above[bus] != bus:
-            above[bus] = above[above[bus]]
-            bus = above[bus]
-        return bus
+T = TypeVar("T", bound=Hashable)
 
-    for one, other, _ in feeder.branches():
+
+def connected(things: Iterable[T], joined: Iterable[tuple[T, T]]) -> tuple[frozenset[T], ...]:
+    """Return the sets of things that pairs join, directly or through others, in the order of their first things."""
+    above = {thing: thing for thing in things}
+
+    def root(thing: T) -> T:
+        while above[thing] != thing:
+            above[thing] = above[above[thing]]
+            thing = above[thing]
+        return thing
+
+    for one, other in joined:
         above[root(one)] = root(other)
-    for switch in feeder.switches:
-        if switch.name in closed:
-            above[root(switch.from_bus)] = root(switch.to_bus)
-    members: dict[str, list[str]] = {}
-    for bus in above:
-        members.setdefault(root(bus), []).append(bus)
-    return tuple(frozenset(buses) for buses in members.values())
+    members: dict[T, list[T]] = {}
+    for thing in above:
+        members.setdefault(root(thing), []).append(thing)
+    return tuple(frozenset(group) for group in members.values())
 
 
 def islands_after(feeder: Feeder, operations: Iterable[SwitchOperations]) -> Iterator[tuple[frozenset[str], ...]]:
@@ -70,8 +64,7 @@ def islands_after(feeder: Feeder, operations: Iterable[SwitchOperations]) -> Ite
         yield bus_islands(feeder, closed)
 
 
-Node = tuple[str, str]
-"""A bus and one of its phases."""
+Node = tuple[str, str]  # a bus and one of its phases
 
 
 class Connectivity:
@@ -80,11 +73,6 @@ class Connectivity:
     Lines, regulators and switches join the nodes of each of their phases; a transformer, the substation and a
     grid-forming inverter of three phases join all three. Equipment that feeds nothing by itself, or is connected to
     ground (loads, capacitors, grid-following inverters), joins none.
-
-    Parameters
-    ----------
-    feeder : Feeder
-        Its tables.
     """
 
     def __init__(self, feeder: Feeder) -> None:
@@ -106,7 +94,6 @@ class Connectivity:
             ]
 
     def closed_at_start(self) -> frozenset[str]:
-        """Return the switches that are closed at the start."""
         return frozenset(switch.name for switch in self._feeder.switches if switch.closed)
 
     def parts(
@@ -117,45 +104,21 @@ class Connectivity:
     ) -> tuple[frozenset[Node], ...]:
         """Return the sets of connected nodes, in the order of their first buses.
 
-        Parameters
-        ----------
-        closed : Collection[str], optional
-            Names of the closed switches; by default all.
-        whole : Iterable[str], optional
-            Buses whose three phases count as one, because their source feeds all of them.
-        tied : Iterable[tuple[Node, Node]], optional
-            Further pairs of nodes that count as connected.
+        `whole`: buses whose three phases count as one, because their source feeds all of them; `tied`: further pairs of
+        nodes that count as connected.
         """
-        above = {node: node for node in self.nodes}
-
-        def root(node: Node) -> Node:
-            while above[node] != node:
-                above[node] = above[above[node]]
-                node = above[node]
-            return node
-
         joined = [*self._fixed, *(((bus, "A"), (bus, phase)) for bus in whole for phase in PHASES), *tied]
         for switch in self._feeder.switches:
             if closed is None or switch.name in closed:
                 joined += [((switch.from_bus, p), (switch.to_bus, p)) for p in switch.phases]
-        for one, other in joined:
-            above[root(one)] = root(other)
-        parts: dict[Node, list[Node]] = {}
-        for node in self.nodes:
-            parts.setdefault(root(node), []).append(node)
-        return tuple(frozenset(nodes) for nodes in parts.values())
+        return connected(self.nodes, joined)
 
     def fed(
         self, closed: Collection[str], forming: Iterable[InverterRow]
     ) -> tuple[tuple[frozenset[Node], ...], tuple[frozenset[Node], ...]]:
         """Return the parts that the substation or a grid-forming inverter feeds, and the de-energised parts.
 
-        Parameters
-        ----------
-        closed : Collection[str]
-            Names of the closed switches.
-        forming : Iterable[InverterRow]
-            The connected grid-forming inverters.
+        `forming`: the connected grid-forming inverters.
         """
         alive, whole = set[Node](), list[str]()
         for row in forming:
@@ -184,17 +147,7 @@ def buses_without_ground(
 ) -> frozenset[str]:
     """Return the buses behind a delta winding, from which no current can return through ground.
 
-    Parameters
-    ----------
-    transformers, lines, others
-        The feeder's; the others are its regulators and switches.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.tables import read_feeder
-    >>> feeder = read_feeder("microgrid123")
-    >>> buses_without_ground(feeder.transformers, feeder.lines, feeder.switches)
-    frozenset({'610'})
+    `transformers`, `lines`, `others`: the feeder's; the others are its regulators and switches.
     """
     beside: dict[str, set[str]] = {}
     grounded = [(row.from_bus, row.to_bus) for row in transformers if row.connection != "D-D"]

@@ -8,7 +8,7 @@ from typing import TypeVar
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment import Feeder, InverterRow, Line, Switch
+from gridpeers.plant.equipment import Feeder, InverterRow, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters
 from gridpeers.plant.plant_config import FeederChanges
@@ -22,15 +22,6 @@ def changed(feeder: Feeder, changes: FeederChanges) -> Feeder:
     lines' susceptances, and the capacitors' reactive power go with the frequency. Loads are powers at nominal
     frequency, and inverters' filters per-unit values at nominal frequency; both stay as they are.
 
-    Parameters
-    ----------
-    feeder : Feeder
-        As its tables have it.
-    changes : FeederChanges
-        What is to be otherwise; inverters that there are not are left out.
-
-    Examples
-    --------
     >>> from gridpeers.plant.tables import read_feeder
     >>> feeder = read_feeder("microgrid123")
     >>> slower = changed(feeder, FeederChanges(f_nom=50.0, m_p_factor=2.0))
@@ -66,7 +57,6 @@ def _inverter(row: InverterRow, changes: FeederChanges) -> InverterRow:
 
 
 def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
-    """The same equipment at another nominal frequency (Hz)."""
     if f_nom == feeder.f_nom:
         return feeder
     k = f_nom / feeder.f_nom
@@ -86,27 +76,17 @@ def _at_frequency(feeder: Feeder, f_nom: float) -> Feeder:
     )
 
 
-TIE_LENGTH = 0.3
-"""Length (km) of the line of a tie."""
+TIE_LENGTH = 0.3  # length (km) of the line of a tie
 
 AnyFeeder = TypeVar("AnyFeeder", bound=Feeder)
 Row = TypeVar("Row", bound=msgspec.Struct)
 
-_REFERENCES = ("bus", "from_bus", "to_bus")
-"""Fields of equipment that name a bus."""
-
-_NAMES = ("name", "alias", "microgrid", "zone")
-"""Fields whose names differ from copy to copy."""
+_REFERENCES = ("bus", "from_bus", "to_bus")  # fields of equipment that name a bus
+_NAMES = ("name", "alias", "microgrid", "zone")  # fields whose names differ from copy to copy
 
 
 def copy_name(name: str, k: int) -> str:
-    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names.
-
-    Examples
-    --------
-    >>> copy_name("inv1", 1), copy_name("inv1", 3)
-    ('inv1', 'inv1_3')
-    """
+    """Return the name that a bus, a switch or an inverter has in copy k; the first copy keeps its names."""
     return name if k == 1 or not name else f"{name}_{k}"
 
 
@@ -116,19 +96,8 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
     All copies hang on the first one's substation by closed switches. A tie is a closed switch and a line, so the copies
     remain one network when each is cut off the substation. Spare inverters are left out.
 
-    Parameters
-    ----------
-    feeder
-        A feeder with a substation.
-    copies
-        How many, at least 1.
-    joint
-        A bus with phases A, B and C.
-
-    Raises
-    ------
-    ValueError
-        If the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a phase.
+    ValueError if the feeder has no substation, the number is below 1 or makes too many inverters, or `joint` lacks a
+    phase.
     """
     bus = next((each for each in feeder.buses if each.name == joint), None)
     if feeder.source is None:
@@ -142,7 +111,11 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         raise ValueError(f'bus "{joint}": a tie needs a bus with phases A, B and C')
     fields = ("buses", "lines", "switches", "loads", "capacitors", "regulators", "transformers", "inverters")
     rows = {name: [row for k in range(1, copies + 1) for row in _copied(getattr(feeder, name), k)] for name in fields}
-    elements = [element for k in range(1, copies + 1) for element in _copied_elements(feeder, k)]
+    elements = [
+        replace(it, name=copy_name(it.name, k), nodes=tuple((copy_name(bus, k), phase) for bus, phase in it.nodes))
+        for k in range(1, copies + 1)
+        for it in feeder.elements
+    ]
     parts = [part for k in range(1, copies + 1) for part in _copied(feeder.load_parts, k)]
     source = feeder.source.bus
     width = max(each.x for each in feeder.buses) - min(each.x for each in feeder.buses)
@@ -156,7 +129,9 @@ def joined_copies(feeder: AnyFeeder, copies: int, joint: str) -> AnyFeeder:
         rows["buses"].append(replace(place, name=between, phases="ABC"))
         rows["switches"].append(_tie_switch(here, between, between))
         if feeder.lines:
-            rows["lines"].append(_tie_line(feeder, between, there))
+            of_three = next(line for line in feeder.lines if line.phases == "ABC")
+            ends = {"name": between, "from_bus": between, "to_bus": there}
+            rows["lines"].append(replace(of_three, **ends, length=TIE_LENGTH))
         else:
             elements.append(_tie_element(feeder, bus.V_nom, between, there))
     return replace(
@@ -179,24 +154,11 @@ def _copied(rows: tuple[Row, ...], k: int) -> Iterator[Row]:
         yield replace(row, **changed)
 
 
-def _copied_elements(feeder: Feeder, k: int) -> Iterator[LinearElement]:
-    for element in feeder.elements:
-        nodes = tuple((copy_name(bus, k), phase) for bus, phase in element.nodes)
-        yield replace(element, name=copy_name(element.name, k), nodes=nodes)
-
-
 def _tie_switch(one: str, other: str, alias: str) -> Switch:
     return Switch(name=f"{one}-{other}", alias=alias, from_bus=one, to_bus=other, phases="ABC", closed=True)
 
 
-def _tie_line(feeder: Feeder, one: str, other: str) -> Line:
-    """Return a line as the first of three phases."""
-    kind = next(line for line in feeder.lines if line.phases == "ABC")
-    return Line(name=one, from_bus=one, to_bus=other, phases="ABC", config=kind.config, length=TIE_LENGTH)
-
-
 def _tie_element(feeder: Feeder, V_nom: float, one: str, other: str) -> LinearElement:
-    """Return a line as the first of three phases at this voltage."""
     voltages = {bus.name: bus.V_nom for bus in feeder.buses}
     for element in feeder.elements:
         buses = [bus for bus, _ in element.nodes]

@@ -8,11 +8,8 @@ BEHIND = "~"
 """Stands in the name of a bus that an import adds, behind the name of the bus whose voltage and place it has."""
 
 
-OVERVOLTAGE = 1.2
-"""Voltage (pu) above which generation disconnects: OV2 of IEEE 1547-2018."""
-
-HIGH = 1.1
-"""Voltage (pu) above which what it usually has is taken for nominal: the nominal voltage is wrong."""
+OVERVOLTAGE = 1.2  # voltage (pu) above which generation disconnects: OV2 of IEEE 1547-2018
+HIGH = 1.1  # voltage (pu) above which what it usually has is taken for nominal: the nominal voltage is wrong
 
 
 def cut_off(usual: float) -> float:
@@ -21,8 +18,6 @@ def cut_off(usual: float) -> float:
     Other programs have no such limit: beyond their own limits it is a negative impedance, and an island in which it
     prevails has no voltage at which to rest.
 
-    Examples
-    --------
     >>> cut_off(1.02), cut_off(1.7)
     (1.2, 2.04)
     """
@@ -30,36 +25,22 @@ def cut_off(usual: float) -> float:
 
 
 def bus_behind(bus: str, element: str) -> str:
-    """Return the name of the bus that an import puts between a bus and an element.
-
-    Examples
-    --------
-    >>> bus_behind("632", "632-671")
-    '632~632-671'
-    """
+    """Return the name of the bus that an import puts between a bus and an element."""
     return f"{bus}{BEHIND}{element}"
 
 
 def is_behind(bus: str) -> bool:
-    """Return whether an import has added a bus, which the other program does not have.
-
-    Examples
-    --------
-    >>> is_behind("632~632-671"), is_behind("632")
-    (True, False)
-    """
+    """Return whether an import has added a bus, which the other program does not have."""
     return BEHIND in bus
 
 
 class LinearElement(msgspec.Struct, frozen=True, kw_only=True):
     """Anything linear between nodes, by its primitive admittance matrix: a line, a transformer, a capacitor."""
 
-    name: str
-    """Name, unique: "transformer.sub"."""
+    name: str  # name, unique: "transformer.sub"
     nodes: tuple[tuple[str, str], ...]
     """The nodes (bus, phase) of its rows and columns; whatever leads to ground has no row."""
-    Y: tuple[tuple[complex, ...], ...]
-    """Admittance (S); it need not be symmetric."""
+    Y: tuple[tuple[complex, ...], ...]  # admittance (S); it need not be symmetric
 
 
 class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,38 +50,24 @@ class LoadPart(msgspec.Struct, frozen=True, kw_only=True):
     below `V_min` its current falls in proportion to the voltage, to the nominal impedance at `V_low` and below.
     """
 
-    name: str
-    """Name of the load it is a part of."""
-    bus: str
-    """Where it is connected."""
-    ends: tuple[str, str]
-    """Its two phases; the second is empty for ground."""
-    S: complex
-    """Power at nominal voltage (VA)."""
-    V_nom: float
-    """Nominal voltage across it (V)."""
+    name: str  # name of the load it is a part of
+    bus: str  # where it is connected
+    ends: tuple[str, str]  # its two phases; the second is empty for ground
+    S: complex  # power at nominal voltage (VA)
+    V_nom: float  # nominal voltage across it (V)
     exponents: tuple[float, float]
     """Powers of the voltage with which P and Q go: 0 constant power, 1 constant current, 2 constant impedance."""
     V_low: float = 0.0
     """Voltage (pu) below which it is its nominal impedance. If it is `V_min`, the current stays as at `V_min` below."""
-    V_min: float = 0.0
-    """Voltage (pu) below which it is limited; 0: nowhere."""
-    V_max: float = 0.0
-    """Voltage (pu) above which it is limited; 0: nowhere."""
+    V_min: float = 0.0  # voltage (pu) below which it is limited; 0: nowhere
+    V_max: float = 0.0  # voltage (pu) above which it is limited; 0: nowhere
     edge: float = 0.0
     """Exponent that sets its current at the limits: 0 as of constant power, 1 as of current, 2 as of impedance."""
     V_off: float = 0.0
     """Voltage (pu) below which it switches off: half of it is off there, all of it 0.01 pu below; 0: nowhere."""
-    V_off_above: float = 0.0
-    """The same for voltages above; 0: nowhere."""
+    V_off_above: float = 0.0  # the same for voltages above; 0: nowhere
 
     @property
     def is_impedance(self) -> bool:
-        """Whether it is a constant impedance at any voltage.
-
-        Examples
-        --------
-        >>> LoadPart(name="l", bus="1", ends=("A", ""), S=1e3, V_nom=240.0, exponents=(2.0, 2.0)).is_impedance
-        True
-        """
+        """Whether it is a constant impedance at any voltage."""
         return self.exponents == (2.0, 2.0) and self.V_off == self.V_off_above == 0.0

@@ -36,53 +36,34 @@ class GfmParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     voltage_control: bool = True
     """true: the Q-V droop gives the terminal voltage, and a controller holds it; false: the droop gives the internal
     voltage (VFlag of REGFM_A1, section 3.8)."""
-    R_f: Resistance = 0.015
-    """Filter resistance (pu)."""
-    X_f: Reactance = 0.15
-    """Filter reactance (pu)."""
-    T_p: TimeConstant = 0.01
-    """Filter of measured P (s)."""
-    T_q: TimeConstant = 0.01
-    """Filter of measured Q (s)."""
-    T_v: TimeConstant = 0.01
-    """Filter of measured V (s)."""
-    P_max: LimitOfP = 1.0
-    """Overload limit (pu)."""
-    P_min: Annotated[LimitOfP, Below("P_max")] = 0.0
-    """Under-load limit (pu)."""
-    k_pp: Annotated[Gain, Unit("rad/s per pu")] = 3.0
-    """Proportional gain of the P limiters (rad/s per pu)."""
-    k_ip: Annotated[Gain, Unit("rad/s^2 per pu")] = 60.0
-    """Integral gain of the P limiters (rad/s^2 per pu)."""
+    R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.015
+    X_f: Annotated[Reactance, "Filter reactance (pu)."] = 0.15
+    T_p: Annotated[TimeConstant, "Filter of measured P (s)."] = 0.01
+    T_q: Annotated[TimeConstant, "Filter of measured Q (s)."] = 0.01
+    T_v: Annotated[TimeConstant, "Filter of measured V (s)."] = 0.01
+    P_max: Annotated[LimitOfP, "Overload limit (pu)."] = 1.0
+    P_min: Annotated[LimitOfP, Below("P_max"), "Under-load limit (pu)."] = 0.0
+    k_pp: Annotated[Gain, Unit("rad/s per pu"), "Proportional gain of the P limiters (rad/s per pu)."] = 3.0
+    k_ip: Annotated[Gain, Unit("rad/s^2 per pu"), "Integral gain of the P limiters (rad/s^2 per pu)."] = 60.0
     w_lim: Annotated[float, Unit("rad/s"), Plausible("the limiters' bound w_lim", 0.1, 1e4, above_zero=True)] = 200.0
     """Bound of the P limiters' output (rad/s)."""
-    Q_max: LimitOfQ = 10.0
-    """Upper reactive limit (pu)."""
-    Q_min: Annotated[LimitOfQ, Below("Q_max")] = -10.0
-    """Lower reactive limit (pu)."""
-    k_pq: Annotated[Gain, Unit("pu V per pu")] = 3.0
-    """Proportional gain of the Q limiters (pu V per pu)."""
-    k_iq: Annotated[Gain, Unit("pu V per pu s")] = 20.0
-    """Integral gain of the Q limiters (pu V per pu s)."""
+    Q_max: Annotated[LimitOfQ, "Upper reactive limit (pu)."] = 10.0
+    Q_min: Annotated[LimitOfQ, Below("Q_max"), "Lower reactive limit (pu)."] = -10.0
+    k_pq: Annotated[Gain, Unit("pu V per pu"), "Proportional gain of the Q limiters (pu V per pu)."] = 3.0
+    k_iq: Annotated[Gain, Unit("pu V per pu s"), "Integral gain of the Q limiters (pu V per pu s)."] = 20.0
     V_lim: Annotated[float, Unit("pu"), Plausible("the limiters' bound V_lim", 0.01, 10.0, above_zero=True)] = 10.0
     """Bound of the Q limiters' output (pu V)."""
-    k_pv: Gain = 0.0
-    """Proportional gain of the voltage controller."""
-    k_iv: Annotated[Gain, Unit("1/s")] = 5.86
-    """Integral gain of the voltage controller (1/s)."""
-    E_min: Annotated[InternalVoltage, Below("E_max")] = 0.0
-    """Lower bound of the internal voltage (pu)."""
-    E_max: InternalVoltage = 1.25
-    """Upper bound of the internal voltage (pu)."""
+    k_pv: Annotated[Gain, "Proportional gain of the voltage controller."] = 0.0
+    k_iv: Annotated[Gain, Unit("1/s"), "Integral gain of the voltage controller (1/s)."] = 5.86
+    E_min: Annotated[InternalVoltage, Below("E_max"), "Lower bound of the internal voltage (pu)."] = 0.0
+    E_max: Annotated[InternalVoltage, "Upper bound of the internal voltage (pu)."] = 1.25
     I_max: PhaseCurrent = 2.0
     """Largest current of a phase (pu of the rating): beyond it the phase keeps its angle and loses the surplus."""
     P_set_lim: BoundOfPset = 3.0
     """Bound of P_set, either way (pu). P_set shifts the droop (3), so it may exceed P_max; with 3 pu and 1 % droop an
     unloaded GFM stays within 3 % of nominal frequency. GridLAB-D has no such bound."""
-    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
-    """Lower bound of V_set (pu)."""
-    V_set_max: BoundOfVset = 1.2
-    """Upper bound of V_set (pu)."""
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max"), "Lower bound of V_set (pu)."] = 0.8
+    V_set_max: Annotated[BoundOfVset, "Upper bound of V_set (pu)."] = 1.2
 
 
 REGFM_A1 = GfmParameters(
@@ -109,65 +90,42 @@ class GflParameters(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     """Representation towards the network (sections 4.6, 4.7)."""
     mode: Literal["positive_sequence", "balanced_power"] = "positive_sequence"
     """Control of its phases: one PLL for all and equal currents, or a PLL for each and equal powers (section 4)."""
-    R_f: Resistance = 0.01
-    """Filter resistance (pu)."""
-    X_f: Reactance = 0.15
-    """Filter reactance (pu)."""
-    k_pPLL: Annotated[Gain, Unit("rad/s per pu")] = 50.0
-    """PLL proportional gain (rad/s per pu)."""
-    k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu")] = 900.0
-    """PLL integral gain (rad/s^2 per pu)."""
-    k_pc: Annotated[Gain, Unit("pu", in_key=False)] = 0.05
-    """Current controller, proportional (pu)."""
-    k_ic: Annotated[Gain, Unit("1/s")] = 5.0
-    """Current controller, integral (1/s)."""
+    R_f: Annotated[Resistance, "Filter resistance (pu)."] = 0.01
+    X_f: Annotated[Reactance, "Filter reactance (pu)."] = 0.15
+    k_pPLL: Annotated[Gain, Unit("rad/s per pu"), "PLL proportional gain (rad/s per pu)."] = 50.0
+    k_iPLL: Annotated[Gain, Unit("rad/s^2 per pu"), "PLL integral gain (rad/s^2 per pu)."] = 900.0
+    k_pc: Annotated[Gain, Unit("pu", in_key=False), "Current controller, proportional (pu)."] = 0.05
+    k_ic: Annotated[Gain, Unit("1/s"), "Current controller, integral (1/s)."] = 5.0
     F_current: Annotated[float, Plausible("the cross-coupling gain F_current", 0.0, 1.0)] = 0.6
     """Cross-coupling gain: 0 oscillates on this feeder, 1 diverges (row 23)."""
-    T_if: TimeConstant = 0.005
-    """Current lag of the current-source form (s)."""
-    frequency_watt: bool = True
-    """Frequency-watt droop on."""
-    volt_var: bool = True
-    """Volt-var droop on."""
-    T_ff: TimeConstant = 0.02
-    """Filter of the PLL frequency (s)."""
+    T_if: Annotated[TimeConstant, "Current lag of the current-source form (s)."] = 0.005
+    frequency_watt: Annotated[bool, "Frequency-watt droop on."] = True
+    volt_var: Annotated[bool, "Volt-var droop on."] = True
+    T_ff: Annotated[TimeConstant, "Filter of the PLL frequency (s)."] = 0.02
     T_pf: TimeConstant = 0.05
     """Lag of the P reference (s). GridLAB-D's default 0.5 s is too slow for consensus in 1 s."""
-    T_vf: TimeConstant = 0.05
-    """Filter of measured V (s)."""
+    T_vf: Annotated[TimeConstant, "Filter of measured V (s)."] = 0.05
     T_qf: TimeConstant = 0.1
     """Lag of the Q reference (s). 5 % droop is a gain of 20 from V to Q: with T_vf 0.02 and T_qf 0.05 s one GFM with
     four GFL oscillates on this feeder; GridLAB-D's 0.2 s only slows the sharing of vars."""
-    db_UF: FrequencyBand = 0.0
-    """Dead band below nominal frequency (Hz)."""
-    db_OF: FrequencyBand = 0.0
-    """Dead band above nominal frequency (Hz)."""
-    db_UV: VoltageBand = 0.0
-    """Dead band below V_set (pu)."""
-    db_OV: VoltageBand = 0.0
-    """Dead band above V_set (pu)."""
+    db_UF: Annotated[FrequencyBand, "Dead band below nominal frequency (Hz)."] = 0.0
+    db_OF: Annotated[FrequencyBand, "Dead band above nominal frequency (Hz)."] = 0.0
+    db_UV: Annotated[VoltageBand, "Dead band below V_set (pu)."] = 0.0
+    db_OV: Annotated[VoltageBand, "Dead band above V_set (pu)."] = 0.0
     dead_band: Literal["gridlabd", "ieee1547"] = "gridlabd"
     """Droop outside of a dead band, of freq-watt and volt-var: by the full deviation, so that it jumps at the edge, as
     GridLAB-D, or by the deviation from the edge, as IEEE 1547-2018 (sections 4.3, 4.4)."""
-    P_max: LimitOfP = 1.0
-    """Upper bound of the P reference (pu)."""
-    P_min: Annotated[LimitOfP, Below("P_max")] = -1.0
-    """Lower bound of the P reference (pu)."""
-    S_max: Capacity = 1.2
-    """Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."""
-    Q_max: LimitOfQ = 10.0
-    """Upper bound of the Q reference (pu): Q1 of IEEE 1547-2018."""
-    Q_min: Annotated[LimitOfQ, Below("Q_max")] = -10.0
-    """Lower bound of the Q reference (pu): Q4 of IEEE 1547-2018."""
-    i_max: Capacity = 1.2
-    """Bound of each axis of the current reference (pu)."""
+    P_max: Annotated[LimitOfP, "Upper bound of the P reference (pu)."] = 1.0
+    P_min: Annotated[LimitOfP, Below("P_max"), "Lower bound of the P reference (pu)."] = -1.0
+    S_max: Annotated[Capacity, "Apparent-power limit (pu of the rating): bounds Q at sqrt(S_max^2 - P^2)."] = 1.2
+    Q_max: Annotated[LimitOfQ, "Upper bound of the Q reference (pu): Q1 of IEEE 1547-2018."] = 10.0
+    Q_min: Annotated[LimitOfQ, Below("Q_max"), "Lower bound of the Q reference (pu): Q4 of IEEE 1547-2018."] = -10.0
+    i_max: Annotated[Capacity, "Bound of each axis of the current reference (pu)."] = 1.2
     P_set_lim: BoundOfPset = 1.0
     """Bound of P_set, either way (pu), before the droop (7) is added: the rating, as in GridLAB-D. A larger one lets a
     set-point that was wound up delay the inverter's response."""
-    V_set_min: Annotated[BoundOfVset, Below("V_set_max")] = 0.8
-    """Lower bound of V_set (pu)."""
-    V_set_max: BoundOfVset = 1.2
-    """Upper bound of V_set (pu)."""
+    V_set_min: Annotated[BoundOfVset, Below("V_set_max"), "Lower bound of V_set (pu)."] = 0.8
+    V_set_max: Annotated[BoundOfVset, "Upper bound of V_set (pu)."] = 1.2
 
 
 Kind = Literal["GFM", "GFL"]
@@ -225,7 +183,6 @@ BOUNDS_OF_SET_POINTS = frozenset({"P_set_lim", "V_set_min", "V_set_max"})
 
 
 def _published(own: InverterParameters) -> OwnParameters:
-    """Return a set of all parameters that a specification has."""
     names = [name for name in own.__struct_fields__ if name not in BOUNDS_OF_SET_POINTS]
     return OwnParameters(**{name: getattr(own, name) for name in names})
 
@@ -240,13 +197,7 @@ def with_published(sets: Mapping[str, OwnParameters]) -> dict[str, OwnParameters
 
 
 def given(own: OwnParameters) -> dict[str, Any]:
-    """Return what a set gives, by the names of `GfmParameters` and `GflParameters`.
-
-    Examples
-    --------
-    >>> given(OwnParameters(P_max=1.2))
-    {'P_max': 1.2}
-    """
+    """Return what a set gives, by the names of `GfmParameters` and `GflParameters`."""
     values = {name: getattr(own, name) for name in own.__struct_fields__}
     return {name: value for name, value in values.items() if value is not None}
 
@@ -254,8 +205,6 @@ def given(own: OwnParameters) -> dict[str, Any]:
 def foreign(own: OwnParameters, kind: str) -> list[str]:
     """Return what a set gives and a kind of inverter does not have: keys, and words of a choice with their key.
 
-    Examples
-    --------
     >>> foreign(OwnParameters(P_max=1.2, S_max=1.2), "GFM")
     ['S_max_pu']
     >>> foreign(OwnParameters(model="regfm_a1"), "GFL")

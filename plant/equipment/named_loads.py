@@ -8,13 +8,12 @@ from collections.abc import Mapping, Sequence
 import msgspec
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment.equipment import Feeder
+from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.messages import LoadSetting
 from gridpeers.wire.schema.plausible import Plausible
 from gridpeers.wire.wording import first_of, suggestion
 
-FACTOR = Plausible("a factor on a load", 0.0, 10.0)
-"""Factors on the power that a load has in the feeder's tables."""
+FACTOR = Plausible("a factor on a load", 0.0, 10.0)  # factors on the power that a load has in the feeder's tables
 
 LEAST = 0.01
 """Part of the sum of its branches' sizes below which a load's total says nothing of how its branches share it."""
@@ -23,22 +22,12 @@ LEAST = 0.01
 class NamedLoad(msgspec.Struct, frozen=True, kw_only=True):
     """A load as people speak of it: all rows of our own tables at one bus, or all parts of one imported load."""
 
-    name: str
-    """Name: that of the bus, or of the imported load."""
+    name: str  # name: that of the bus, or of the imported load
     bus: str
-    S: complex
-    """Power at nominal voltage (VA), of all branches."""
+    S: complex  # power at nominal voltage (VA), of all branches
 
 
 def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
-    """Return the loads of a feeder by name, in the order of its tables.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.tables import read_feeder
-    >>> named_loads(read_feeder("microgrid123"))["48"]
-    NamedLoad(name='48', bus='48', S=(210000+150000j))
-    """
     found: dict[str, NamedLoad] = {}
     for name, bus, S in (
         *((load.bus, load.bus, sum(load.S)) for load in feeder.loads),
@@ -52,13 +41,8 @@ def named_loads(feeder: Feeder) -> dict[str, NamedLoad]:
 def load_name(loads: Mapping[str, NamedLoad], text: str) -> str:
     """Return the name of a load by its name, with or without OpenDSS's "load." before it, or by its bus.
 
-    Raises
-    ------
-    ValueError
-        If there is no such load, or the text may mean several; the message says what was probably meant.
+    ValueError if there is no such load, or the text may mean several; the message says what was probably meant.
 
-    Examples
-    --------
     >>> loads = {name: NamedLoad(name=name, bus=name[5:8], S=1 + 0j) for name in ("load.634a", "load.634b", "load.671")}
     >>> load_name(loads, "634a"), load_name(loads, "Load.671"), load_name(loads, "671")
     ('load.634a', 'load.671', 'load.671')
@@ -111,7 +95,6 @@ def with_powers(feeder: Feeder, powers: Mapping[str, complex]) -> Feeder:
 
 
 def _shared(branches: Sequence[complex], total: complex) -> list[complex]:
-    """Return the powers (VA) of a load's branches for another total."""
     P = _scaled([S.real for S in branches], [abs(S) for S in branches], total.real)
     Q = _scaled([S.imag for S in branches], [abs(S) for S in branches], total.imag)
     return [complex(p, q) for p, q in zip(P, Q, strict=True)]
@@ -136,12 +119,7 @@ _POWER = re.compile(r"\bset to (\S+) kW and (\S+) kvar at nominal voltage")
 class LoadPowers:
     """The loads of a feeder by name, and the powers at nominal voltage that each can have.
 
-    Parameters
-    ----------
-    feeder
-        The feeder, with the powers of its tables.
-    P_rated
-        Ratings of its inverters together (W).
+    `feeder`: the feeder, with the powers of its tables; `P_rated`: ratings of its inverters together (W).
     """
 
     def __init__(self, feeder: Feeder, P_rated: float) -> None:
@@ -149,29 +127,15 @@ class LoadPowers:
         self._most = MOST * max(sum(abs(load.S) for load in self._loads.values()), P_rated) / 1e3
 
     def name(self, text: str) -> str:
-        """Return the name of a load by its name, or by its bus; see `load_name`."""
         return load_name(self._loads, text)
 
     def table(self, name: str) -> complex:
-        """Return the power (VA) of a load, by its name, in the feeder's tables."""
         return self._loads[name].S
 
     def power(self, name: str, setting: LoadSetting, before: complex) -> complex:
         """Return the power (VA) of a load after a setting.
 
-        Parameters
-        ----------
-        name
-            Name of the load.
-        setting
-            Its new power; what is None stays as it is.
-        before
-            Its power until then (VA).
-
-        Raises
-        ------
-        ValueError
-            If a number makes no sense; the message says what would be right, and does not name the load.
+        ValueError if a number makes no sense; the message says what would be right, and does not name the load.
         """
         table = self._loads[name].S
         if (setting.factor is None) == (setting.P is None and setting.Q is None):
@@ -188,15 +152,12 @@ class LoadPowers:
         return complex(P, Q)
 
     def words(self, name: str, S: complex) -> str:
-        """Return a power (VA) of a load in words, beside that of its table."""
         return f"{S.real / 1e3:.6g} kW and {S.imag / 1e3:.6g} kvar at nominal voltage{_beside(S, self.table(name))}"
 
 
 def set_power(text: str) -> complex | None:
     """Return the power (VA, to six digits) that an event of the plant says a load was set to; None if it says none.
 
-    Examples
-    --------
     >>> set_power("load 48 set to 315 kW and -22.5 kvar at nominal voltage, 1.5 times its table")
     (315000-22500j)
     """

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from gridpeers.plant.equipment.equipment import PHASES, Bus, Feeder, Switch
+from gridpeers.plant.equipment import PHASES, Bus, Feeder, Switch
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
 from gridpeers.wire.wording import first_of
 
-EARTH = "earth"
-"""In place of a neutral: the inverter returns through earth, though its bus has a neutral."""
+EARTH = "earth"  # in place of a neutral: the inverter returns through earth, though its bus has a neutral
 
 BETWEEN_PHASES = 1.3
 """Voltage of a load (pu of its bus, line-to-neutral) from which on it is between phases: there it is 1.73, or 2 between
 the legs of a split-phase service."""
 
-SHOWN = 6
-"""Inverters that a sentence names."""
+SHOWN = 6  # inverters that a sentence names
 
 Node = tuple[str, str]
 
@@ -29,19 +27,10 @@ def neutrals_of(feeder: Feeder) -> dict[str, str]:
 def neutral_for(text: str, bus: Bus, phases: str, neutral: str) -> str:
     """Return the letter of the node to which an inverter returns; empty for earth.
 
-    Parameters
-    ----------
-    text
-        What is wanted: such a letter, `EARTH`, or empty for the bus's neutral.
-    bus, phases
-        Where it stands.
-    neutral
-        The bus's neutral; empty for none.
+    `text`: what is wanted: such a letter, `EARTH`, or empty for the bus's neutral; `neutral`: the bus's neutral; empty
+    for none.
 
-    Raises
-    ------
-    ValueError
-        If it cannot return there; the message says where it can.
+    ValueError if it cannot return there; the message says where it can.
     """
     if text in ("", EARTH):
         return "" if text == EARTH or neutral in phases else neutral
@@ -76,11 +65,9 @@ def neutrals_by_bus(
 ) -> dict[str, str]:
     """Return the neutral of each bus that has one: the letter of a node, that of most load where there are several.
 
-    Parameters
-    ----------
-    buses, load_parts, elements, switches
-        The feeder's. A neutral goes on along the elements that have it in the same place at both ends. Node A, B or C
-        is none where loads return to earth: there a load between two phases has a voltage that is wrong.
+    `buses`, `load_parts`, `elements`, `switches`: the feeder's. A neutral goes on along the elements that have it in
+    the same place at both ends. Node A, B or C is none where loads return to earth: there a load between two phases has
+    a voltage that is wrong.
     """
     load_parts = tuple(load_parts)
     V_nom = {bus.name: bus.V_nom for bus in buses}
@@ -91,7 +78,8 @@ def neutrals_by_bus(
             node = part.bus, next((end for end in part.ends if end not in PHASES), part.ends[1])
             weight[node] = weight.get(node, 0.0) + abs(part.S)
     along: dict[Node, list[Node]] = {}
-    for one, other in (*_conductors(elements), *_poles(switches)):
+    poles = (((it.from_bus, phase), (it.to_bus, phase)) for it in switches for phase in it.phases)
+    for one, other in (*_conductors(elements), *poles):
         along.setdefault(one, []).append(other)
         along.setdefault(other, []).append(one)
     for seed in [node for node in weight if node[1] in PHASES]:
@@ -126,9 +114,3 @@ def _conductors(elements: Iterable[LinearElement]) -> Iterator[tuple[Node, Node]
         ends = element.nodes[:half], element.nodes[half:]
         if len(ends[0]) == len(ends[1]) and all(len({bus for bus, _ in end}) == 1 for end in ends):
             yield from zip(*ends, strict=True)
-
-
-def _poles(switches: Iterable[Switch]) -> Iterator[tuple[Node, Node]]:
-    """Yield the two ends of each pole of switches."""
-    for switch in switches:
-        yield from (((switch.from_bus, phase), (switch.to_bus, phase)) for phase in switch.phases)

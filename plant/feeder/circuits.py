@@ -4,58 +4,37 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Circuit, PlantError
-from gridpeers.plant.dynamics.live_network import ForeseenCache
-from gridpeers.plant.equipment.equipment import PHASES
+from gridpeers.plant.dynamics.kernel.compiled import Integers
+from gridpeers.plant.dynamics.live_network import recent
+from gridpeers.plant.equipment import PHASES
 from gridpeers.plant.network import Network
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.merging import Merge
 
-ROUNDING = 1e-14
-"""Size of a sum of admittances relative to its terms below which the sum is 0 but for rounding."""
+ROUNDING = 1e-14  # size of a sum of admittances relative to its terms below which the sum is 0 but for rounding
 
 
 class Circuits:
-    """A feeder's circuits; each is made at the first call for its switches and loads, and kept as in `ForeseenCache`.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """A feeder's circuits, each made at the first call for its switches and loads, and kept for a while."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
-        self._loads = {network: network.loads()}
-        """Load branches of each network of which circuits are kept: one for each state of the loads."""
-        self._made: ForeseenCache[tuple[Network, frozenset[str]], Circuit] = ForeseenCache()
+        self._loads: dict[Network, LoadBranches] = {}  # of each network, one for each state of the loads
+        self._made: dict[tuple[Network, frozenset[str]], Circuit] = {}
 
     def change_loads(self, network: Network) -> None:
-        """Go on with the same network with other loads."""
         self._network = network
 
-    def of(self, closed: frozenset[str], network: Network | None = None, *, foreseen: bool = False) -> Circuit:
+    def of(self, closed: frozenset[str], network: Network | None = None) -> Circuit:
         """Return the circuit with these switches closed, with the present loads or with those of another network.
 
-        One that is `foreseen`, for an event to come, stays.
-
-        Raises
-        ------
-        PlantError
-            If ideal devices tie an inverter to another: their sharing would be undetermined.
+        PlantError if ideal devices tie an inverter to another: their sharing would be undetermined.
         """
         of = self._network if network is None else network
-        return self._made.get((of, closed), lambda: circuit_of(of, closed, self._loads_of(of)), foreseen=foreseen)
-
-    def _loads_of(self, network: Network) -> LoadBranches:
-        """Return the load branches of a network."""
-        if network not in self._loads:
-            still = {used for used, _ in self._made} | {self._network}
-            self._loads = {used: loads for used, loads in self._loads.items() if used in still}
-            self._loads[network] = network.loads()
-        return self._loads[network]
+        loads = recent(self._loads, of, of.loads)
+        return recent(self._made, (of, closed), lambda: circuit_of(of, closed, loads))
 
 
 def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) -> Circuit:
@@ -93,14 +72,14 @@ def circuit_of(network: Network, closed: frozenset[str], loads: LoadBranches) ->
     )
 
 
-def _neutral_nodes(network: Network, merge: Merge, reference: NDArray[np.int64] | None) -> NDArray[np.int64]:
+def _neutral_nodes(network: Network, merge: Merge, reference: Integers | None) -> Integers:
     """Return the nodes of neutral conductors whose voltages count from earth, each once."""
     raw = [k for k, (bus, at) in enumerate(network.nodes) if at not in PHASES or at == network.neutrals.get(bus)]
     nodes = np.unique(merge.representative[np.array(raw, np.int64)])
     return nodes if reference is None else nodes[reference[nodes] < 0]
 
 
-def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDArray[np.int64]) -> NDArray[np.int64]:
+def _references(network: Network, merge: Merge, on: LoadBranches, terminals: Integers) -> Integers:
     """Return the node from which each node's voltage counts: the neutral of an inverter there, or -1.
 
     A node between which and a terminal a load stands counts from the same neutral, where it can: the load is then
@@ -128,7 +107,7 @@ def _references(network: Network, merge: Merge, on: LoadBranches, terminals: NDA
         reference[other[follows]] = reference[one[follows]]
 
 
-def _referred(Y: sp.csc_array, C: sp.csc_array, reference: NDArray[np.int64]) -> tuple[sp.csc_array, sp.csc_array]:
+def _referred(Y: sp.csc_array, C: sp.csc_array, reference: Integers) -> tuple[sp.csc_array, sp.csc_array]:
     """Return admittances and incidence for voltages that count from these nodes; see `Circuit`."""
     n = reference.size
     at = np.flatnonzero(reference >= 0)

@@ -6,14 +6,13 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Real
 from gridpeers.plant.feeder.protection import ATTEMPTS, Recovery, Relays
 from gridpeers.plant.plant_config import Protection
 
-Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]
-"""Takes an event: step, kind, subject, text."""
+Tell = Callable[[int, Literal["inverter", "trip"], str, str], None]  # takes an event: step, kind, subject, text
 
 Settle = Callable[[int, list[int]], None]
 """Called after inverters were switched at a step: reads them again, and reports islands."""
@@ -26,28 +25,13 @@ class InService:
     delay. In a de-energised island all tripped inverters return at once, when the last of them has waited as long: a
     black start, which needs a GFM. There is no load shedding, so these inverters take the whole load of the island;
     an inverter that trips repeatedly stays off.
-
-    Parameters
-    ----------
-    settings
-        Trip settings and delay.
-    names
-        The inverters.
-    V_nom
-        Their nominal voltages (V).
-    dynamics
-        The inverters and their network.
-    connected
-        Inverters that are connected at the start.
-    tell, settle
-        See `Tell` and `Settle`.
     """
 
     def __init__(
         self,
         settings: Protection,
         names: tuple[str, ...],
-        V_nom: NDArray[np.float64],
+        V_nom: Real,
         dynamics: Dynamics,
         connected: list[bool],
         tell: Tell,
@@ -63,7 +47,6 @@ class InService:
         self._recovery = Recovery(settings.enter_service, len(names), dynamics.h, dynamics.inverters.f_nom)
 
     def has_tripped(self, i: int) -> bool:
-        """Whether an inverter is off because it tripped."""
         return bool(self._recovery.tripped.item(i))
 
     @property
@@ -101,15 +84,11 @@ class InService:
             self._tell(step, "inverter", name, f"{name} connected, at no load")
             self._settle(step, [i])
 
-    def watch(self, step: int, out: NDArray[np.float64]) -> None:
+    def watch(self, step: int, out: Real) -> None:
         """Trip inverters beyond their settings after these steps, and bring back those that may return.
 
-        Parameters
-        ----------
-        step
-            Present step of the plant; changes act from the next step on.
-        out
-            Readings of the steps since the last call, of `Dynamics.run`.
+        `step`: present step of the plant; changes act from the next step on; `out`: readings of the steps since the
+        last call, of `Dynamics.run`.
         """
         reduction = self._dynamics.network.reduction
         f, V_low, V_high = out[:, :, 0], out[:, :, 4] / self._V_nom, out[:, :, 5] / self._V_nom
@@ -149,14 +128,12 @@ class InService:
             text = f"{', '.join(locked)}: tripped {ATTEMPTS} times, off until the agent joins again, or a GFM joins"
             self._tell(step, "trip", locked[0], text)
 
-    def _with(self, i: int) -> NDArray[np.bool_]:
-        """Return the inverters in the same island, this one included."""
+    def _with(self, i: int) -> Flags:
         island = self._dynamics.network.reduction.inverter_island
-        same: NDArray[np.bool_] = island == island[i]
+        same: Flags = island == island[i]
         return same
 
     def _fed(self, i: int) -> bool:
-        """Whether an inverter's island is energised."""
         reduction = self._dynamics.network.reduction
         return bool(reduction.live[reduction.inverter_island[i]])
 

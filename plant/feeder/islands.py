@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
 from gridpeers.plant.dynamics import Dynamics, PlantError, Trip
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.equipment.imported_equipment import is_behind
 from gridpeers.plant.known_names import SUBSTATION
@@ -18,18 +18,11 @@ from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import counted
 
-GRID = "grid"
-"""Name of the island that the substation feeds."""
+GRID = "grid"  # name of the island that the substation feeds
 
 
 class Islands:
-    """Name a feeder's islands, and report their changes.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """Name a feeder's islands, and report their changes."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -37,11 +30,9 @@ class Islands:
         self._dead: list[str] = []
         self._named: tuple[SwitchState, tuple[list[str], list[bool]]] | None = None
         """The last switch state, and its `names`."""
-        self._reported: dict[str, str] = {}
-        """Last reported text of each island."""
+        self._reported: dict[str, str] = {}  # last reported text of each island
 
     def change_loads(self, network: Network) -> None:
-        """Go on with the same network with other loads."""
         self._network = network
 
     def names(self, reduction: SwitchState) -> tuple[list[str], list[bool]]:
@@ -94,25 +85,17 @@ class Islands:
         text += f", {', '.join(idle)} idle" if idle else ""
         return [PlantEvent(t=t, kind="dead", subject=new[0], text=text)]
 
-    def _dead_buses(self, closed: frozenset[str], live: NDArray[np.bool_]) -> list[str]:
-        """Return the buses without a live node, in the feeder's order."""
+    def _dead_buses(self, closed: frozenset[str], live: Flags) -> list[str]:
         alive = live[self._network.merge(closed).representative]
         fed = {bus for (bus, _), on in zip(self._network.nodes, alive.tolist(), strict=True) if on}
         return [bus.name for bus in self._network.feeder.buses if bus.name not in fed]
 
 
-TOUCHABLE = 50.0
-"""Voltage to earth (V) that may last on what people touch (IEC 60364-4-41)."""
+TOUCHABLE = 50.0  # voltage to earth (V) that may last on what people touch (IEC 60364-4-41)
 
 
 class NeutralEvents:
-    """Report the neutrals of a feeder when its network has changed; each once, until it is as before.
-
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    """
+    """Report the neutrals of a feeder when its network has changed; each once, until it is as before."""
 
     def __init__(self, network: Network) -> None:
         self._network = network
@@ -124,34 +107,20 @@ class NeutralEvents:
         self._off: set[int] = set()
 
     def report(self, t: float, closed: frozenset[str], dynamics: Dynamics) -> list[PlantEvent]:
-        """Return the events at t (s), with these switches closed."""
         if not self._neutrals:
             return []
-        earthing = set(dynamics.network.reduction.earthing)
-        rows = [self._network.inverters[i] for i in sorted(earthing - self._earthing)]
-        self._earthing = earthing
-        events = [
-            PlantEvent(
-                t=t,
-                kind="island",
-                subject=row.name,
-                text=f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does",
+        earthing, tied = set(dynamics.network.reduction.earthing), set(self._tied_alone(closed, dynamics))
+        events = []
+        for row in (self._network.inverters[i] for i in sorted(earthing - self._earthing)):
+            text = f"{row.name} earths its neutral, node {row.neutral} of bus {row.bus}: nothing else does"
+            events.append(PlantEvent(t=t, kind="island", subject=row.name, text=text))
+        for row in (self._network.inverters[i] for i in sorted(tied - self._tied)):
+            text = (
+                f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
+                "the switch open the neutral, too"
             )
-            for row in rows
-        ]
-        tied = set(self._tied_alone(closed, dynamics))
-        rows = [self._network.inverters[i] for i in sorted(tied - self._tied)]
-        self._tied = tied
-        events += [
-            PlantEvent(
-                t=t,
-                kind="warning",
-                subject=row.name,
-                text=f"{row.name}: the neutral alone ties its part to the grid, so it counts as fed by the grid; let "
-                "the switch open the neutral, too",
-            )
-            for row in rows
-        ]
+            events.append(PlantEvent(t=t, kind="warning", subject=row.name, text=text))
+        self._earthing, self._tied = earthing, tied
         V = np.abs(self._network.merge(closed).expand(dynamics.voltages())[self._nodes])
         off = set(np.flatnonzero(V > TOUCHABLE).tolist())
         new, self._off = off - self._off, off
@@ -184,24 +153,15 @@ class NeutralEvents:
         return [int(i) for i in forming[alone]]
 
 
-RECENT = 1.0
-"""Time (s) after a closing out of phase within which a collapse counts as its effect."""
-
-BEYOND = 10.0
-"""Voltage (pu) that no network has: where there is no solution, it says nothing."""
+RECENT = 1.0  # time (s) after a closing out of phase within which a collapse counts as its effect
+BEYOND = 10.0  # voltage (pu) that no network has: where there is no solution, it says nothing
 
 
 class Closing(NamedTuple):
-    """A switch that has joined two live islands."""
-
     t: float
-    """Time (s)."""
     switch: str
-    """Its name."""
-    angle: float
-    """Angle between the two sides before (deg, 0 to 180)."""
-    in_phase: bool
-    """Whether the angle was within the window of a synchronism check."""
+    angle: float  # angle between the two sides before (deg, 0 to 180)
+    in_phase: bool  # whether the angle was within the window of a synchronism check
 
 
 def raise_for_trip(events: Iterable[PlantEvent]) -> None:
@@ -214,21 +174,7 @@ def raise_for_trip(events: Iterable[PlantEvent]) -> None:
 def trip_event(
     t: float, trip: Trip, network: Network, closed: frozenset[str], closings: Iterable[Closing]
 ) -> PlantEvent:
-    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase).
-
-    Parameters
-    ----------
-    t
-        Time (s).
-    trip
-        Disconnected units.
-    network
-        The feeder's network.
-    closed
-        Switches closed at that time.
-    closings
-        Earlier closings that joined live islands.
-    """
+    """Return the event of a trip: the tripped units, and the cause (overload, collapse or closing out of phase)."""
     names = [network.inverters[i].name for i in trip.inverters]
     buses = {network.inverters[i].bus for i in trip.inverters}
     if trip.substation:

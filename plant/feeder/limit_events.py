@@ -6,45 +6,28 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Real
 from gridpeers.plant.dynamics.kernel.solve import COLUMNS, limited_admittance
 from gridpeers.plant.network import Network
 from gridpeers.wire.messages import PlantEvent
 from gridpeers.wire.wording import first_of
 
-SPELL = 1.0
-"""Time (s) without a limited set-point after which a spell is over."""
+SPELL = 1.0  # time (s) without a limited set-point after which a spell is over
 
 _UNIT = {"P_set": "kW", "V_set": "V"}
 
 
 @dataclass
 class _Spell:
-    """Consecutive limited set-points of one inverter."""
-
     count: int
-    last: float
-    """Time of the last one (s)."""
-    farthest: float
-    """The one farthest from the held value (kW or V)."""
-    distance: float
-    """Distance of that one (kW or V)."""
+    last: float  # time of the last one (s)
+    farthest: float  # the one farthest from the held value (kW or V)
+    distance: float  # distance of that one (kW or V)
 
 
 class SetPointLimits:
-    """Report set-points beyond an inverter's bounds: one event when a spell begins, and one when it ends.
-
-    Examples
-    --------
-    >>> limits = SetPointLimits()
-    >>> [event.text for event in limits.held("inv1", 2.0, "P_set", set_point=10_000.0, held=1800.0)]
-    ['inv1 gets P_set 10000 kW, which is beyond its bound; it holds 1800 kW']
-    >>> limits.held("inv1", 2.02, "P_set", set_point=10_000.0, held=1800.0)
-    []
-    >>> [event.text for event in limits.held("inv1", 3.5, "P_set", set_point=500.0, held=500.0)]
-    ['inv1 gets P_set within its bound again; 2 set-points were limited, the farthest 10000 kW']
-    """
+    """Report set-points beyond an inverter's bounds: one event when a spell begins, and one when it ends."""
 
     def __init__(self) -> None:
         self._spells: dict[tuple[str, str], _Spell] = {}
@@ -77,7 +60,6 @@ class SetPointLimits:
         return []
 
     def refused(self, name: str, t: float) -> list[PlantEvent]:
-        """Note set-points that are not finite; report them once per inverter."""
         if name in self._refused:
             return []
         self._refused.add(name)
@@ -88,35 +70,20 @@ class SetPointLimits:
 LIMITS = "limits its phase currents"
 """Words of these events alone; their kind, `limit`, is that of set-points, available power and loads, too."""
 
-PAUSE = 0.1
-"""Time (s) without limiting after which the next limiting is a spell of its own."""
+PAUSE = 0.1  # time (s) without limiting after which the next limiting is a spell of its own
 
 
 class CurrentLimits:
     """The inverters whose phases are, or were lately, at their limit.
 
-    Parameters
-    ----------
-    names
-        The inverters.
-    I_max
-        Their limits (pu), 0 for an inverter without one.
-
-    Examples
-    --------
-    >>> limits = CurrentLimits(("inv1",), (2.0,))
-    >>> [event.text for event in limits.report(1.0, np.array([True]))]
-    ['inv1 limits its phase currents to 2 pu']
-    >>> limits.report(1.002, np.array([True]))
-    []
+    `I_max`: their limits (pu), 0 for an inverter without one.
     """
 
     def __init__(self, names: tuple[str, ...], I_max: tuple[float, ...]) -> None:
         self._names, self._I_max = names, I_max
         self._last = [-np.inf] * len(names)
 
-    def report(self, t: float, limiting: NDArray[np.bool_]) -> list[PlantEvent]:
-        """Return the events of spells that begin at t (s), given which inverters limit."""
+    def report(self, t: float, limiting: Flags) -> list[PlantEvent]:
         events = []
         for i in np.flatnonzero(limiting).tolist():
             name, since = self._names[i], t - self._last[i]
@@ -130,52 +97,37 @@ class CurrentLimits:
 CROSSING_PAUSE = 0.5
 """Time (s) without a crossing after which a load's next crossing is reported: once per spell of an oscillation."""
 
-SHOWN = 3
-"""Loads that an event names."""
-
-BESIDE = 1e-9
-"""Distance from a limit, in proportion, at which the law beside it is taken; a jump is larger by far."""
+SHOWN = 3  # loads that an event names
+BESIDE = 1e-9  # distance from a limit, in proportion, at which the law beside it is taken; a jump is larger by far
 
 LAW_LIMITS = {"V_min": -1, "V_max": 1}
 """Limits of a load's law, and the side on which a load is beyond them: below or above."""
 
 
 class _Jump(NamedTuple):
-    """A limit of a load branch at which its law jumps."""
-
-    name: str
-    """Name of its load."""
+    name: str  # name of its load
     branch: int
     V: float
-    """The limit (V)."""
-    limit: str
-    """Its name, of `LAW_LIMITS`."""
-    S: tuple[float, float]
-    """Apparent power (VA) just within the limit and just beyond it."""
+    limit: str  # its name, of `LAW_LIMITS`
+    S: tuple[float, float]  # apparent power (VA) just within the limit and just beyond it
 
 
 class LoadLimits:
     """Loads of an imported feeder whose law jumps at V_min or V_max, as that of OpenDSS's models 3, 4 and 6 does.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    V
-        Voltages across its load branches at the start (V).
+    `V`: voltages across its load branches at the start (V).
     """
 
-    def __init__(self, network: Network, V: NDArray[np.complex128]) -> None:
+    def __init__(self, network: Network, V: Complex) -> None:
         self._jumps = _jumps(network)
-        self.any = bool(self._jumps)
-        """Whether a load has such a limit."""
+        self.any = bool(self._jumps)  # whether a load has such a limit
         self._branches = np.array([jump.branch for jump in self._jumps], np.int64)
         self._V = np.array([jump.V for jump in self._jumps])
         self._side = np.array([LAW_LIMITS[jump.limit] for jump in self._jumps])
         self._beyond = self._are_beyond(np.abs(V[self._branches]))
         self._last: dict[str, float] = {}
 
-    def report(self, t: float, V: NDArray[np.complex128]) -> list[PlantEvent]:
+    def report(self, t: float, V: Complex) -> list[PlantEvent]:
         """Return events for the loads that crossed a limit since the last call, at these voltages (V) of all branches.
 
         There is one for each limit and direction. A load without voltage stays as it was.
@@ -192,7 +144,7 @@ class LoadLimits:
             for event in self._events(t, limit, beyond=beyond, jumps=jumps)
         ]
 
-    def _are_beyond(self, magnitude: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _are_beyond(self, magnitude: Real) -> Flags:
         return np.asarray(self._side * (magnitude - self._V) > 0.0)
 
     def _events(self, t: float, limit: str, *, beyond: bool, jumps: list[_Jump]) -> list[PlantEvent]:
@@ -212,7 +164,6 @@ class LoadLimits:
 
 
 def _jumps(network: Network) -> list[_Jump]:
-    """Return the limits of a network's loads at which their law jumps."""
     law = network.loads().law
     names = [part.name for part in network.feeder.load_parts if not part.is_impedance]
     found = []

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import islice
 from math import isfinite
-from typing import Literal, NamedTuple
+from typing import Literal
 
 import numpy as np
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, Inverter, PlantError
 from gridpeers.plant.dynamics.circuit import NoPowerFlowError
 from gridpeers.plant.dynamics.equilibrium import require_within_limits
-from gridpeers.plant.dynamics.live_network import ROOM
+from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.in_service import InService
 from gridpeers.plant.feeder.islands import Islands, NeutralEvents, trip_event
@@ -21,12 +21,12 @@ from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
 from gridpeers.plant.feeder.synchronism import Closings, Difference, Synchronism
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 
 
 def hunting_event(name: str) -> PlantEvent:
-    """Return the event of an inverter that starts on the edge of its dead band."""
     text = (
         f"{name} has no rest at t = 0: without vars its voltage is beyond its dead band, with those of its droop it is "
         "within, so Q hunts between both; choose another db_UV_pu, db_OV_pu or V_set0_pu to avoid it"
@@ -53,56 +53,20 @@ def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inve
     )
 
 
-class Reading(NamedTuple):
-    """Sensor readings of one inverter."""
-
-    P: float
-    """Real power out (W)."""
-    Q: float
-    """Reactive power out (var)."""
-    V: float
-    """Mean terminal voltage (V, line-to-neutral)."""
-    f: float
-    """Frequency (Hz)."""
-    P_set: float
-    """Set-point held (W)."""
-    V_set: float
-    """Set-point held (V)."""
-    grid_connected: bool
-    """Whether the substation feeds its island."""
-    island: str
-    """"grid", or the name of the first inverter in its island; `OFF` for one that is off the network or idle."""
-
-
 class Plant:
     """The feeder with its inverters, advanced by control periods.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    settings
-        Parameters, events and step.
-    T_c
-        Control period (s), a multiple of `settings.h`.
-    record_step
-        Distance of the recorded rows (s), a multiple of h that divides T_c.
+    `T_c`: control period (s), a multiple of `settings.h`; `record_step`: distance of the recorded rows (s), a multiple
+    of h that divides T_c.
 
-    Raises
-    ------
-    PlantError
-        If there is no operating point at the start.
-    ValueError
-        If a parameter or a switch's name is wrong.
+    PlantError if there is no operating point at the start. ValueError if a parameter or a switch's name is wrong.
     """
 
     def __init__(self, network: Network, settings: PlantSettings, T_c: float, record_step: float) -> None:
         self.network, self.settings = network, settings
         self.inverters = tuple(unit.name for unit in network.inverters)
-        self.tick = 0
-        """k: the plant is at k T_c."""
-        self._t = 0.0
-        """Its time (s)."""
+        self.tick = 0  # k: the plant is at k T_c
+        self._t = 0.0  # its time (s)
         self._row = {name: i for i, name in enumerate(self.inverters)}
         self._T_c, self._h = T_c, settings.h
         self._steps, self._record = round(T_c / settings.h), round(record_step / settings.h)
@@ -115,8 +79,7 @@ class Plant:
             self._limits.setdefault(round(limit.t / settings.h), []).append(limit)
         self._P_rated = np.array([unit.P_rated for unit in network.inverters])
         self._V_nom = np.array([unit.V_nom for unit in network.inverters])
-        self._base = np.column_stack([self._P_rated, self._V_nom])
-        """Bases of P_set (W) and V_set (V)."""
+        self._base = np.column_stack([self._P_rated, self._V_nom])  # bases of P_set (W) and V_set (V)
         self._bases: list[tuple[float, float]] = list(map(tuple, self._base.tolist()))
         connected = [not unit.spare for unit in network.inverters]
         self._dynamics = Dynamics(
@@ -155,8 +118,8 @@ class Plant:
         self._events += self._neutrals.report(0.0, self._switches.closed, self._dynamics)
         self._events += [hunting_event(units[i].name) for i in np.flatnonzero(point.on_edge).tolist()]
         # the first scheduled networks are factored now: in wall-clock time an event must not be late
-        for circuit in islice(self._foreseen(), ROOM):
-            self._dynamics.network.reduced(circuit, foreseen=True)
+        for circuit in islice(self._foreseen(), KEPT - 1):
+            self._dynamics.network.reduced(circuit)
 
     def load_step(self) -> None:
         """Compile or load the inner loop now; else the first `advance` does, which takes seconds in its first use."""
@@ -165,7 +128,6 @@ class Plant:
     # ---------------------------------------------------------------- for agents
 
     def measure(self) -> dict[str, Reading]:
-        """Read every inverter's sensors at t = tick * T_c."""
         reduction = self._dynamics.network.reduction
         islands = zip(*self._islands.names(reduction), reduction.online.tolist(), strict=True)
         held = (self._dynamics.inverters.set_points[:, :2] * self._base).tolist()
@@ -197,7 +159,6 @@ class Plant:
 
     @property
     def switches(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return self._switches.positions
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
@@ -206,16 +167,10 @@ class Plant:
         A closing switch joins two live islands as they are, and a warning gives their differences; with
         `synchronised` it closes only if they are in step.
 
-        Returns
-        -------
-        bool
-            Whether it was in that state already, or will be by another command since the last step.
+        Return whether it was in that state already, or will be by another command since the last step.
 
-        Raises
-        ------
-        ValueError
-            If there is no such switch, or its sides are not in step; the message lists the switches, or the
-            differences of the sides.
+        ValueError if there is no such switch, or its sides are not in step; the message lists the switches, or the
+        differences of the sides.
         """
         known = self.network.switch_name(name)
         if synchronised and action == "close" and (refusal := self._closings.refusal(known)):
@@ -228,7 +183,6 @@ class Plant:
 
     @property
     def loads(self) -> dict[str, complex]:
-        """Power at nominal voltage (VA) of each load that has another one than in the feeder's tables now."""
         return self._loads.changed
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
@@ -278,12 +232,10 @@ class Plant:
     # ---------------------------------------------------------------- for the recorder
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows recorded since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Return the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
 
@@ -291,7 +243,6 @@ class Plant:
         """Do nothing: all of this plant is in this process."""
 
     def _time(self, step: int) -> float:
-        """Return the time of a step (s)."""
         return time_of(step, self._h)
 
     def _tell(self, step: int, kind: Literal["inverter", "trip"], subject: str, text: str) -> None:
@@ -312,10 +263,9 @@ class Plant:
         loaded = dict(self._loads.foreseen())
         for step in sorted({*switched, *loaded}):
             closed, network = switched.get(step, closed), loaded.get(step, network)
-            yield self._circuits.of(closed, network, foreseen=True)
+            yield self._circuits.of(closed, network)
 
     def _change_network(self, step: int) -> None:
-        """Change the loads and operate the switches of this step, all at once."""
         loads_change = self._loads.is_due(step)
         if loads_change:
             self.network, events = self._loads.apply(step)
@@ -362,7 +312,6 @@ class Plant:
         self._tell_islands(self._time(step))
 
     def _tell_islands(self, t: float) -> None:
-        """Report the islands of a network that has changed at t (s), and their neutrals."""
         closed = self._switches.closed
         self._events += self._islands.report(t, closed, self._dynamics.network.reduction)
         self._events += self._neutrals.report(t, closed, self._dynamics)
@@ -379,7 +328,6 @@ class Plant:
         return bool(trips)
 
     def _limit(self, limit: PowerLimit) -> None:
-        """Change the available power of an inverter from the next step on."""
         self._dynamics.inverters.limit_power(self._row[limit.inverter], limit.P_max)
         text = f"{limit.inverter} has {limit.P_max / 1e3:g} kW available"
         self._events.append(PlantEvent(t=round(limit.t, 9), kind="limit", subject=limit.inverter, text=text))

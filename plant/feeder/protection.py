@@ -8,82 +8,40 @@ A function trips when its condition has held at every step of its clearing time.
 
 from __future__ import annotations
 
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Flags, Real
 from gridpeers.plant.known_names import F_BASE, defaults
 from gridpeers.plant.plant_config import Protection
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-V_ENTER = (0.917, 1.05)
-"""Voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4."""
-
-F_ENTER = (59.5, 60.1)
-"""The same for the frequency (Hz at 60 Hz)."""
+V_ENTER = (0.917, 1.05)  # voltages (pu) within which an inverter may enter service: IEEE 1547-2018, Table 4
+F_ENTER = (59.5, 60.1)  # the same for the frequency (Hz at 60 Hz)
 
 ATTEMPTS = 3
 """Trips, each within `SETTLED` of the last return, after which an inverter stays off until its agent joins again."""
 
-SETTLED = 60.0
-"""Time in service (s) after which earlier trips do not count."""
+SETTLED = 60.0  # time in service (s) after which earlier trips do not count
 
 _WORDS = {"OV": "overvoltage", "UV": "undervoltage", "OF": "overfrequency", "UF": "underfrequency"}
 
 
 class Tripped(NamedTuple):
-    """An inverter whose protection has tripped."""
-
     inverter: int
-    """Its index."""
-    function: str
-    """Name of the function in the standard: "UV2"."""
-    value: float
-    """Last measured value (pu or Hz)."""
-    threshold: float
-    """Its setting (pu or Hz)."""
-    time: float
-    """Time beyond the setting (s): the clearing time."""
+    function: str  # name of the function in the standard: "UV2"
+    value: float  # last measured value (pu or Hz)
+    threshold: float  # its setting (pu or Hz)
+    time: float  # time beyond the setting (s): the clearing time
 
     def __str__(self) -> str:
-        """Cause of the trip, for a person.
-
-        Examples
-        --------
-        >>> print(Tripped(0, "UV2", 0.42, 0.45, 0.16))
-        undervoltage 0.42 pu for 0.16 s (UV2: 0.45 pu)
-        """
         unit = "Hz" if self.function[1] == "F" else "pu"
         value = f"{self.value:.2f} {unit}"
         return f"{_WORDS[self.function[:2]]} {value} for {self.time:g} s ({self.function}: {self.threshold:g} {unit})"
 
 
 class Relays:
-    """The trip functions of all inverters.
-
-    Parameters
-    ----------
-    settings
-        Category and changed settings.
-    n
-        Number of inverters.
-    h
-        Step (s).
-    f_nom
-        Nominal frequency (Hz).
-
-    Examples
-    --------
-    >>> relays = Relays(Protection(category="II"), n=1, h=0.02, f_nom=60.0)
-    >>> sag, normal, on = np.array([[0.4]]), np.array([[1.0]]), np.array([True])
-    >>> f = np.array([[60.0]])
-    >>> trips = [relays.watch(f, sag, normal, on) for _ in range(8)]
-    >>> [len(tripped) for tripped in trips], str(trips[-1][0])
-    ([0, 0, 0, 0, 0, 0, 0, 1], 'undervoltage 0.40 pu for 0.16 s (UV2: 0.45 pu)')
-    """
+    """The trip functions of all inverters."""
 
     def __init__(self, settings: Protection, n: int, h: float, f_nom: float) -> None:
         chosen = {} if settings.category == "off" else defaults(settings.category, f_nom) | settings.trips
@@ -91,13 +49,13 @@ class Relays:
         self.thresholds = np.array([value for value, _ in chosen.values()])
         self.times = np.array([time for _, time in chosen.values()])
         self._need = np.maximum(1, np.round(self.times / h)).astype(np.int64)
-        self._of = np.array([("f", "low", "high").index(_quantity(name)) for name in chosen], np.int64)
+        self._of = np.array([0 if name[1] == "F" else 2 if name[0] == "O" else 1 for name in chosen], np.int64)
+        """Quantity of each function: f, V_low or V_high."""
         self._sign = np.array([1.0 if name[0] == "O" else -1.0 for name in chosen])
         self._count = np.zeros((n, len(chosen)), np.int64)
         """Number of steps for which each function's condition has held."""
         self._shortest = int(np.min(self._need, initial=2**31))
-        self._counting = False
-        """Whether any condition has held at the last step."""
+        self._counting = False  # whether any condition has held at the last step
         highest, lowest = np.full(3, np.inf), np.full(3, -np.inf)
         for of, sign, threshold in zip(self._of, self._sign, self.thresholds, strict=True):
             if sign > 0.0:
@@ -112,15 +70,11 @@ class Relays:
         """Number of steps within which no function can trip."""
         return int(np.min(self._need - self._count, initial=2**31)) if self._counting else self._shortest
 
-    def watch(self, f: Floats, V_low: Floats, V_high: Floats, on: Flags) -> list[Tripped]:
+    def watch(self, f: Real, V_low: Real, V_high: Real, on: Flags) -> list[Tripped]:
         """Take the readings of the steps since the last call, at most `quiet` of them.
 
-        Parameters
-        ----------
-        f, V_low, V_high
-            Frequency (Hz), and voltage of the lowest and of the highest phase (pu): steps x inverters.
-        on
-            Inverters in service; the others do not trip.
+        `f`, `V_low`, `V_high`: frequency (Hz), and voltage of the lowest and of the highest phase (pu): steps x
+        inverters; `on`: inverters in service; the others do not trip.
         """
         if not self.names:
             return []
@@ -148,23 +102,10 @@ class Relays:
 class Recovery:
     """Tripped inverters, and their return to service.
 
-    Parameters
-    ----------
-    delay
-        Time (s) for which voltage and frequency must have been normal at the terminals.
-    n
-        Number of inverters.
-    h
-        Step (s).
-    f_nom
-        Nominal frequency (Hz).
+    `delay`: time (s) for which voltage and frequency must have been normal at the terminals.
 
-    Attributes
-    ----------
-    tripped : bool[n]
-        Inverters that are off because they tripped.
-    locked : bool[n]
-        Those among them that have tripped too often: they do not return by themselves.
+    `tripped`: inverters that are off because they tripped; `locked`: those among them that have tripped too often:
+    they do not return by themselves.
     """
 
     def __init__(self, delay: float, n: int, h: float, f_nom: float) -> None:
@@ -183,12 +124,10 @@ class Recovery:
         return bool(self.locked[i])
 
     def enter(self, i: int) -> None:
-        """Note that an inverter has returned."""
         self.tripped[i] = self.locked[i] = False
         self._served[i] = 0
 
     def forget(self, i: int) -> None:
-        """Forget an inverter's trips: its agent has connected or disconnected it."""
         self.enter(i)
         self._trips[i] = 0
 
@@ -202,7 +141,6 @@ class Recovery:
         self.unlock(i)
 
     def passed(self, i: int) -> bool:
-        """Whether a tripped inverter has waited long enough."""
         return bool(self._waited[i] >= self._need)
 
     @property
@@ -213,15 +151,12 @@ class Recovery:
         waits = (self._need - self._waited)[self.tripped & ~self.locked]
         return int(np.min(waits[waits > 0], initial=2**31))
 
-    def watch(self, f: Floats, V_low: Floats, V_high: Floats, dead: Flags) -> None:
+    def watch(self, f: Real, V_low: Real, V_high: Real, dead: Flags) -> None:
         """Take the readings of the terminals since the last call.
 
-        Parameters
-        ----------
-        f, V_low, V_high
-            Frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu): steps x inverters.
-        dead
-            Inverters in a de-energised island: there the delay counts from the trip, because there is no voltage.
+        `f`, `V_low`, `V_high`: frequency of the island (Hz), and voltage of the lowest and of the highest phase (pu):
+        steps x inverters; `dead`: inverters in a de-energised island: there the delay counts from the trip, because
+        there is no voltage.
         """
         steps = len(f)
         if not self.tripped.any():
@@ -235,10 +170,3 @@ class Recovery:
         waited = np.where(dead == self._was_dead, waited, np.minimum(waited, since_last))
         self._waited = np.where(self.tripped, waited, 0)
         self._was_dead = dead.copy()
-
-
-def _quantity(name: str) -> Literal["f", "low", "high"]:
-    """Return the quantity of a function."""
-    if name[1] == "F":
-        return "f"
-    return "high" if name[0] == "O" else "low"

@@ -17,37 +17,15 @@ _PAST = {"open": "opened", "close": "closed"}
 
 
 class Operation(NamedTuple):
-    """An operation of a switch."""
-
     switch: str
-    """Its name."""
-    action: str
-    """"open" or "close"."""
-    synchronised: bool = False
-    """Whether to close only in step."""
+    action: str  # "open" or "close"
+    synchronised: bool = False  # whether to close only in step
 
 
 class Switchboard:
     """The switches of a feeder.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    events
-        Operations on schedule.
-    h
-        Step (s).
-
-    Attributes
-    ----------
-    closed : frozenset of str
-        Names of the switches that are closed now.
-
-    Raises
-    ------
-    ValueError
-        If an event names no switch; the message lists all switches.
+    ValueError if an event names no switch; the message lists all switches.
     """
 
     def __init__(self, network: Network, events: Iterable[SwitchEvent], h: float) -> None:
@@ -59,37 +37,29 @@ class Switchboard:
 
     @property
     def positions(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return {name: name in self.closed for name in self._network.switches}
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps with operations to come."""
         return self._at.keys()
 
     def put(self, step: int, name: str, action: str, *, synchronised: bool = False) -> None:
         """Schedule an operation ("open" or "close") of a switch, by its name or alias, at a step.
 
-        Raises
-        ------
-        ValueError
-            If there is no such switch; the message lists all switches.
+        ValueError if there is no such switch; the message lists all switches.
         """
         known = self._network.switch_name(name)  # first, so that an error leaves the schedule as it is
         self._at.setdefault(step, []).append(Operation(known, action, synchronised))
 
     def due(self, step: int) -> tuple[Operation, ...]:
-        """Return the operations of a step."""
         return tuple(self._at.get(step, ()))
 
     def drop(self, step: int, operation: Operation) -> None:
-        """Remove an operation of a step; the others stay."""
         self._at[step].remove(operation)
         if not self._at[step]:
             del self._at[step]
 
     def switch(self, name: str) -> Switch:
-        """Return a switch by its name in the tables."""
         return self._network.switches[name]
 
     def foreseen(self) -> Iterator[frozenset[str]]:
@@ -123,19 +93,7 @@ def _operated(closed: frozenset[str], name: str, action: str) -> frozenset[str]:
 class LoadBoard:
     """The powers of a feeder's loads at nominal voltage, and those that they are to have.
 
-    Parameters
-    ----------
-    network
-        The feeder's network as the run began.
-    events
-        Changes on schedule, in the order of time.
-    h
-        Step (s).
-
-    Raises
-    ------
-    ValueError
-        If an event names no load, or a number of it makes no sense.
+    ValueError if an event names no load, or a number of it makes no sense.
     """
 
     def __init__(self, network: Network, events: Iterable[LoadEvent] = (), h: float = 1.0) -> None:
@@ -159,7 +117,6 @@ class LoadBoard:
 
     @property
     def steps(self) -> Collection[int]:
-        """Steps with scheduled changes to come."""
         return self._at.keys()
 
     def foreseen(self) -> Iterator[tuple[int, Network]]:
@@ -174,17 +131,7 @@ class LoadBoard:
     def put(self, text: str, setting: LoadSetting) -> str:
         """Have a load take another power at nominal voltage from the next step on; return it in words.
 
-        Parameters
-        ----------
-        text
-            Name of the load, or of its bus.
-        setting
-            Its power; what is None stays as it is.
-
-        Raises
-        ------
-        ValueError
-            If there is no such load, or a number makes no sense.
+        ValueError if there is no such load, or a number makes no sense.
         """
         name = self._powers.name(text)
         S = self._coming[name] = self._power(name, setting, self._set | self._coming)
@@ -216,7 +163,6 @@ class LoadBoard:
             raise ValueError(f"load {name}: {error}") from None
 
     def _put(self, powers: dict[str, complex], name: str, S: complex) -> None:
-        """Note the power of a load, if it is another one than that of the table."""
         if self._powers.table(name) == S:
             powers.pop(name, None)
         else:

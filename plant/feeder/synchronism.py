@@ -13,9 +13,9 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics import Dynamics
+from gridpeers.plant.dynamics.kernel.compiled import Flags
 from gridpeers.plant.feeder.islands import Closing
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.known_names import F_BASE
@@ -31,8 +31,7 @@ _TABLE_5 = ((500e3, 0.3, 0.10, 20.0), (1500e3, 0.2, 0.05, 15.0), (np.inf, 0.1, 0
 LOCKED = 0.01
 """Difference of frequency (Hz) below which two islands count as held at one frequency: a beat lasts 100 s and more."""
 
-LEAST = 0.1
-"""Voltage without load (pu) below which a pole of a switch is a neutral's."""
+LEAST = 0.1  # voltage without load (pu) below which a pole of a switch is a neutral's
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,27 +39,19 @@ class Difference:
     """Difference across an open switch between two separate live islands."""
 
     switch: str
-    """Name of the switch."""
-    angle: float
-    """Largest angle between equal phases (deg), 0 to 180."""
-    f: float
-    """Difference of frequency (Hz)."""
-    V: float
-    """Largest difference of voltage of equal phases (pu of nominal)."""
+    angle: float  # largest angle between equal phases (deg), 0 to 180
+    f: float  # difference of frequency (Hz)
+    V: float  # largest difference of voltage of equal phases (pu of nominal)
     limits: SynchronizationLimits
-    """Limits of these three."""
 
     @property
     def within(self) -> bool:
-        """Whether the two sides may be joined."""
         return self.angle <= self.limits.angle and self.f <= self.limits.f and self.V <= self.limits.V
 
     @property
     def way_out(self) -> str:
         """Advice that brings the two sides within the limits.
 
-        Examples
-        --------
         >>> apart = {"switch": "sw", "V": 0.0, "limits": SynchronizationLimits(angle=10.0, f=0.1, V=0.03)}
         >>> Difference(angle=90.0, f=0.05, **apart).way_out
         'try again: the angle passes through zero every 20 s'
@@ -84,11 +75,8 @@ class SynchronizationLimits:
     """Largest differences at which a switch may close."""
 
     angle: float
-    """Angle (deg)."""
     f: float
-    """Frequency (Hz)."""
     V: float
-    """Voltage (pu)."""
 
     def __str__(self) -> str:
         return f"at most {self.angle:g} deg, {self.f:g} Hz and {100.0 * self.V:g} %"
@@ -99,8 +87,6 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
 
     The standard's frequencies are for 60 Hz; at another nominal frequency (Hz) they are in proportion.
 
-    Examples
-    --------
     >>> limits_for(1.3e6, SyncCheck())
     SynchronizationLimits(angle=15.0, f=0.2, V=0.05)
     >>> str(limits_for(3.9e6, SyncCheck(angle=5.0)))
@@ -115,14 +101,7 @@ def limits_for(rating: float, check: SyncCheck, f_nom: float = F_BASE) -> Synchr
 class Synchronism:
     """Measure differences across the open switches of a feeder.
 
-    Parameters
-    ----------
-    network
-        The feeder's network.
-    dynamics
-        Its inverters.
-    check
-        Limits that replace those of the standard.
+    `check`: limits that replace those of the standard.
     """
 
     def __init__(self, network: Network, dynamics: Dynamics, check: SyncCheck) -> None:
@@ -131,14 +110,7 @@ class Synchronism:
     def across(self, switch: str, closed: frozenset[str], others: Iterable[str] = ()) -> Difference | None:
         """Return the difference across a switch (by its name) now; None if it does not separate two live islands.
 
-        Parameters
-        ----------
-        switch
-            Its name.
-        closed
-            Switches that are closed now.
-        others
-            Switches that close with it. A dead side that one of them energizes counts as the energizing island.
+        `others`: switches that close with it. A dead side that one of them energizes counts as the energizing island.
         """
         device = self._network.switches[switch]
         at = [self._network.index(device.from_bus, phase) for phase in device.phases]
@@ -176,7 +148,7 @@ class Synchronism:
             limits=limits_for(min(rated), self._check, network.feeder.f_nom),
         )
 
-    def _live_end(self, bus: str, phases: str, live: NDArray[np.bool_], closed: frozenset[str]) -> str:
+    def _live_end(self, bus: str, phases: str, live: Flags, closed: frozenset[str]) -> str:
         """Return the bus if it is live, else a live bus that these closed switches join to it; "" if there is none."""
         network = self._network
         island = next(buses for buses in network.islands(closed) if bus in buses)
@@ -194,32 +166,16 @@ class Synchronism:
 
 
 class _Pending(NamedTuple):
-    """A closing that waits for synchronism."""
-
-    since: int
-    """Step of its scheduled closing."""
-    last: int
-    """Step at which it gives up."""
+    since: int  # step of its scheduled closing
+    last: int  # step at which it gives up
 
 
 class Closings:
     """Judge the closings of a feeder's switches.
 
-    Parameters
-    ----------
-    switches
-        The switches.
-    sync
-        Measures the differences across them.
-    timeout
-        Longest wait of a switch for synchronism (steps).
-    h
-        Step (s).
+    `timeout`: longest wait of a switch for synchronism (steps).
 
-    Attributes
-    ----------
-    joined : list of Closing
-        Closings that have joined live islands, the latest last.
+    `joined`: closings that have joined live islands, the latest last.
     """
 
     def __init__(self, switches: Switchboard, sync: Synchronism, timeout: int, h: float) -> None:

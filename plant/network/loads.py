@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.network.merging import Merge
 
@@ -28,26 +28,19 @@ class LoadBranches:
     `law`. Constant-impedance loads are not here, but in `Network.admittance`.
     """
 
-    n_from: NDArray[np.int64]
-    """Node at the beginning."""
-    n_to: NDArray[np.int64]
-    """Node at the end, -1: ground."""
-    law: LoadLaw
-    """Law of their currents."""
-    V_nom: NDArray[np.float64]
-    """Nominal voltage across the branch (V)."""
-    phi0: NDArray[np.float64]
-    """Nominal angle of the voltage across the branch (rad)."""
-    a_from: NDArray[np.float64]
+    n_from: Integers  # node at the beginning
+    n_to: Integers  # node at the end, -1: ground
+    law: LoadLaw  # law of their currents
+    V_nom: Real  # nominal voltage across the branch (V)
+    phi0: Real  # nominal angle of the voltage across the branch (rad)
+    a_from: Real
     """Ratio of the voltage at the branch's beginning to that of node `n_from`: 1 unless merged."""
-    a_to: NDArray[np.float64]
-    """The same at its end; 0 at ground, where index -1 would read the last node's voltage."""
+    a_to: Real  # the same at its end; 0 at ground, where index -1 would read the last node's voltage
 
     def __len__(self) -> int:
         return len(self.n_from)
 
     def __add__(self, others: LoadBranches) -> LoadBranches:
-        """Return these branches and then the others."""
         pairs = {name: (getattr(self, name), getattr(others, name)) for name in self.__dataclass_fields__}
         laws = pairs.pop("law")
         return LoadBranches(law=laws[0] + laws[1], **{name: np.concatenate(pair) for name, pair in pairs.items()})
@@ -87,30 +80,20 @@ class LoadBranches:
         row, column, value = (np.concatenate([entry[k] for entry in entries]) for k in range(3))
         return sp.csc_array((value, (row, column)), shape=(n, n))
 
-    def voltages(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def voltages(self, V: Complex) -> Complex:
         """Return the voltages across the branches (V) from the nodes' voltages (V, line-to-ground)."""
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
 
-    def branch_currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Currents through the branches (A). A branch without voltage, in a dead island, takes none."""
+    def branch_currents(self, V: Complex) -> Complex:
         return self.law.currents(self.voltages(V))
 
-    def powers(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
-        """Return the powers taken by the branches (VA)."""
+    def powers(self, V: Complex) -> Complex:
         return np.asarray(self.voltages(V) * np.conj(self.branch_currents(V)), dtype=np.complex128)
 
-    def currents(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def currents(self, V: Complex) -> Complex:
         """Return the currents that the loads draw from the nodes (A), positive into the load.
 
-        Parameters
-        ----------
-        V : complex128[n]
-            Voltages of all nodes (V, line-to-ground).
-
-        Returns
-        -------
-        complex128[n]
-            In the order of V; those of a delta load sum to zero unless ratios differ.
+        Those of a delta load sum to zero unless ratios differ.
         """
         current = self.branch_currents(V)
         drawn = np.zeros(len(V), dtype=np.complex128)

@@ -6,35 +6,21 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
 from gridpeers.plant.equipment import Line, LineConfig, Transformer
 
 DELTA = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 """Voltages across A-B, B-C, C-A from those of A, B, C."""
 
 
-def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArray[np.complex128]:
+def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> Complex:
     r"""Return the nodal admittance of a line (S), a pi of series impedance and halves of the shunt capacitance.
 
     .. math:: Y = \begin{pmatrix} z^{-1} + y/2 & -z^{-1} \\ -z^{-1} & z^{-1} + y/2 \end{pmatrix}
 
-    Parameters
-    ----------
-    line : Line
-        Its phases and length.
-    config : LineConfig
-        Its impedance and susceptance per length.
-    charging : bool
-        Whether to include the shunt capacitance.
+    Nodes in the order: phases of the from end, phases of the to end.
 
-    Returns
-    -------
-    complex128[2p, 2p]
-        Nodes in the order: phases of the from end, phases of the to end.
-
-    References
-    ----------
     Kersting, Distribution System Modeling and Analysis, section 6.1 (exact line segment model).
     """
     keep = [config.phases.index(phase) for phase in line.phases]
@@ -48,7 +34,7 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> NDArra
     return Y
 
 
-def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> NDArray[np.complex128]:
+def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> Complex:
     """Return the nodal admittance of a three-phase transformer (S) at its nominal ratio.
 
     A delta-delta transformer passes no zero sequence, so the mean of the three voltages at `to_bus` is undetermined,
@@ -56,20 +42,8 @@ def transformer_admittance(transformer: Transformer, V_from: float, V_to: float)
     It carries no current, hence changes nothing, as long as nothing else at `to_bus` is connected to ground; loads
     behind a delta winding must be delta loads.
 
-    Parameters
-    ----------
-    transformer : Transformer
-        Its connection, rating and impedance.
-    V_from, V_to : float
-        Nominal voltages of its buses (V, line-to-neutral).
+    Nodes in the order: A, B, C of from_bus, A, B, C of to_bus.
 
-    Returns
-    -------
-    complex128[6, 6]
-        Nodes in the order: A, B, C of from_bus, A, B, C of to_bus.
-
-    References
-    ----------
     Kersting, Distribution System Modeling and Analysis, chapter 8.
     """
     y = transformer.S_rated / (3.0 * V_from**2 * transformer.z)
@@ -94,28 +68,23 @@ class Merge:
     with :math:`a_i = 1` through switches and the tap ratio through regulators. The second equation follows from the
     first, because ideal devices take no power.
 
-    Attributes
-    ----------
-    representative : int64[n]
-        Node -> its representative. A representative represents itself.
-    ratio : float64[n]
-        :math:`a_i`; exactly 1 for representatives.
+    `representative`: node -> its representative. A representative represents itself; `ratio`: :math:`a_i`; exactly
+    1 for representatives.
     """
 
-    def __init__(self, representative: NDArray[np.int64], ratio: NDArray[np.float64]) -> None:
+    def __init__(self, representative: Integers, ratio: Real) -> None:
         self.representative = representative
         self.ratio = ratio
 
     @property
-    def representatives(self) -> NDArray[np.int64]:
-        """Nodes that represent their groups, ascending."""
+    def representatives(self) -> Integers:
         return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
 
-    def expand(self, V: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def expand(self, V: Complex) -> Complex:
         """Return every node's voltage (V) from the voltages at the representatives (the other entries are unused)."""
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
 
-    def gather(self, current: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    def gather(self, current: Complex) -> Complex:
         """Sum the currents of all nodes (A) at the representatives; the other entries become zero."""
         gathered = np.zeros(len(current), dtype=np.complex128)
         np.add.at(gathered, self.representative, self.ratio * current)
@@ -130,19 +99,10 @@ class Merge:
 def merge_nodes(names: Sequence[str], ties: Iterable[tuple[int, int, float]], preferred: Sequence[int]) -> Merge:
     """Group nodes that are tied together.
 
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the nodes, for errors.
-    ties : iterable of (from, to, ratio)
-        Ideal devices: V_to = ratio * V_from.
-    preferred : sequence of int
-        Nodes that represent their groups by preference, the most preferred first; else the first node does.
+    `names`: names of the nodes, for errors; `ties`: ideal devices: V_to = ratio * V_from; `preferred`: nodes that
+    represent their groups by preference, the most preferred first; else the first node does.
 
-    Raises
-    ------
-    ValueError
-        If two paths between the same nodes have different ratios: an ideal short circuit.
+    ValueError if two paths between the same nodes have different ratios: an ideal short circuit.
     """
     n = len(names)
     neighbours: list[list[tuple[int, float]]] = [[] for _ in range(n)]

@@ -11,11 +11,11 @@ from math import pi, sqrt
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Switch
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers, Real
+from gridpeers.plant.equipment import PHASES, Feeder, InverterRow, Regulator, Switch
 from gridpeers.plant.equipment.connectivity import bus_islands, switch_name
 from gridpeers.plant.equipment.imported_equipment import LoadPart
 from gridpeers.plant.equipment.named_loads import named_loads
@@ -24,8 +24,7 @@ from gridpeers.plant.network.loads import LoadBranches, law_row
 from gridpeers.plant.network.merging import Merge, line_admittance, merge_nodes, transformer_admittance
 from gridpeers.wire.wording import first_of
 
-ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}
-"""Nominal angles of the phases (rad)."""
+ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}  # nominal angles of the phases (rad)
 
 DELTA_PAIRS = (("A", "B"), ("B", "C"), ("C", "A"))
 """Ends of the three branches of a delta load; its nominal angles are +30, -90, +150 degrees."""
@@ -40,37 +39,17 @@ class Network:
     Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); tied nodes keep
     one unknown. In `admittance` only representatives have entries.
 
-    Parameters
-    ----------
-    feeder : Feeder
-        Tables from `gridpeers.plant.tables.read_feeder`.
-    line_charging : bool, optional
-        Whether to include the lines' shunt capacitance. The published solution of the standard feeder has it.
-    spares : iterable of str, optional
-        Names of the spare inverters in this run; ValueError for an unknown one.
+    `line_charging`: whether to include the lines' shunt capacitance. The published solution of the standard feeder has
+    it; `spares`: names of the spare inverters in this run; ValueError for an unknown one.
 
-    Attributes
-    ----------
-    nodes : tuple of (bus, phase)
-        Order of all vectors.
-    V_nom : float64[n]
-        Nominal voltages (V, line-to-neutral).
-    nominal : complex128[n]
-        Nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers too; in
-        a feeder of `LinearElement`s they are the voltages without load.
-    switches : dict of str to Switch
-        By name ("13-152"); `switch_name` finds the name.
-    closed0 : frozenset of str
-        Names of the switches that are closed at the start.
-    source_nodes : int64[3] or int64[0]
-        Nodes of the substation, if there is one. They always represent themselves.
-    source_voltage : complex128[3] or complex128[0]
-        Its voltages (V).
-    inverters : tuple of InverterRow
-        In the table's order, spares last.
-    Y_branches, Y_capacitors, Y_loads : csc_array, complex, n x n
-        Parts of the admittance matrix (S) before merging: lines and transformers; capacitor banks;
-        constant-impedance loads.
+    `V_nom`: nominal voltages (V, line-to-neutral);
+    `nominal`: nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers
+    too; in a feeder of `LinearElement`s they are the voltages without load;
+    `switches`: by name ("13-152"); `switch_name` finds the name;
+    `source_nodes`: nodes of the substation, if there is one. They always represent themselves (3);
+    `inverters`: in the table's order, spares last;
+    `Y_branches`, `Y_capacitors`, `Y_loads`: parts of the admittance matrix (S) before merging: lines and transformers;
+    capacitor banks; constant-impedance loads.
     """
 
     def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
@@ -78,8 +57,8 @@ class Network:
         self.line_charging = line_charging
         self.nodes = tuple((bus.name, phase) for bus in feeder.buses for phase in bus.phases)
         self._index = {node: i for i, node in enumerate(self.nodes)}
-        self.V_nom: NDArray[np.float64] = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
-        self.nominal: NDArray[np.complex128] = np.array(
+        self.V_nom: Real = np.array([bus.V_nom for bus in feeder.buses for _ in bus.phases])
+        self.nominal: Complex = np.array(
             [cmath.rect(V, ANGLE.get(phase, 0.0)) for V, (_, phase) in zip(self.V_nom, self.nodes, strict=True)],
             dtype=np.complex128,
         )
@@ -87,11 +66,11 @@ class Network:
         self.closed0 = frozenset(switch.name for switch in feeder.switches if switch.closed)
         self.inverters: tuple[InverterRow, ...] = feeder.inverters + _chosen(feeder, tuple(spares))
         source = feeder.source
-        self.source_nodes: NDArray[np.int64] = np.array(
+        self.source_nodes: Integers = np.array(
             [self.index(source.bus, phase) for phase in PHASES] if source else [], dtype=np.int64
         )
         turned = cmath.rect(source.V_pu, source.angle) if source else 1.0
-        self.source_voltage: NDArray[np.complex128] = self.nominal[self.source_nodes] * turned
+        self.source_voltage: Complex = self.nominal[self.source_nodes] * turned
         self.Y_branches = self._branches()
         self.Y_capacitors = self._capacitors()
         self.Y_loads = self._impedance_loads()
@@ -112,17 +91,10 @@ class Network:
         return self._index[bus, phase]
 
     def has(self, bus: str, phases: str) -> bool:
-        """Whether a bus has these phases."""
         return all((bus, phase) in self._index for phase in phases)
 
     def switch_name(self, text: str) -> str:
-        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`.
-
-        Raises
-        ------
-        ValueError
-            If no switch has this name.
-        """
+        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`."""
         return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
@@ -138,10 +110,7 @@ class Network:
         It has lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
         their representative are empty, and so is the matrix outside of the islands' blocks.
 
-        Returns
-        -------
-        csc_array, complex, n x n
-            T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
+        Return T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
         """
         T = self.merge(closed).matrix()
         Y = sp.csc_array(T.T @ self._Y @ T)
@@ -157,10 +126,8 @@ class Network:
     def weak_loads(self, weak: Mapping[int, float]) -> str:
         """Say which loads the network cannot feed even alone, and what to do; of none, that the load may be too much.
 
-        Parameters
-        ----------
-        weak
-            Branches of `loads`, and the short-circuit powers there (VA): see `gridpeers.plant.dynamics.island_newton`.
+        `weak`: branches of `loads`, and the short-circuit powers there (VA): see
+        `gridpeers.plant.dynamics.island_newton`.
         """
         pairs = zip(self.feeder.loads, self._first.loads, strict=True)
         names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]
@@ -194,10 +161,9 @@ class Network:
         return other
 
     def islands(self, closed: frozenset[str]) -> tuple[frozenset[str], ...]:
-        """Return the sets of buses joined by branches and closed switches, in the order of their first buses."""
-        return bus_islands(self.feeder, {switch.name for switch in self._closed_switches(closed)})
+        return bus_islands(self.feeder, closed)
 
-    def _without_load(self) -> NDArray[np.complex128]:
+    def _without_load(self) -> Complex:
         """Phasors (V) with all switches closed and no load: what transformers of any connection make of the source."""
         merge = merge_nodes(self._node_names(), self._ties(frozenset(self.switches)), self.source_nodes.tolist())
         T = merge.matrix()
@@ -214,28 +180,21 @@ class Network:
     def _node_names(self) -> list[str]:
         return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]
 
-    def _closed_switches(self, closed: frozenset[str]) -> Iterable[Switch]:
-        for name in closed:
-            if name not in self.switches:
-                raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
-        return [switch for name, switch in self.switches.items() if name in closed]
-
     def _ties(self, closed: frozenset[str]) -> list[tuple[int, int, float]]:
-        devices = [(switch, 1.0) for switch in self._closed_switches(closed)]
-        ties = [
-            (self.index(switch.from_bus, phase), self.index(switch.to_bus, phase), ratio)
-            for switch, ratio in devices
-            for phase in switch.phases
+        """Return the pairs of nodes that closed switches and regulators tie, with their ratios."""
+        for name in closed - self.switches.keys():
+            raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
+        devices: list[tuple[Switch | Regulator, float]] = [
+            (switch, 1.0) for name, switch in self.switches.items() if name in closed
         ]
-        ties += [
-            (self.index(regulator.from_bus, phase), self.index(regulator.to_bus, phase), regulator.ratio)
-            for regulator in self.feeder.regulators
-            for phase in regulator.phases
+        devices += [(regulator, regulator.ratio) for regulator in self.feeder.regulators]
+        return [
+            (self.index(device.from_bus, phase), self.index(device.to_bus, phase), ratio)
+            for device, ratio in devices
+            for phase in device.phases
         ]
-        return ties
 
-    def _assemble(self, parts: list[tuple[list[int], NDArray[np.complex128]]]) -> sp.csc_array:
-        """Add up element matrices, each given with the nodes of its rows."""
+    def _assemble(self, parts: list[tuple[list[int], Complex]]) -> sp.csc_array:
         n = len(self.nodes)
         rows = [np.repeat(nodes, len(nodes)) for nodes, _ in parts]
         columns = [np.tile(nodes, len(nodes)) for nodes, _ in parts]
@@ -329,7 +288,6 @@ class Network:
 
 
 def _chosen(feeder: Feeder, spares: tuple[str, ...]) -> tuple[InverterRow, ...]:
-    """Return the spare inverters of these names, in the table's order."""
     known = {row.name: row for row in feeder.spares}
     for name in spares:
         if name not in known:

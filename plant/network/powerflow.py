@@ -7,87 +7,55 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import factorized
 
 from gridpeers.plant.dynamics.island_newton import weak_branches
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Integers
 from gridpeers.plant.network.loads import LoadBranches
 from gridpeers.plant.network.network import Network
 
-Injection = Callable[[NDArray[np.complex128]], NDArray[np.complex128]]
+Injection = Callable[[Complex], Complex]
 """Function from the voltages of all nodes (V) to the currents fed into them (A)."""
 
 MOST_ITERATIONS = 200
 """Most iterations: a feeder that can carry its loads takes about 10, one that cannot diverges long before."""
 
-NOISE = 1e-8
-"""Change (pu) that may be rounding in any network; more where a section has next to nothing to ground."""
-
-STALL = 8
-"""Iterations without a smaller change after which it is rounding."""
+NOISE = 1e-8  # change (pu) that may be rounding in any network; more where a section has next to nothing to ground
+STALL = 8  # iterations without a smaller change after which it is rounding
 
 
 @dataclass(frozen=True, kw_only=True)
 class PowerFlow:
-    """A solved state of a network."""
-
-    V: NDArray[np.complex128]
-    """Voltages of all nodes (V, line-to-ground); zero where the substation does not reach."""
-    S_source: complex
-    """Power out of the substation (VA)."""
-    S_loads: complex
-    """Power taken by all loads of any kind (VA)."""
-    S_losses: complex
-    """Power taken by lines and transformers (VA); the imaginary part includes line charging."""
-    S_capacitors: complex
-    """Power taken by capacitor banks (VA); their imaginary part is negative."""
-    iterations: int
-    """Number of network solutions."""
+    V: Complex  # voltages of all nodes (V, line-to-ground); zero where the substation does not reach
+    S_source: complex  # power out of the substation (VA)
+    S_loads: complex  # power taken by all loads of any kind (VA)
+    S_losses: complex  # power taken by lines and transformers (VA); the imaginary part includes line charging
+    S_capacitors: complex  # power taken by capacitor banks (VA); their imaginary part is negative
+    iterations: int  # number of network solutions
 
 
 def solve_power_flow(
     network: Network,
     closed: frozenset[str],
-    loads: LoadBranches | None = None,
     *,
-    shunt: NDArray[np.complex128] | None = None,
+    shunt: Complex | None = None,
     injection: Injection | None = None,
     tolerance: float = 1e-10,
-    start: NDArray[np.complex128] | None = None,
+    start: Complex | None = None,
 ) -> PowerFlow:
     r"""Solve the nodes that the substation reaches, by a fixed point.
 
     .. math:: V \leftarrow Y^{-1} (J(V) - I_\mathrm{load}(V) - Y_s V_s).
 
-    Parameters
-    ----------
-    network : Network
-        The network; it must have a source.
-    closed : frozenset of str
-        Names of the closed switches.
-    loads : LoadBranches, optional
-        Loads of constant power and current; by default the network's own.
-    shunt : complex128[n], optional
-        Admittances to ground added at the nodes (S): filters of inverters.
-    injection : callable, optional
-        Currents fed into the nodes (A) from their voltages (V), in addition.
-    tolerance : float, optional
-        Largest change of any voltage in the last iteration (pu).
-    start : complex128[n], optional
-        Voltages to start from (V); by default those without load.
+    `network`: the network; it must have a source;
+    `shunt`: admittances to ground added at the nodes (S): filters of inverters;
+    `injection`: currents fed into the nodes (A) from their voltages (V), in addition;
+    `tolerance`: largest change of any voltage in the last iteration (pu);
+    `start`: voltages to start from (V); by default those without load.
 
-    Returns
-    -------
-    PowerFlow
-        Voltages and power balance.
-
-    Raises
-    ------
-    ValueError
-        If the feeder has no source.
-    ArithmeticError
-        If it does not converge, mostly because the feeder cannot carry the load.
+    ValueError if the feeder has no source. ArithmeticError if it does not converge, mostly because the feeder cannot
+    carry the load.
     """
     if not len(network.source_nodes):
         raise ValueError(f'feeder "{network.feeder.name}" has no source; a power flow needs one, give source.csv')
@@ -95,7 +63,7 @@ def solve_power_flow(
     Y = network.admittance(closed)
     if shunt is not None:
         Y = Y + sp.diags_array(merge.gather(merge.ratio * shunt)).tocsc()
-    own = loads if loads is not None else network.loads()
+    own = network.loads()
     without_loads = Y
     linear = own.nominal_admittance(len(network.nodes))
     if linear.nnz:  # without the loads' linear part the fixed point diverges where a phase is missing
@@ -105,7 +73,7 @@ def solve_power_flow(
     solve = factorized(sp.csc_matrix(Y[unknown][:, unknown]))
     from_source = Y[unknown][:, network.source_nodes] @ network.source_voltage
 
-    def rounding(V: NDArray[np.complex128]) -> float:
+    def rounding(V: Complex) -> float:
         """Return the change (pu) that rounding of the network's currents can make."""
         lost = np.finfo(float).eps * (abs(Y[unknown][:, unknown]) @ np.abs(V))
         return float(np.max(np.abs(solve(lost.astype(complex))) / network.V_nom[unknown], initial=0.0))
@@ -143,7 +111,7 @@ def solve_power_flow(
     )
 
 
-def _reached(Y: sp.csc_array, source: NDArray[np.int64], loads: LoadBranches) -> NDArray[np.int64]:
+def _reached(Y: sp.csc_array, source: Integers, loads: LoadBranches) -> Integers:
     """Nodes connected to the source through the matrix or through loads (a neutral), without the source's own."""
     between = np.flatnonzero(loads.n_to >= 0)
     ends = (loads.n_from[between], loads.n_to[between])
@@ -156,10 +124,10 @@ def _reached(Y: sp.csc_array, source: NDArray[np.int64], loads: LoadBranches) ->
 
 def _balance(
     network: Network,
-    V: NDArray[np.complex128],
+    V: Complex,
     loads: LoadBranches,
     injection: Injection | None,
-    shunt: NDArray[np.complex128] | None,
+    shunt: Complex | None,
     iterations: int,
 ) -> PowerFlow:
     S_loads = complex(loads.powers(V).sum() + V @ np.conj(network.Y_loads @ V))

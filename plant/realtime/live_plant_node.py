@@ -13,7 +13,7 @@ from typing import Literal
 
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.plant_interface import LivePlant
-from gridpeers.plant.plant_node import STAYS, PlantNode
+from gridpeers.plant.plant_node import STAYS, PlantNode, TickActions
 from gridpeers.plant.realtime.recorder_feed import KEPT_BYTES, KEPT_BYTES_RECORDED, RecorderFeed
 from gridpeers.plant.realtime.run_commands import LinkCommandSender
 from gridpeers.plant.realtime.silence_detector import SilenceDetector
@@ -26,8 +26,7 @@ from gridpeers.wire.traffic import TimedTraffic
 
 Phase = Literal["gathering", "running", "closing", "over"]
 
-REFUSALS = 20
-"""Refused processes that are logged: anybody may hold tokens."""
+REFUSALS = 20  # refused processes that are logged: anybody may hold tokens
 
 REFUSAL_INTERVAL = 0.1
 """Time (s, wall) after which one more process is told that it is refused, once so many have been told at once: each
@@ -36,8 +35,7 @@ needs a publisher of its own, a millisecond or two in which the plant does not s
 AGAIN = 1.0
 """Time (s, wall) between two questions for the nameplates that have not come: a question dies with its link."""
 
-HEARD = 1.0
-"""Time (s, wall) after its last state for which an agent is on the roster, as one that the plant hears."""
+HEARD = 1.0  # time (s, wall) after its last state for which an agent is on the roster, as one that the plant hears
 
 
 class LivePlantNode(PlantNode):
@@ -53,16 +51,14 @@ class LivePlantNode(PlantNode):
             KEPT_BYTES if self.journal is None else KEPT_BYTES_RECORDED,
         )
         self.recorder_feed = RecorderFeed(config.recorders, publish, kept)
-        self._states: dict[str, State] = {}
-        """States that the links let through and that are not held yet."""
+        self._states: dict[str, State] = {}  # states that the links let through and that are not held yet
         self._state_at: dict[str, float] = {}
         """Time (s, driver's clock) at which the last state of each agent came off the wire."""
         self._silence = SilenceDetector(config.max_age, config.T_c, config.T_c / config.speed)
         self._ask_timer = Timer(AGAIN, 0.0)
         self._refusals = 0
         self._refusal_limit = RateLimit(REFUSALS, REFUSAL_INTERVAL)
-        self.timed: TimedTraffic | None = None
-        """Notes the plant's messages and tokens; None if nobody records them."""
+        self.timed: TimedTraffic | None = None  # notes the plant's messages and tokens; None if nobody records them
         if self.journal is not None:
             arrivals = config.record == "all"
             self.timed = self.traffic = TimedTraffic(self.keys, self.journal, arrivals=arrivals, whole=True)
@@ -77,13 +73,11 @@ class LivePlantNode(PlantNode):
 
     @property
     def publications(self) -> tuple[str, ...]:
-        """Keys to be published on."""
         inverters = self.plant.inverters
         each = (*map(self.keys.measurement, inverters), *map(self.keys.link_request, inverters))
         return self.keys.control, self.keys.telemetry, *each
 
     def _begin(self, now: float) -> None:
-        """Begin the run."""
         raise NotImplementedError
 
     # ---------------------------------------------------------------- tokens and nameplates
@@ -123,7 +117,6 @@ class LivePlantNode(PlantNode):
         return False
 
     def _ask_again(self, now: float) -> None:
-        """Ask for the nameplates that have not come."""
         if now >= self._ask_timer.due:
             self._ask_timer.take(now)
             for name, instance in self.members.next_unmet():
@@ -207,7 +200,7 @@ class LivePlantNode(PlantNode):
 
     def _let_leave_and_join(self) -> None:
         """Ask the agents that leave at this tick by the scenario to do so, and report those that are to be started."""
-        leave, join, _ = self._schedule.take(self.tick)  # in real time an agent dies as a process
+        leave, join, _ = self._schedule.pop(self.tick, TickActions())  # in real time an agent dies as a process
         for name in leave:
             instance = self.members.instance(name)
             if instance:

@@ -12,33 +12,14 @@ TOLERATED = 0.01
 HOPELESS = 10
 """Control periods behind which the schedule is put off: what is made up for in a rush is not real time either."""
 
-FIRST = 100
-"""Steps before which nothing is judged."""
-
-_KEPT = 5_000
-"""Delays that are remembered, the latest, for the percentiles of a run that stays."""
+FIRST = 100  # steps before which nothing is judged
+_KEPT = 5_000  # delays that are remembered, the latest, for the percentiles of a run that stays
 
 
 class RealTimePacer:
     """Due times of the plant's steps, and the delays behind them.
 
-    Parameters
-    ----------
-    period : float
-        Control period in wall time (s).
-    now : float
-        When step 0 is due (s).
-
-    Examples
-    --------
-    >>> pacer = RealTimePacer(0.02, now=5.0)
-    >>> pacer.due
-    5.0
-    >>> pacer.note(5.0); pacer.note(5.03)
-    0.0
-    0.0
-    >>> pacer.due, pacer.report().late
-    (5.04, 0)
+    `now`: when step 0 is due (s).
     """
 
     def __init__(self, period: float, now: float) -> None:
@@ -69,10 +50,7 @@ class RealTimePacer:
     def take_failure(self, of: int | None) -> bool:
         """Return whether it is clear now, and was not before, that the plant cannot keep pace.
 
-        Parameters
-        ----------
-        of : int or None
-            Steps of the whole run, of which `TOLERATED` may be late; without an end those made so far count.
+        `of`: steps of the whole run, of which `TOLERATED` may be late; without an end those made so far count.
         """
         judged = of is not None or self.steps >= FIRST
         fails = judged and self.late > TOLERATED * (self.steps if of is None else of)
@@ -80,7 +58,6 @@ class RealTimePacer:
         return news
 
     def report(self) -> Pacing:
-        """Return the percentiles of the delays so far."""
         ordered = sorted(self._delays) or [0.0]
 
         def percentile(part: float) -> float:
@@ -101,13 +78,6 @@ class RealTimePacer:
 
 
 def sentence(pacing: Pacing, period: float) -> str:
-    """Return a sentence on the pace.
-
-    Examples
-    --------
-    >>> sentence(Pacing(steps=350, late=1, p50=1e-4, p95=5e-4, p99=2e-3, worst=0.021, slipped=0.0), 0.02)
-    '1 of 350 steps (0.3 %) more than a control period (20 ms) late; delay p50 0.1, p95 0.5, p99 2.0, worst 21.0 ms'
-    """
     share = 100.0 * pacing.late / max(1, pacing.steps)
     ms = 1e3
     text = (

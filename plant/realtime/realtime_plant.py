@@ -27,20 +27,14 @@ from gridpeers.wire.messages import PLANT, Command, PlantEvent, Waiting
 from gridpeers.wire.node import ANYBODY, CLOCK_ALONE, Route
 from gridpeers.wire.timing import RateLimit, Timer
 
-TELEMETRY = 0.2
-"""Time (s, wall) between two telemetry messages."""
-
-LINKS = 0.5
-"""Time (s, wall) between two reports on links in a recorded run."""
-
-LEAD = 0.25
-"""Time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other."""
+TELEMETRY = 0.2  # time (s, wall) between two telemetry messages
+LINKS = 0.5  # time (s, wall) between two reports on links in a recorded run
+LEAD = 0.25  # time (s, wall) from the last agent's nameplate to step 0: the agents are still busy finding each other
 
 RECORDING = 15.0
 """Longest time (s, wall) that an ended run stays for a recorder that has not got all of it: it may have stood still."""
 
-WAITING = 0.5
-"""Time (s, wall) between two messages of a plant that waits for agents to those that are there."""
+WAITING = 0.5  # time (s, wall) between two messages of a plant that waits for agents to those that are there
 
 
 COMMANDS, COMMAND_INTERVAL = 100, 0.02
@@ -67,23 +61,19 @@ class RealtimePlant(LivePlantNode):
         self._warnings = RateLimit(burst=5)
         self._commands = RunCommands(self)
         self._command_limit = RateLimit(burst=COMMANDS, interval=COMMAND_INTERVAL)
-        self._stays = False
-        """Whether the end is kept back only for recorders."""
+        self._stays = False  # whether the end is kept back only for recorders
         self.routes[self.keys.command] = Route(ANYBODY, (Command,), self._on_command)
         self.routes[self.keys.request] = Route(ANYBODY, (Command,), self._on_request)
         self.subscriptions = tuple(self.routes)
-        """Keys to subscribe to before the token is declared."""
 
     # ---------------------------------------------------------------- what the driver needs
 
     @property
     def finished(self) -> bool:
-        """Whether the driver should close."""
         return self.phase == "over"
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages to be woken for."""
         return CLOCK_ALONE if self.phase == "running" else 1
 
     @property
@@ -94,7 +84,6 @@ class RealtimePlant(LivePlantNode):
         return min(self._deadline, self._waiting_timer.due) if self.phase == "gathering" else self._deadline
 
     def start(self, now: float) -> None:
-        """Begin to wait for the agents."""
         if self.timed is not None:
             self.timed.process("start", f"run {self.config.run}, epoch {self.config.epoch}", now)
         self._deadline = now + max(0.0, self.config.wait_for_agents)
@@ -105,7 +94,6 @@ class RealtimePlant(LivePlantNode):
         self._gather(now)
 
     def expire(self, now: float) -> None:
-        """Make the step that is due, or end the wait that is over."""
         if now < self.deadline:
             return
         if self.timed is not None:
@@ -135,7 +123,6 @@ class RealtimePlant(LivePlantNode):
     # ---------------------------------------------------------------- the end
 
     def abort(self, reason: str, now: float) -> None:
-        """End the run because something went wrong."""
         if self.phase not in ("closing", "over"):
             self.outcome = reason
             self.close(reason, now)
@@ -149,7 +136,6 @@ class RealtimePlant(LivePlantNode):
             self.recorder_feed.end()
 
     def close(self, reason: str, now: float) -> None:
-        """End the run and tell all processes."""
         for line in self._warnings.left_out():
             self._tell_warning(line)
         self._say(f"ends: {reason}. {self.pacer}")
@@ -197,7 +183,6 @@ class RealtimePlant(LivePlantNode):
         self._say(f"t = 0; speed {self.config.speed:g}")
 
     def _tell_waiting(self) -> None:
-        """Tell the agents that the plant is there, and the names of the agents that it waits for."""
         waiting = Waiting(sender=PLANT, epoch=self.config.epoch, seq=0, t=self.t, waits_for=self.absent)
         self._publish(self.keys.control, encode(waiting))
 
@@ -265,7 +250,6 @@ class RealtimePlant(LivePlantNode):
         return tuple(self._reporter.latest)
 
     def note_links(self, text: str) -> None:
-        """Note a command to links among the events."""
         self._note_event("link", "links", text)
 
     def _warn(self, text: str, now: float) -> None:
@@ -279,11 +263,15 @@ class RealtimePlant(LivePlantNode):
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         self._reporter.collect()
-        self._telemetry(
-            final=final,
-            reproducible=False,
-            missing_agents=missing_agents,
-            pacing=self.pacer.report(),
-            impaired=self.link_commands.impaired(self.t),
-            others=self.recorder_feed.kept.others(self._reporter.seq),
+        self._send_all(
+            self._reporter.report(
+                self.t,
+                final=final,
+                outcome=self.outcome,
+                reproducible=False,
+                pacing=self.pacer.report(),
+                awaited=missing_agents,
+                impaired=self.link_commands.impaired(self.t),
+                others=self.recorder_feed.kept.others(self._reporter.seq),
+            )
         )

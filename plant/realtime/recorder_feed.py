@@ -4,33 +4,14 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+
+from gridpeers.plant.telemetry_reporter import count_last
 
 KEPT_BYTES, KEPT_BYTES_RECORDED = 4_000_000, 40_000_000
 """Bytes that are kept, without and with journals: two minutes of nine inverters at real time, a part of the
 process's memory."""
 
-AT_ONCE = 20
-"""Messages that are published again in one control period, so that the plant keeps its pace."""
-
-
-BLOCK = 1 << 20
-"""Bytes of a block that messages are copied into. Kept one by one among all else, they would leave a heap full of
-holes: a plant grew by 35 MB in five minutes, with nothing more in use than before."""
-
-
-class _Entry(NamedTuple):
-    """A message that is kept."""
-
-    number: int
-    """Number of the Telemetry that it counts to."""
-    block: bytearray
-    start: int
-    end: int
-
-    @property
-    def payload(self) -> bytes:
-        return bytes(self.block[self.start : self.end])
+AT_ONCE = 20  # messages that are published again in one control period, so that the plant keeps its pace
 
 
 class KeptTelemetry:
@@ -38,103 +19,49 @@ class KeptTelemetry:
 
     Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
     While messages are published again, new ones wait for their turn: a recorder gets all in order.
-
-    Parameters
-    ----------
-    limit : int, optional
-        Bytes that are kept.
-
-    Examples
-    --------
-    >>> kept = KeptTelemetry(limit=8)
-    >>> [kept.add(number, payload) for number, payload in [(0, b"T0"), (1, b"T1"), (2, b"L2"), (2, b"T2"), (3, b"T3")]]
-    [True, True, True, True, True]
-    >>> kept.again_from(0)
-    1
-    >>> kept.add(4, b"T4"), kept.take(3), kept.take(3), kept.add(5, b"T5")
-    (False, [b'T1', b'L2', b'T2'], [b'T3', b'T4'], True)
     """
 
     def __init__(self, limit: int = KEPT_BYTES) -> None:
         self._limit, self._bytes = limit, 0
-        self._kept: deque[_Entry] = deque()
-        self._due: deque[_Entry] = deque()
-        self._block, self._filled = bytearray(), 0
-        self._spare: list[bytearray] = []
-        """Blocks to be filled again."""
-        self._latest, self._count = 0, 0
+        self._kept: deque[tuple[int, bytes]] = deque()
+        self._due: deque[tuple[int, bytes]] = deque()
 
     def add(self, number: int, payload: bytes) -> bool:
         """Keep a message; return whether it is to be published now, and not after those that are published again."""
-        self._latest, self._count = number, self.others(number) + 1
-        entry = self._stored(number, payload)
-        self._kept.append(entry)
+        self._kept.append((number, payload))
         self._bytes += len(payload)
-        while self._bytes > self._limit and self._kept[0].number < number:  # what counts to one Telemetry goes together
-            gone = self._kept[0].number
-            while self._kept[0].number == gone:
-                self._drop()
+        while self._bytes > self._limit and self._kept[0][0] < number:  # what counts to one Telemetry goes together
+            gone = self._kept[0][0]
+            while self._kept[0][0] == gone:
+                self._bytes -= len(self._kept.popleft()[1])
         if self._due:
-            self._due.append(entry)
+            self._due.append((number, payload))
             return False
         return True
 
-    def _stored(self, number: int, payload: bytes) -> _Entry:
-        """Copy a message into a block."""
-        size = len(payload)
-        if self._filled + size > len(self._block):
-            fits = self._spare and size <= BLOCK
-            self._block, self._filled = self._spare.pop() if fits else bytearray(max(BLOCK, size)), 0
-        start = self._filled
-        self._filled = start + size
-        self._block[start : self._filled] = payload
-        return _Entry(number, self._block, start, self._filled)
-
-    def _drop(self) -> None:
-        """Forget the oldest message; its block can be filled again once nothing in it is kept, or to be published."""
-        entry = self._kept.popleft()
-        self._bytes -= entry.end - entry.start
-        if self._kept[0].block is not entry.block and not self._due and len(entry.block) == BLOCK:
-            self._spare.append(entry.block)
-
     def others(self, number: int) -> int:
         """Return the number of messages that count to a Telemetry that is yet to be kept."""
-        return self._count if number == self._latest else 0
+        return count_last(self._kept, number)
 
     def again_from(self, number: int) -> int:
         """Have messages from a number on published again; return the first number that is still kept."""
-        start = min(number, self._due[0].number) if self._due else number
-        self._due = deque(entry for entry in self._kept if entry.number >= start)
-        return max(number, self._kept[0].number) if self._kept else number
+        start = min(number, self._due[0][0]) if self._due else number
+        self._due = deque(entry for entry in self._kept if entry[0] >= start)
+        return max(number, self._kept[0][0]) if self._kept else number
 
-    def take(self, count: int = AT_ONCE) -> list[bytes]:
-        """Take out the messages to publish again now."""
-        return [self._due.popleft().payload for _ in range(min(count, len(self._due)))]
-
-    def take_all(self) -> list[bytes]:
-        """Take out all of them, as the run ends."""
-        return self.take(len(self._due))
+    def take(self, count: int | None = AT_ONCE) -> list[bytes]:
+        """Take out the messages to publish again now; None: all of them, as the run ends."""
+        return [self._due.popleft()[1] for _ in range(len(self._due) if count is None else min(count, len(self._due)))]
 
 
 class RecorderFeed:
-    """The recorders that the run waits for, and what is published for them.
-
-    Parameters
-    ----------
-    needed : Iterable[str]
-        Names of the recorders that the run waits for.
-    publish : Callable[[bytes], None]
-        Publishes bytes on the key of telemetry.
-    limit : int, optional
-        Bytes that are kept.
-    """
+    """The recorders that the run waits for, and what is published for them."""
 
     def __init__(self, needed: Iterable[str], publish: Callable[[bytes], None], limit: int = KEPT_BYTES) -> None:
         self._needed, self._publish = frozenset(needed), publish
         self._out_of_reach: set[str] = set()
         """Recorders whose token went while the run went on, and has not come back."""
-        self.kept = KeptTelemetry(limit)
-        """Messages that recorders can have again."""
+        self.kept = KeptTelemetry(limit)  # messages that recorders can have again
         self.paced = False
         """Whether the plant keeps pace, so that `replay` publishes a little in each period; else all goes at once."""
 
@@ -169,11 +96,9 @@ class RecorderFeed:
             self.replay()
 
     def replay(self) -> None:
-        """Publish again what is due."""
-        for payload in self.kept.take() if self.paced else self.kept.take_all():
+        for payload in self.kept.take(AT_ONCE if self.paced else None):
             self._publish(payload)
 
     def end(self) -> None:
-        """Publish again all that is due, as the run ends."""
         self.paced = False
         self.replay()

@@ -22,30 +22,19 @@ if TYPE_CHECKING:
 NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
 """Error when a run has no emulated links."""
 
-AGAIN = 1.0
-"""Time (s, wall) after which a command that was not acknowledged is sent again."""
+AGAIN = 1.0  # time (s, wall) after which a command that was not acknowledged is sent again
 
 
 class LinkCommandSender:
     """Has the links to the plant and to all agents carry out commands.
 
-    Parameters
-    ----------
-    epoch : int
-        The plant's epoch.
-    keys : Keys
-        The run's.
-    links : Links or None
-        The links to the plant; without any, commands are rejected.
-    publish : Callable[[str, bytes], None]
-        Publishes bytes under a key.
+    `links`: the links to the plant; without any, commands are rejected.
     """
 
     def __init__(self, epoch: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]) -> None:
         self._epoch, self._keys, self._links, self._publish = epoch, keys, links, publish
         self._given: list[LinkRequest] = []
-        self._acknowledged: dict[str, int] = {}
-        """Number of the last command that each agent has acknowledged."""
+        self._acknowledged: dict[str, int] = {}  # number of the last command that each agent has acknowledged
         self._sent: dict[str, tuple[int, float]] = {}
         """Number of the last command that was sent to each agent, and when (s)."""
 
@@ -53,10 +42,7 @@ class LinkCommandSender:
     def links(self) -> Links:
         """The links to the plant.
 
-        Raises
-        ------
-        ValueError
-            If the run has no emulated links.
+        ValueError if the run has no emulated links.
         """
         if self._links is None:
             raise ValueError(NO_LINKS)
@@ -67,15 +53,9 @@ class LinkCommandSender:
 
         It is in force for the plant's own links, and published for recorders; `send` sends it to the agents.
 
-        Returns
-        -------
-        tuple[LinkRequest, str, tuple[str, ...]]
-            The command, what it does in words, and the receivers of the links that it changes.
+        Return the command, what it does in words, and the receivers of the links that it changes.
 
-        Raises
-        ------
-        ValueError
-            If it is no command to links, or the run has no emulated links.
+        ValueError if it is no command to links, or the run has no emulated links.
         """
         text, receivers, _ = self.links.command(tree, t)
         request = self._request(len(self._given) + 1, tree, t, reply_to)
@@ -128,16 +108,11 @@ class LinkCommandSender:
         self._publish(self._keys.answer(answer.reply_to), encode(answer))
 
 
-MOST_SWITCHES = 500
-"""Most switches in a status, which must fit into an answer."""
-
-MOST_LOADS = 150
-"""Most loads with another power than their table's in a status."""
+MOST_SWITCHES = 500  # most switches in a status, which must fit into an answer
+MOST_LOADS = 150  # most loads with another power than their table's in a status
 
 
 class RunCommands:
-    """Carry commands to a plant out."""
-
     def __init__(self, node: RealtimePlant) -> None:
         self._node = node
 
@@ -162,7 +137,6 @@ class RunCommands:
         )
 
     def follow_up(self, command: Command, now: float) -> None:
-        """Do the rest of a command once its answer is out."""
         node = self._node
         agents = node.members.nameplates
         if command.verb == "link":
@@ -173,7 +147,6 @@ class RunCommands:
             node.close("the run was ended by command", now)
 
     def _do(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
-        """Carry a command out; return the text and the data of the answer."""
         verb = command.verb
         if verb == "status":
             status = self.status()

@@ -17,64 +17,36 @@ SETTLING = 0.1
 """Time (s, wall) for which a neighbour must be reported as not heard before that is an event: meanwhile the plant
 itself detects one that is frozen."""
 
-ACQUAINTANCE = 1.0
-"""Time (s, wall) after a join in which agents may not have heard each other yet."""
+ACQUAINTANCE = 1.0  # time (s, wall) after a join in which agents may not have heard each other yet
 
 LISTENED = 2.0
 """Control periods between two steps of the plant that count as time in which it listened; what is beyond it slept."""
 
-RECENT = 3.0
-"""Control periods within which the plant must have heard an agent that a neighbour does not hear."""
+RECENT = 3.0  # control periods within which the plant must have heard an agent that a neighbour does not hear
 
 
 class SilenceDetector:
     """Keep the time at which each agent was heard last, and report silences.
 
-    Parameters
-    ----------
-    max_age : float
-        Age (s of run time) beyond which a state is not used.
-    T_c : float
-        Control period (s of run time).
-    period : float
-        The same in wall time (s).
-
-    Examples
-    --------
-    >>> silence = SilenceDetector(max_age=0.25, T_c=0.02, period=0.02)
-    >>> silence.joined("inv2"); list(silence.take(now=5.0))
-    []
-    >>> [news for step in range(1, 14) for news in silence.take(now=5.0 + 0.02 * step)]
-    [('inv2', 'inv2 is silent: no state for 0.25 s, nothing comes from it')]
-    >>> silence.heard("inv2"); list(silence.take(now=5.28))
-    [('inv2', 'inv2 is heard again')]
-    >>> list(silence.take(now=9.0))
-    []
+    `max_age`: age (s of run time) beyond which a state is not used; `T_c`: control period (s of run time); `period`:
+    the same in wall time (s).
     """
 
     def __init__(self, max_age: float, T_c: float, period: float) -> None:
         self._max_age, self._period = max_age, period
-        self._limit = max_age * period / T_c
-        """The same in wall time (s)."""
-        self._clock = 0.0
-        """Time (s, wall) for which the plant has listened."""
-        self._now: float | None = None
-        """Time of the last update of the clock (s)."""
+        self._limit = max_age * period / T_c  # the same in wall time (s)
+        self._clock = 0.0  # time (s, wall) for which the plant has listened
+        self._now: float | None = None  # time of the last update of the clock (s)
         self._joined: dict[str, float] = {}
-        self._last: dict[str, float] = {}
-        """Time at which each agent was heard last, or joined."""
-        self._holding: set[str] = set()
-        """Agents that report that they have no measurement."""
-        self._failed: set[str] = set()
-        """Agents whose law has failed: they send nothing more."""
+        self._last: dict[str, float] = {}  # time at which each agent was heard last, or joined
+        self._holding: set[str] = set()  # agents that report that they have no measurement
+        self._failed: set[str] = set()  # agents whose law has failed: they send nothing more
         self._silent: set[str] = set()
         self._unheard: dict[str, dict[str, float]] = {}
         """By agent, the neighbours that it does not hear, and the time from which on that is an event."""
-        self._reported: dict[str, set[str]] = {}
-        """By agent, the neighbours whose silence has been an event."""
+        self._reported: dict[str, set[str]] = {}  # by agent, the neighbours whose silence has been an event
 
     def joined(self, name: str) -> None:
-        """Note that an agent takes part from now on."""
         self._joined[name] = self._last[name] = self._clock
 
     def heard(self, name: str, *, failed: bool = False) -> None:
@@ -84,7 +56,6 @@ class SilenceDetector:
         self._holding.discard(name)
 
     def forget(self, name: str) -> None:
-        """Note that an agent does not take part any more."""
         for known in (self._joined, self._last, self._unheard, self._reported):
             known.pop(name, None)
         self._silent.discard(name)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 from gridpeers.plant.equipment import PHASES, Line, LineConfig, Regulator, Switch, Transformer
-from gridpeers.plant.tables.buses import BusTable, is_imported
-from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.buses import BusTable
+from gridpeers.plant.tables.csv_table import CsvRow
 from gridpeers.plant.tables.feeder_columns import (
     MUTUAL,
     MUTUAL_B,
@@ -27,13 +26,13 @@ from gridpeers.plant.tables.feeder_columns import (
 from gridpeers.wire.wording import suggestion
 
 
-def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig] | None:
+def read_line_configs(buses: BusTable) -> dict[str, LineConfig] | None:
     """Read line_configs.csv: the upper triangles of the matrices, one element per row. None if it is unreadable."""
     elements: dict[str, dict[tuple[str, str], tuple[complex, float]]] = {}
     last_row: dict[str, CsvRow[LineConfigColumns]] = {}
     mistaken: dict[str, bool] = {}
     spoiled: set[str] = set()  # an element's place is unknown, so none can be called missing
-    table = CsvTable(folder, "line_configs.csv", LineConfigColumns, problems, required=not is_imported(folder))
+    table = buses.table("line_configs.csv", LineConfigColumns, required=not buses.imported)
     for row in table:
         it, misplaced = row.columns, not row.wrong.isdisjoint(("config", "phase_1", "phase_2"))
         name, first, second = it.config, it.phase_1, it.phase_2
@@ -72,12 +71,10 @@ def read_line_configs(folder: Path, problems: list[str]) -> dict[str, LineConfig
     return configs if table.readable else None
 
 
-def read_lines(
-    folder: Path, buses: BusTable, configs: dict[str, LineConfig] | None, problems: list[str]
-) -> tuple[Line, ...]:
+def read_lines(buses: BusTable, configs: dict[str, LineConfig] | None) -> tuple[Line, ...]:
     """Read lines.csv; lengths in m."""
     lines: dict[str, Line] = {}
-    for row in CsvTable(folder, "lines.csv", LineColumns, problems, required=not is_imported(folder)):
+    for row in buses.table("lines.csv", LineColumns, required=not buses.imported):
         name, config, phases = row.columns.line, row.columns.config, row.columns.phases
         ends = buses.find_ends(row, phases)
         if configs is None or not config:
@@ -88,9 +85,7 @@ def read_lines(
             )
         elif not set(phases) <= set(configs[config].phases):
             row.problem(f'config "{config}" is for phases {configs[config].phases}, the line carries {phases}')
-        if name in lines:
-            row.problem(f'line "{name}": there is one of this name already; names must differ')
-        elif ends:
+        if row.is_new("line", name, lines) and ends:
             buses.require_equal_voltage(row, ends, "line")
             lines[name] = Line(
                 name=name,
@@ -103,11 +98,11 @@ def read_lines(
     return tuple(lines.values())
 
 
-def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Switch, ...]:
+def read_switches(buses: BusTable) -> tuple[Switch, ...]:
     """Read switches.csv; a switch is named by its buses ("13-152"), column alias may give a second name."""
     switches: list[Switch] = []
     names: set[str] = set()
-    for row in CsvTable(folder, "switches.csv", SwitchColumns, problems):
+    for row in buses.table("switches.csv", SwitchColumns):
         phases, alias, closed = row.columns.phases, row.columns.alias, row.columns.state == "closed"
         ends = buses.find_ends(row, phases)
         if not ends:
@@ -115,19 +110,19 @@ def read_switches(folder: Path, buses: BusTable, problems: list[str]) -> tuple[S
         buses.require_equal_voltage(row, ends, "switch")
         one, other = ends[0].name, ends[1].name
         name = f"{one}-{other}"
-        for taken in [text for text in (name, alias) if text in names]:
-            row.problem(f'switch "{taken}": there is one of this name already; names must differ')
+        for text in (name, alias):
+            row.is_new("switch", text, names)
         switch = Switch(name=name, alias=alias, from_bus=one, to_bus=other, phases=phases, closed=closed)
         names.update(switch.names)
         switches.append(switch)
     return tuple(switches)
 
 
-def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Regulator, ...]:
+def read_regulators(buses: BusTable) -> tuple[Regulator, ...]:
     """Read regulators.csv; one row for all phases that stand on the same tap."""
     regulators: list[Regulator] = []
     seen: set[tuple[str, str]] = set()
-    for row in CsvTable(folder, "regulators.csv", RegulatorColumns, problems):
+    for row in buses.table("regulators.csv", RegulatorColumns):
         name, phases = row.columns.regulator, row.columns.phases
         ends = buses.find_ends(row, phases)
         ratio = 1.0 + row.columns.tap * row.columns.tap_step_pu
@@ -149,18 +144,15 @@ def read_regulators(folder: Path, buses: BusTable, problems: list[str]) -> tuple
     return tuple(regulators)
 
 
-def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Transformer, ...]:
-    """Read transformers.csv; impedances in percent of the rating."""
+def read_transformers(buses: BusTable) -> tuple[Transformer, ...]:
     transformers: dict[str, Transformer] = {}
-    for row in CsvTable(folder, "transformers.csv", TransformerColumns, problems):
+    for row in buses.table("transformers.csv", TransformerColumns):
         it, name = row.columns, row.columns.transformer
         ends = buses.find_ends(row, "ABC")
         if ends:
             most = power_of("a transformer", min(end.V_nom for end in ends), RATED_CURRENT, 3)
             row.require("S_rated_kVA", replace(most, low=1.0))
-        if name in transformers:
-            row.problem(f'transformer "{name}": there is one of this name already; names must differ')
-        elif ends:
+        if row.is_new("transformer", name, transformers) and ends:
             transformers[name] = Transformer(
                 name=name,
                 from_bus=ends[0].name,
@@ -173,13 +165,7 @@ def read_transformers(folder: Path, buses: BusTable, problems: list[str]) -> tup
 
 
 def _positive_definite(matrix: tuple[tuple[float, ...], ...]) -> bool:
-    """Return whether a symmetric matrix of up to three rows is positive definite, by its leading minors.
-
-    Examples
-    --------
-    >>> _positive_definite(((2.0, 1.0), (1.0, 2.0))), _positive_definite(((1.0, 2.0), (2.0, 1.0)))
-    (True, False)
-    """
+    """Return whether a symmetric matrix of up to three rows is positive definite, by its leading minors."""
     (a, *ab), rest = matrix[0], matrix[1:]
     if a <= 0.0:
         return False

@@ -2,47 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from math import sqrt
 from pathlib import Path
 from typing import Any
 
 from gridpeers.plant.equipment import PHASES, Bus, Feeder
 from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus
-from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.csv_table import C, CsvRow, CsvTable
 from gridpeers.plant.tables.feeder_columns import BusColumns, ImportedBusColumns
 from gridpeers.wire.wording import first_of, suggestion
 
-_SHOWN = 24
-"""So many buses that are cut off are named."""
-
-
-GROUND_NEEDED = (
-    'bus "{bus}" stands behind a delta winding without ground, and {what} needs ground; '
-    "use delta loads there, or a Yg-Yg transformer"
-)
-"""Problem of equipment between a phase and ground where no current can return through ground."""
-
-
-def is_imported(folder: Path) -> bool:
-    """Return whether a feeder comes from another program: it then needs no lines of our own."""
-    return (folder / "elements.csv").is_file()
+_SHOWN = 24  # so many buses that are cut off are named
 
 
 class BusTable:
-    """Reads buses.csv and checks references to buses.
-
-    Attributes
-    ----------
-    rows : tuple of Bus
-        The buses, in the table's order.
-    """
+    """Reads buses.csv and checks references to buses; the other tables come from its folder, with its problems."""
 
     def __init__(self, folder: Path, problems: list[str]) -> None:
+        self._folder, self.problems = folder, problems
+        self.imported = (folder / "elements.csv").is_file()
+        """Whether the feeder comes from another program: it then needs no lines of our own."""
         self._by_name: dict[str, Bus] = {}
         self._row_of: dict[str, CsvRow[BusColumns]] = {}
-        columns = ImportedBusColumns if is_imported(folder) else BusColumns
-        table = CsvTable(folder, "buses.csv", columns, problems, required=True)
+        table = self.table("buses.csv", ImportedBusColumns if self.imported else BusColumns, required=True)
         self._readable = table.readable and len(table) > 0
         if table.readable and not len(table):
             problems.append("buses.csv: has no rows; a feeder needs at least one bus")
@@ -50,16 +33,16 @@ class BusTable:
             it = row.columns
             name, V_nom = it.bus, it.V_nom_kV_LL * 1000.0 / sqrt(3.0)
             bus = Bus(name=name, phases=it.phases, V_nom=V_nom, zone=it.zone, x=it.x, y=it.y)
-            if name in self._by_name:
-                row.problem(f'bus "{name}": there is one of this name already; names must differ')
-            elif name:
+            if row.is_new("bus", name, self._by_name) and name:
                 self._by_name[name] = bus
                 self._row_of[name] = row
         self.rows = tuple(self._by_name.values())
-        self._floating: set[str] = set()
+        self.floating: set[str] = set()
+
+    def table(self, file: str, columns: type[C], *, required: bool = False) -> CsvTable[C]:
+        return CsvTable(self._folder, file, columns, self.problems, required=required)
 
     def find(self, row: CsvRow[Any], column: str = "bus") -> Bus | None:
-        """Read a reference to a bus; None, and a problem noted, if there is no such bus."""
         return self.named(row, column, getattr(row.columns, column))
 
     def named(self, row: CsvRow[Any], column: str, name: str) -> Bus | None:
@@ -74,20 +57,13 @@ class BusTable:
         ends = self.find(row, "from_bus"), self.find(row, "to_bus")
         for bus in dict.fromkeys(ends):
             if bus is not None:
-                self.require_phases(row, bus, phases)
+                require_phases(row, bus, phases)
         if ends[0] is None or ends[1] is None:
             return None
         if ends[0].name == ends[1].name:
             row.problem(f'both ends are bus "{ends[0].name}"; a branch needs two buses')
             return None
         return ends[0], ends[1]
-
-    def require_phases(self, row: CsvRow[Any], bus: Bus, phases: Iterable[str]) -> bool:
-        """Note a problem if the bus lacks one of the phases; tell whether all is well."""
-        missing = [phase for phase in phases if phase not in bus.phases]
-        if missing:
-            row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
-        return not missing
 
     def require_equal_voltage(self, row: CsvRow[Any], ends: tuple[Bus, Bus], what: str) -> None:
         """Note a problem if something that is no transformer joins two nominal voltages."""
@@ -100,17 +76,31 @@ class BusTable:
 
     def mark_floating(self, names: Iterable[str]) -> None:
         """Note that buses stand behind a delta winding, where no current can return through ground."""
-        self._floating.update(names)
+        self.floating.update(names)
 
     def require_ground(self, row: CsvRow[Any], bus: Bus, what: str) -> bool:
-        """Note a problem if something connected to ground stands behind a delta winding; tell whether all is well."""
-        if bus.name in self._floating:
-            row.problem(GROUND_NEEDED.format(bus=bus.name, what=what))
-        return bus.name not in self._floating
+        return require_ground(row, bus, what, self.floating)
 
     def row_of(self, name: str) -> CsvRow[BusColumns]:
-        """Give the table's row of a bus, to note a problem there."""
         return self._row_of[name]
+
+
+def require_phases(row: CsvRow[Any], bus: Bus, phases: Iterable[str]) -> bool:
+    """Note a problem if the bus lacks one of the phases; return whether it has all."""
+    missing = [phase for phase in phases if phase not in bus.phases]
+    if missing:
+        row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
+    return not missing
+
+
+def require_ground(row: CsvRow[Any], bus: Bus, what: str, floating: Container[str]) -> bool:
+    """Note a problem if something connected to ground stands behind a delta winding; return whether it does not."""
+    if bus.name in floating:
+        row.problem(
+            f'bus "{bus.name}" stands behind a delta winding without ground, and {what} needs ground; '
+            "use delta loads there, or a Yg-Yg transformer"
+        )
+    return bus.name not in floating
 
 
 def report_unconnected(feeder: Feeder, buses: BusTable, problems: list[str]) -> None:

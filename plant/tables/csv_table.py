@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar, get_args, get_origin
@@ -24,24 +24,12 @@ C = TypeVar("C", bound=msgspec.Struct)
 class PhaseLetters:
     """Annotation of a text that is a set of phases, such as "ABC" or "AC"."""
 
-    stand_in: str = ""
-    """Phases in place of wrong ones; no later check asks anything of no phase."""
-    others: bool = False
-    """Whether letters of further nodes may stand behind them (`gridpeers.plant.equipment.NODES`)."""
+    stand_in: str = ""  # phases in place of wrong ones; no later check asks anything of no phase
+    others: bool = False  # whether letters of further nodes may stand behind them (`gridpeers.plant.equipment.NODES`)
 
 
 class CsvRow(Generic[C]):
-    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN.
-
-    Attributes
-    ----------
-    columns : C
-        Its values.
-    mistaken : bool
-        Whether a problem was noted so far.
-    wrong : set[str]
-        Columns whose cells are wrong.
-    """
+    """One line of a table. A wrong cell is noted, and has a harmless stand-in: of a number NaN."""
 
     def __init__(self, table: type[C], where: str, cells: Mapping[str, str], problems: list[str]) -> None:
         self._table, self._where, self._problems = table, where, problems
@@ -51,9 +39,14 @@ class CsvRow(Generic[C]):
         self.columns = table(**values)
 
     def problem(self, text: str) -> None:
-        """Note that something is wrong with this row."""
         self.mistaken = True
         self._problems.append(f"{self._where}: {text}")
+
+    def is_new(self, what: str, name: str, known: Container[str]) -> bool:
+        """Note a problem if there is one of this name already; return whether there is none."""
+        if name in known:
+            self.problem(f'{what} "{name}": there is one of this name already; names must differ')
+        return name not in known
 
     def require(self, column: str, plausible: Plausible) -> bool:
         """Note a number that is not plausible, beside what its column asks of it; return whether it is."""
@@ -108,23 +101,11 @@ def _converted(field: Field, cell: str) -> tuple[Any, str]:
 class CsvTable(Generic[C]):
     """A CSV file with one header line. Columns beyond the declared ones are free (origin, note).
 
-    Parameters
-    ----------
-    folder : Path
-        Folder of the feeder.
-    file : str
-        Name of the file in it.
-    columns : type[C]
-        Struct that declares the columns; one without a default must be there.
-    problems : list of str
-        Takes the problems; those of a row when the row is reached.
-    required : bool
-        Whether it is a problem if the file does not exist; else it then has no rows.
+    `columns`: struct that declares the columns; one without a default must be there; `problems`: takes the problems;
+    those of a row when the row is reached; `required`: whether it is a problem if the file does not exist; else it then
+    has no rows.
 
-    Attributes
-    ----------
-    readable : bool
-        Whether its rows are what the file says; if not, references to them cannot be judged.
+    `readable`: whether its rows are what the file says; if not, references to them cannot be judged.
     """
 
     def __init__(
@@ -184,5 +165,4 @@ class CsvTable(Generic[C]):
 
 
 def required_columns(columns: type[msgspec.Struct]) -> list[str]:
-    """Return the columns that a table must have."""
     return [field.key for field in fields_of(columns) if field.required]

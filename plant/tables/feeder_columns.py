@@ -49,89 +49,62 @@ BankVar = Annotated[float, Unit("kvar"), Range(low=0.0), "Reactive power at V_ra
 class BusColumns(msgspec.Struct, frozen=True, kw_only=True):
     """buses.csv: the order of the rows is the order of the nodes everywhere."""
 
-    bus: str
-    """Name."""
-    phases: Annotated[str, PhaseLetters(stand_in="ABC")]
-    """Phases that it has."""
+    bus: Annotated[str, "Name."]
+    phases: Annotated[str, PhaseLetters(stand_in="ABC"), "Phases that it has."]
     V_nom_kV_LL: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.1, 800.0, above_zero=True)]
     """Nominal voltage, line-to-line."""
-    zone: str = ""
-    """Part of the feeder."""
-    x: float = 0.0
-    """Place in a drawing (any unit)."""
-    y: float = 0.0
-    """Place in a drawing (any unit)."""
+    zone: Annotated[str, "Part of the feeder."] = ""
+    x: Annotated[float, "Place in a drawing (any unit)."] = 0.0
+    y: Annotated[float, "Place in a drawing (any unit)."] = 0.0
 
 
 class ImportedBusColumns(BusColumns, frozen=True, kw_only=True):
     """buses.csv of a feeder with elements.csv: neutrals and the like are further letters of `phases`, 4, 5, ...."""
 
-    phases: Annotated[str, PhaseLetters(stand_in="ABC", others=True)]
-    """Phases and further nodes that it has."""
+    phases: Annotated[str, PhaseLetters(stand_in="ABC", others=True), "Phases and further nodes that it has."]
 
 
 class LineColumns(msgspec.Struct, frozen=True, kw_only=True):
     """lines.csv."""
 
-    line: str
-    """Name."""
-    from_bus: str
-    """One end."""
-    to_bus: str
-    """The other end."""
-    phases: Phases
-    """Phases that it carries."""
-    config: str
-    """Its impedances, by their name in line_configs.csv."""
-    length_m: Annotated[float, Unit("m"), Plausible("the length of a line", 0.1, 1e5, above_zero=True)]
-    """Length."""
+    line: Annotated[str, "Name."]
+    from_bus: Annotated[str, "One end."]
+    to_bus: Annotated[str, "The other end."]
+    phases: Annotated[Phases, "Phases that it carries."]
+    config: Annotated[str, "Its impedances, by their name in line_configs.csv."]
+    length_m: Annotated[float, Unit("m"), Plausible("the length of a line", 0.1, 1e5, above_zero=True), "Length."]
 
 
 class LineConfigColumns(msgspec.Struct, frozen=True, kw_only=True):
     """line_configs.csv: one element of the upper triangle of the matrices a row, at nominal frequency."""
 
-    config: str
-    """Name of the configuration."""
-    phase_1: Annotated[Literal["A", "B", "C"], Label("phase")]
-    """Row of the element."""
-    phase_2: Annotated[Literal["A", "B", "C"], Label("phase")]
-    """Column of the element."""
-    R_ohm_per_km: OhmPerKm
-    """Resistance; above 0 on the diagonal."""
-    X_ohm_per_km: OhmPerKm
-    """Reactance; above 0 on the diagonal."""
-    B_uS_per_km: Annotated[float, Unit("uS/km")]
-    """Shunt susceptance."""
+    config: Annotated[str, "Name of the configuration."]
+    phase_1: Annotated[Literal["A", "B", "C"], Label("phase"), "Row of the element."]
+    phase_2: Annotated[Literal["A", "B", "C"], Label("phase"), "Column of the element."]
+    R_ohm_per_km: Annotated[OhmPerKm, "Resistance; above 0 on the diagonal."]
+    X_ohm_per_km: Annotated[OhmPerKm, "Reactance; above 0 on the diagonal."]
+    B_uS_per_km: Annotated[float, Unit("uS/km"), "Shunt susceptance."]
 
 
 class SwitchColumns(msgspec.Struct, frozen=True, kw_only=True):
     """switches.csv: a switch is called by its buses, "13-152", or by its alias, "sw1_2"."""
 
-    from_bus: str
-    """One end."""
-    to_bus: str
-    """The other end."""
+    from_bus: Annotated[str, "One end."]
+    to_bus: Annotated[str, "The other end."]
     phases: Annotated[str, PhaseLetters(others=True)]
     """Phases that it switches, and further nodes where its buses have some."""
-    state: Annotated[Literal["closed", "open"], Label("state of a switch")]
-    """Position at the start."""
-    alias: str = ""
-    """Second name."""
+    state: Annotated[Literal["closed", "open"], Label("state of a switch"), "Position at the start."]
+    alias: Annotated[str, "Second name."] = ""
 
 
 class RegulatorColumns(msgspec.Struct, frozen=True, kw_only=True):
     """regulators.csv: V_to = (1 + tap tap_step_pu) V_from, fixed; one row for all phases on the same tap."""
 
-    regulator: str
-    """Name."""
-    from_bus: str
-    """Input."""
-    to_bus: str
-    """Output."""
-    phases: Phases
-    """Phases on this tap."""
-    tap: float
-    """Number of steps, as in 5 or -3."""
+    regulator: Annotated[str, "Name."]
+    from_bus: Annotated[str, "Input."]
+    to_bus: Annotated[str, "Output."]
+    phases: Annotated[Phases, "Phases on this tap."]
+    tap: Annotated[float, "Number of steps, as in 5 or -3."]
     tap_step_pu: Annotated[float, Unit("pu"), Plausible("a step of a regulator", 1e-5, 0.25, above_zero=True)]
     """Length of a step, 0.00625 as a rule."""
 
@@ -139,12 +112,9 @@ class RegulatorColumns(msgspec.Struct, frozen=True, kw_only=True):
 class TransformerColumns(msgspec.Struct, frozen=True, kw_only=True):
     """transformers.csv: rated voltages are the nominal voltages of the buses. Behind D-D nothing has ground."""
 
-    transformer: str
-    """Name."""
-    from_bus: str
-    """One side."""
-    to_bus: str
-    """The other side."""
+    transformer: Annotated[str, "Name."]
+    from_bus: Annotated[str, "One side."]
+    to_bus: Annotated[str, "The other side."]
     connection: Annotated[Literal["D-D", "Yg-Yg"], Label("connection of a transformer")]
     """Delta on both sides, or star with ground on both."""
     S_rated_kVA: Annotated[float, Unit("kVA"), Plausible("the rating of a transformer", 1.0, 1e6, above_zero=True)]
@@ -158,12 +128,9 @@ class TransformerColumns(msgspec.Struct, frozen=True, kw_only=True):
 class LoadColumns(msgspec.Struct, frozen=True, kw_only=True):
     """loads_SET.csv: powers per phase; for a delta load a, b, c are A-B, B-C, C-A."""
 
-    bus: str
-    """Its bus."""
-    connection: Annotated[Literal["Y", "D"], Label("connection of a load")]
-    """Star with ground, or delta."""
-    model: Annotated[Literal["P", "I", "Z"], Label("load model")]
-    """Constant power, current or impedance."""
+    bus: Annotated[str, "Its bus."]
+    connection: Annotated[Literal["Y", "D"], Label("connection of a load"), "Star with ground, or delta."]
+    model: Annotated[Literal["P", "I", "Z"], Label("load model"), "Constant power, current or impedance."]
     P_a_kW: LoadW
     Q_a_kvar: LoadVar
     P_b_kW: LoadW
@@ -175,8 +142,7 @@ class LoadColumns(msgspec.Struct, frozen=True, kw_only=True):
 class CapacitorColumns(msgspec.Struct, frozen=True, kw_only=True):
     """capacitors.csv: banks from phase to ground."""
 
-    bus: str
-    """Its bus."""
+    bus: Annotated[str, "Its bus."]
     Q_a_kvar: BankVar
     Q_b_kvar: BankVar
     Q_c_kvar: BankVar
@@ -189,14 +155,10 @@ class CapacitorColumns(msgspec.Struct, frozen=True, kw_only=True):
 class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """inverters.csv: nameplates and places, at most one inverter on each phase of a bus."""
 
-    name: str
-    """Name, a part of keys on the wire."""
-    kind: Annotated[Literal["GFM", "GFL"], Label("kind of inverter")]
-    """Grid-forming or grid-following."""
-    bus: str
-    """Its bus."""
-    microgrid: str
-    """Name of its microgrid."""
+    name: Annotated[str, "Name, a part of keys on the wire."]
+    kind: Annotated[Literal["GFM", "GFL"], Label("kind of inverter"), "Grid-forming or grid-following."]
+    bus: Annotated[str, "Its bus."]
+    microgrid: Annotated[str, "Name of its microgrid."]
     P_rated_kW: Annotated[float, Unit("kW"), Plausible("the rating of an inverter", 0.01, 1e6, above_zero=True)]
     """Rated power of all its phases, the base of its per-unit values."""
     m_p_pu: Annotated[float, Unit("pu"), Plausible("a P-f droop", 0.001, 0.2, above_zero=True)]
@@ -205,8 +167,7 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """Q-V droop (pu voltage per pu reactive power)."""
     phases: Literal["ABC", "A", "B", "C"] = "ABC"
     """Phases of the bus at which it stands: all three, or one for a single-phase inverter."""
-    spare: Literal["", "yes"] = ""
-    """"yes" if it stands by, switched off, until an agent comes for it."""
+    spare: Annotated[Literal["", "yes"], '"yes" if it stands by, switched off, until an agent comes for it.'] = ""
     parameters: str = ""
     """Name of its set of parameters in inverter_parameters.csv; empty: those of its kind."""
     neutral: str = ""
@@ -216,21 +177,16 @@ class InverterColumns(msgspec.Struct, frozen=True, kw_only=True):
 class ParameterColumns(msgspec.Struct, frozen=True, kw_only=True):
     """inverter_parameters.csv: parameters of single inverters, one a row; a set is all rows of its name."""
 
-    set: str
-    """Name of the set, which inverters.csv gives in `parameters`."""
-    key: str
-    """Which parameter, as in the tables [plant.gfm] and [plant.gfl] of a scenario: P_max_pu."""
-    value: str
-    """Its value."""
+    set: Annotated[str, "Name of the set, which inverters.csv gives in `parameters`."]
+    key: Annotated[str, "Which parameter, as in the tables [plant.gfm] and [plant.gfl] of a scenario: P_max_pu."]
+    value: Annotated[str, "Its value."]
 
 
 class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
     """source.csv: the substation, a stiff voltage, at most one. Without it only inverters feed."""
 
-    bus: str
-    """Its bus, of three phases."""
-    V_pu: Annotated[float, Unit("pu"), SOURCE_VOLTAGE]
-    """Voltage."""
+    bus: Annotated[str, "Its bus, of three phases."]
+    V_pu: Annotated[float, Unit("pu"), SOURCE_VOLTAGE, "Voltage."]
     angle_deg: Annotated[float, Unit("deg"), Plausible("the angle of the substation", -360.0, 360.0)]
     """Angle of phase A."""
 
@@ -238,45 +194,32 @@ class SourceColumns(msgspec.Struct, frozen=True, kw_only=True):
 class ElementColumns(msgspec.Struct, frozen=True, kw_only=True):
     """elements.csv: linear elements of a feeder that comes from another program, by their admittances."""
 
-    element: str
-    """Name, as in that program: "transformer.sub"."""
-    nodes: str
-    """Its nodes, bus.phase, with spaces between them."""
-    Y_S: str
-    """Its primitive admittance matrix (S), row by row, with spaces between the numbers: 1.5-2.5j."""
+    element: Annotated[str, 'Name, as in that program: "transformer.sub".']
+    nodes: Annotated[str, "Its nodes, bus.phase, with spaces between them."]
+    Y_S: Annotated[str, "Its primitive admittance matrix (S), row by row, with spaces between the numbers: 1.5-2.5j."]
 
 
 class LoadPartColumns(msgspec.Struct, frozen=True, kw_only=True):
     """load_parts_SET.csv: loads of such a feeder, each phase by itself; its power goes with powers of the voltage."""
 
-    load: str
-    """Name, as in that program."""
-    bus: str
-    """Its bus."""
-    from_phase: str
-    """One end."""
-    to_phase: str = ""
-    """The other end; empty for ground."""
+    load: Annotated[str, "Name, as in that program."]
+    bus: Annotated[str, "Its bus."]
+    from_phase: Annotated[str, "One end."]
+    to_phase: Annotated[str, "The other end; empty for ground."] = ""
     P_kW: LoadW
     Q_kvar: LoadVar
     V_nom_kV: Annotated[float, Unit("kV", in_key=False), Plausible("a nominal voltage", 0.01, 150.0, above_zero=True)]
     """Nominal voltage across it."""
     n_P: Exponent = 0.0
     """Power of the voltage with which P goes: 0 constant power, 1 constant current, 2 constant impedance."""
-    n_Q: Exponent = 0.0
-    """The same for Q."""
-    V_low_pu: LimitOfV = 0.0
-    """Voltage below which it is its nominal impedance."""
+    n_Q: Annotated[Exponent, "The same for Q."] = 0.0
+    V_low_pu: Annotated[LimitOfV, "Voltage below which it is its nominal impedance."] = 0.0
     V_min_pu: LimitOfV = 0.0
     """Voltage below which it turns into that impedance, or whose current it keeps if V_low is the same; 0: nowhere."""
-    V_max_pu: LimitOfV = 0.0
-    """Voltage above which it is an impedance; 0: nowhere."""
-    edge: Exponent = 0.0
-    """Exponent by which its current meets these limits."""
-    V_off_pu: LimitOfV = 0.0
-    """Voltage below which it drops out; 0: it never does."""
-    V_off_above_pu: LimitOfV = 0.0
-    """Voltage above which it drops out; 0: it never does."""
+    V_max_pu: Annotated[LimitOfV, "Voltage above which it is an impedance; 0: nowhere."] = 0.0
+    edge: Annotated[Exponent, "Exponent by which its current meets these limits."] = 0.0
+    V_off_pu: Annotated[LimitOfV, "Voltage below which it drops out; 0: it never does."] = 0.0
+    V_off_above_pu: Annotated[LimitOfV, "Voltage above which it drops out; 0: it never does."] = 0.0
 
 
 class Manifest(msgspec.Struct, frozen=True, kw_only=True):
@@ -301,29 +244,12 @@ TABLES: dict[str, type[msgspec.Struct]] = {
 }
 """Tables of a feeder by their files, beside its load sets."""
 
-LOAD_SETS = ("loads_", "load_parts_")
-"""How the files of a load set begin."""
+LOAD_SETS: dict[str, type[msgspec.Struct]] = {"loads_": LoadColumns, "load_parts_": LoadPartColumns}
+"""Tables of a load set, by the beginnings of their files."""
 
 
 def power_of(what: str, V_nom: float, current: float, phases: int) -> Plausible:
-    """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound.
-
-    Parameters
-    ----------
-    what : str
-        Its load, bank or machine.
-    V_nom : float
-        Nominal voltage (V, line-to-neutral).
-    current : float
-        Greatest current (A per phase).
-    phases : int
-        How many phases carry the power.
-
-    Examples
-    --------
-    >>> power_of("a load", 2400.0, 2000.0, 1)
-    Plausible(what='a load on a phase of 4.16 kV', low=-4800.0, high=4800.0, above_zero=False, hint='')
-    """
+    """Return the range of a power (kW, kvar, kVA) whose current (A per phase) stays below a bound."""
     if math.isnan(V_nom):  # the bus has its own problem
         return Plausible(what, -math.inf, math.inf)
     high = phases * V_nom * current / 1e3

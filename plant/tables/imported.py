@@ -3,36 +3,32 @@
 from __future__ import annotations
 
 from cmath import isfinite
-from pathlib import Path
 from typing import Any
 
 from gridpeers.plant.equipment import Bus
 from gridpeers.plant.equipment.imported_equipment import LinearElement, LoadPart
-from gridpeers.plant.tables.buses import BusTable
-from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.buses import BusTable, require_phases
+from gridpeers.plant.tables.csv_table import CsvRow
 from gridpeers.plant.tables.feeder_columns import PART_CURRENT, ElementColumns, LoadPartColumns, power_of
 
 Matrix = tuple[tuple[complex, ...], ...]
 
 
-def read_elements(folder: Path, buses: BusTable, problems: list[str]) -> tuple[LinearElement, ...]:
-    """Read elements.csv: names, nodes and admittance matrices."""
+def read_elements(buses: BusTable) -> tuple[LinearElement, ...]:
     elements: dict[str, LinearElement] = {}
-    for row in CsvTable(folder, "elements.csv", ElementColumns, problems):
+    for row in buses.table("elements.csv", ElementColumns):
         it = row.columns
         nodes = [_node(row, text, buses) for text in it.nodes.split()]
         Y = _matrix(row, it.Y_S, len(nodes))
-        if it.element in elements:
-            row.problem(f'element "{it.element}": there is one of this name already; names must differ')
-        elif Y is not None and all(nodes):
+        if row.is_new("element", it.element, elements) and Y is not None and all(nodes):
             elements[it.element] = LinearElement(name=it.element, nodes=tuple(filter(None, nodes)), Y=Y)
     return tuple(elements.values())
 
 
-def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str]) -> tuple[LoadPart, ...]:
+def read_load_parts(buses: BusTable, file: str) -> tuple[LoadPart, ...]:
     """Read load_parts_SET.csv: the parts of loads, between two phases of a bus, or a phase and ground."""
     parts: list[LoadPart] = []
-    for row in CsvTable(folder, file, LoadPartColumns, problems):
+    for row in buses.table(file, LoadPartColumns):
         it, bus = row.columns, buses.find(row)
         many = [key for key in ("from_phase", "to_phase") if len(getattr(it, key)) > 1]
         for key in many:
@@ -43,7 +39,7 @@ def read_load_parts(folder: Path, file: str, buses: BusTable, problems: list[str
             row.problem(f"V_max_pu: {it.V_max_pu:g} pu must be above V_min_pu, {it.V_min_pu:g} pu")
         for column in ("P_kW", "Q_kvar"):
             row.require(column, power_of("a load", 1e3 * it.V_nom_kV, PART_CURRENT, 1))
-        if bus is None or many or not buses.require_phases(row, bus, it.from_phase + it.to_phase):
+        if bus is None or many or not require_phases(row, bus, it.from_phase + it.to_phase):
             continue
         if it.from_phase == it.to_phase:
             row.problem(f"both ends are phase {it.from_phase}; a load is between two phases, or a phase and ground")
@@ -73,7 +69,7 @@ def _node(row: CsvRow[Any], text: str, buses: BusTable) -> tuple[str, str] | Non
         row.problem(f'nodes: "{text}" is no node; write a bus and one of its phases, as "650.A"')
         return None
     bus: Bus | None = buses.named(row, "nodes", name)
-    if bus is None or not buses.require_phases(row, bus, phase):
+    if bus is None or not require_phases(row, bus, phase):
         return None
     return bus.name, phase
 

@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from gridpeers.plant.equipment.inverter_parameters import InverterParameters, OwnParameters, foreign, with_published
-from gridpeers.plant.tables.csv_table import CsvTable
+from gridpeers.plant.tables.buses import BusTable
 from gridpeers.plant.tables.feeder_columns import ParameterColumns
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.schema.table_schema import contradictions, fields_of
 from gridpeers.wire.wording import suggestion
 
-FILE = "inverter_parameters.csv"
-"""Name of the file; a feeder without it has no such sets."""
+FILE = "inverter_parameters.csv"  # name of the file; a feeder without it has no such sets
 
 
-def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParameters] | None:
+def read_parameter_sets(buses: BusTable) -> dict[str, OwnParameters] | None:
     """Read inverter_parameters.csv, or return None if it is unreadable.
 
     Which inverter has a set decides whether it can have its parameters: `gridpeers.plant.tables.shunts` asks.
     """
     values: dict[str, dict[str, float | bool | str]] = {}
-    table = CsvTable(folder, FILE, ParameterColumns, problems)
+    table = buses.table(FILE, ParameterColumns)
     for row in table:
         it = row.columns
         before = values.setdefault(it.set, {})
@@ -38,18 +36,12 @@ def read_parameter_sets(folder: Path, problems: list[str]) -> dict[str, OwnParam
             before[it.key] = value
     sets = {name: read_table(OwnParameters, own)[0] for name, own in values.items()}
     for name, own in sets.items():
-        problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
+        buses.problems += [f'{FILE}: set "{name}": {path}: {text}' for path, text in contradictions(OwnParameters, own)]
     return sets if table.readable else None
 
 
 def value_of(cell: str) -> float | bool | str:
-    """Return the value that a cell means: true, false, a number, or a text.
-
-    Examples
-    --------
-    >>> value_of("0.02"), value_of("true"), value_of("current_source")
-    (0.02, True, 'current_source')
-    """
+    """Return the value that a cell means: true, false, a number, or a text."""
     if cell in ("true", "false"):
         return cell == "true"
     try:
@@ -66,26 +58,10 @@ def as_set(
 ) -> tuple[str, dict[str, OwnParameters]]:
     """Return the name of the set that an inverter's parameters are, and all sets with it.
 
-    Parameters
-    ----------
-    name
-        Its name, which a new set takes.
-    kind
-        Its kind.
-    params
-        The name of a set, some parameters by their keys in a file, all of them, or none.
-    sets
-        The sets of its feeder; the published ones are known everywhere.
+    `name`: its name, which a new set takes; `params`: the name of a set, some parameters by their keys in a file, all
+    of them, or none.
 
-    Raises
-    ------
-    ValueError
-        With all that is wrong with them.
-
-    Examples
-    --------
-    >>> as_set("inv1", "GFM", {"P_max_pu": 1.2}, {})[0]
-    'inv1'
+    ValueError with all that is wrong.
     """
     if not params:
         return "", dict(sets)

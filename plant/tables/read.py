@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,6 @@ from gridpeers.wire.text_file import TextFileError, text_of
 from gridpeers.wire.wording import suggestion
 
 MANIFEST = "feeder.toml"
-"""Name of the file."""
 
 
 def read_f_nom(folder: Path, problems: list[str]) -> float:
@@ -51,22 +51,16 @@ def _tables(path: Path, problems: list[str]) -> dict[str, Any]:
     return {}
 
 
-DATA = Path(__file__).parents[1] / "data"
-"""Folder of the feeders that come with the package."""
+DATA = Path(__file__).parents[1] / "data"  # folder of the feeders that come with the package
 
 KEPT = 8
 """Feeders that are kept as they were read, by the bytes of their files: to read one again is a tenth of the work."""
-
-_read: dict[tuple[str | bytes, ...], Feeder] = {}
 
 
 class FeederError(ValueError):
     """A feeder that cannot be used, with everything that is wrong with it.
 
-    Attributes
-    ----------
-    problems : tuple of str
-        One sentence each: file, row (the header is row 1), value, what would be right.
+    `problems`: one sentence each: file, row (the header is row 1), value, what would be right.
     """
 
     def __init__(self, feeder: str, problems: tuple[str, ...]) -> None:
@@ -76,13 +70,6 @@ class FeederError(ValueError):
 
 
 def feeders() -> tuple[str, ...]:
-    """Names of the feeders that come with the package.
-
-    Examples
-    --------
-    >>> feeders()
-    ('ieee34', 'microgrid123', 'standard123')
-    """
     return tuple(sorted(path.name for path in DATA.iterdir() if path.is_dir() and path.name != "__pycache__"))
 
 
@@ -94,60 +81,37 @@ def load_sets(folder: Path) -> tuple[str, ...]:
 def read_feeder(feeder: str, load_set: str = "main") -> Feeder:
     """Read all tables of a feeder and check them.
 
-    Parameters
-    ----------
-    feeder : str
-        Name of a feeder in `plant/data`, or the path of a folder of the same layout.
-    load_set : str, optional
-        Which loads: "main" reads loads_main.csv.
+    `feeder`: name of a feeder in `plant/data`, or the path of a folder of the same layout; `load_set`: which loads:
+    "main" reads loads_main.csv.
 
-    Returns
-    -------
-    Feeder
-        Frozen tables in SI units that fit together.
+    FeederError if anything is wrong; it lists all of it.
 
-    Raises
-    ------
-    FeederError
-        If anything is wrong; it lists all of it.
-
-    Examples
-    --------
     >>> feeder = read_feeder("microgrid123", "main")
     >>> len(feeder.buses), [inverter.name for inverter in feeder.inverters if inverter.kind == "GFM"]
     (134, ['inv1', 'inv4', 'inv7'])
     """
     folder = _folder(feeder)
-    key = (str(folder), load_set, *_contents(folder))
-    if (found := _read.get(key)) is None:
-        found = _read_tables(folder, feeder, load_set)
-        while len(_read) >= KEPT:
-            _read.pop(next(iter(_read)), None)
-        _read[key] = found
-    return found
-
-
-def _contents(folder: Path) -> tuple[str | bytes, ...]:
-    """Return the names and bytes of all files that a feeder is read from; none where one is no file."""
     paths = sorted([*folder.glob("*.csv"), *folder.glob(MANIFEST)])
-    return tuple(part for path in paths for part in (path.name, path.read_bytes() if path.is_file() else b""))
+    contents = tuple((path.name, path.read_bytes() if path.is_file() else b"") for path in paths)
+    return _read_tables(folder, feeder, load_set, contents)
 
 
-def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
-    """Read and check all tables; arguments as of `read_feeder`, and the feeder's folder."""
+@lru_cache(KEPT)
+def _read_tables(folder: Path, feeder: str, load_set: str, contents: tuple[tuple[str, bytes], ...]) -> Feeder:
+    """Read and check all tables; with other `contents` of the files a folder is read anew."""
     problems: list[str] = []
     _report_strange_files(folder, problems)
     buses = BusTable(folder, problems)
-    configs = read_line_configs(folder, problems)
-    lines = read_lines(folder, buses, configs, problems)
-    switches = read_switches(folder, buses, problems)
-    regulators = read_regulators(folder, buses, problems)
-    transformers = read_transformers(folder, buses, problems)
+    configs = read_line_configs(buses)
+    lines = read_lines(buses, configs)
+    switches = read_switches(buses)
+    regulators = read_regulators(buses)
+    transformers = read_transformers(buses)
     buses.mark_floating(buses_without_ground(transformers, lines, [*switches, *regulators]))
     sets = load_sets(folder)
     if load_set in sets:
         needed = not (folder / f"load_parts_{load_set}.csv").is_file()
-        loads = read_loads(folder, f"loads_{load_set}.csv", buses, problems, required=needed)
+        loads = read_loads(buses, f"loads_{load_set}.csv", required=needed)
     else:
         loads, columns = (), ", ".join(required_columns(LoadColumns))
         problems.append(
@@ -155,16 +119,16 @@ def _read_tables(folder: Path, feeder: str, load_set: str) -> Feeder:
             if sets
             else f"loads_{load_set}.csv: no such file; a feeder needs it, with the columns {columns}"
         )
-    elements = read_elements(folder, buses, problems)
-    load_parts = read_load_parts(folder, f"load_parts_{load_set}.csv", buses, problems)
-    capacitors = read_capacitors(folder, buses, problems)
-    parameter_sets = read_parameter_sets(folder, problems)
+    elements = read_elements(buses)
+    load_parts = read_load_parts(buses, f"load_parts_{load_set}.csv")
+    capacitors = read_capacitors(buses)
+    parameter_sets = read_parameter_sets(buses)
     demand = sum(
         S.real for S in (*(S for load in loads for S in load.S), *(part.S for part in load_parts)) if S.real > 0.0
     )
     neutrals = neutrals_by_bus(buses.rows, load_parts, elements, switches)
-    inverters = read_inverters(folder, buses, demand, neutrals, parameter_sets, problems)
-    source = read_source(folder, buses, problems)
+    inverters = read_inverters(buses, demand, neutrals, parameter_sets)
+    source = read_source(buses)
     f_nom = read_f_nom(folder, problems)
     found = Feeder(
         name=folder.name,
@@ -215,5 +179,5 @@ def _folder(feeder: str) -> Path:
 
 def _report_strange_files(folder: Path, problems: list[str]) -> None:
     for path in sorted(folder.glob("*.csv")):
-        if path.name not in TABLES and not path.name.startswith(LOAD_SETS):
+        if path.name not in TABLES and not path.name.startswith(tuple(LOAD_SETS)):
             problems.append(f"{path.name}: not a table of a feeder; {suggestion(path.name, TABLES, 'tables')}")

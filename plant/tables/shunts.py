@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from math import radians
-from pathlib import Path
 from typing import Any
 
 from gridpeers.plant.equipment import Bus, Capacitor, Feeder, InverterRow, Load, Source
 from gridpeers.plant.equipment.connectivity import buses_without_ground
 from gridpeers.plant.equipment.inverter_parameters import OwnParameters, foreign, with_published
 from gridpeers.plant.equipment.neutrals import neutral_for, neutrals_of
-from gridpeers.plant.tables.buses import GROUND_NEEDED, BusTable
-from gridpeers.plant.tables.csv_table import CsvRow, CsvTable
+from gridpeers.plant.tables.buses import BusTable, require_ground, require_phases
+from gridpeers.plant.tables.csv_table import CsvRow
 from gridpeers.plant.tables.feeder_columns import (
     BRANCH_CURRENT,
     RATED_CURRENT,
@@ -38,17 +37,13 @@ TAKEN = {
 }
 """Names that no inverter can have, and why."""
 
-ONE_EACH = "only one can stand on each phase of a bus"
-
 _POWERS = ("P_a_kW", "Q_a_kvar", "P_b_kW", "Q_b_kvar", "P_c_kW", "Q_c_kvar")
 
 
-def read_loads(
-    folder: Path, file: str, buses: BusTable, problems: list[str], *, required: bool = True
-) -> tuple[Load, ...]:
+def read_loads(buses: BusTable, file: str, *, required: bool = True) -> tuple[Load, ...]:
     """Read a load set: powers at nominal voltage, per phase (Y) or per pair of phases (D)."""
     loads: list[Load] = []
-    for row in CsvTable(folder, file, LoadColumns, problems, required=required):
+    for row in buses.table(file, LoadColumns, required=required):
         it, bus = row.columns, buses.find(row)
         if bus is None:
             continue
@@ -65,28 +60,20 @@ def read_loads(
                 continue
             between = f"between {branch[0]} and {branch[1]}" if it.connection == "D" else f"on phase {branch}"
             row.problem(f'bus "{bus.name}" has a load {between} but no phase {", ".join(missing)}; it has {bus.phases}')
-        loads.append(
-            Load(
-                bus=bus.name,
-                connection=it.connection,
-                model=it.model,
-                S=(S[0], S[1], S[2]),
-            )
-        )
+        loads.append(Load(bus=bus.name, connection=it.connection, model=it.model, S=(S[0], S[1], S[2])))
     return tuple(loads)
 
 
-def read_capacitors(folder: Path, buses: BusTable, problems: list[str]) -> tuple[Capacitor, ...]:
-    """Read capacitors.csv: banks from phase to ground."""
+def read_capacitors(buses: BusTable) -> tuple[Capacitor, ...]:
     capacitors: list[Capacitor] = []
-    for row in CsvTable(folder, "capacitors.csv", CapacitorColumns, problems):
+    for row in buses.table("capacitors.csv", CapacitorColumns):
         it, bus = row.columns, buses.find(row)
         Q = tuple(1000.0 * kvar for kvar in (it.Q_a_kvar, it.Q_b_kvar, it.Q_c_kvar))
         V_rated = it.V_rated_kV_LN * 1000.0
         if bus is not None:
             for column in ("Q_a_kvar", "Q_b_kvar", "Q_c_kvar"):
                 row.require(column, power_of("a capacitor bank", bus.V_nom, BRANCH_CURRENT, 1))
-            buses.require_phases(row, bus, [phase for phase, q in zip("ABC", Q, strict=True) if q])
+            require_phases(row, bus, [phase for phase, q in zip("ABC", Q, strict=True) if q])
             if buses.require_ground(row, bus, "a capacitor bank"):
                 _require_bank_voltage(row, V_rated, bus)
             capacitors.append(Capacitor(bus=bus.name, Q=(Q[0], Q[1], Q[2]), V_rated=V_rated))
@@ -108,12 +95,7 @@ def _require_bank_voltage(row: CsvRow[Any], V_rated: float, bus: Bus) -> None:
 
 
 def read_inverters(
-    folder: Path,
-    buses: BusTable,
-    load: float,
-    neutrals: Mapping[str, str],
-    sets: Mapping[str, OwnParameters] | None,
-    problems: list[str],
+    buses: BusTable, load: float, neutrals: Mapping[str, str], sets: Mapping[str, OwnParameters] | None
 ) -> tuple[InverterRow, ...]:
     """Read inverters.csv: nameplates, places, and the sets of parameters by name, None where they are unreadable.
 
@@ -123,31 +105,16 @@ def read_inverters(
     """
     inverters: dict[str, InverterRow] = {}
     at: dict[tuple[str, str], str] = {}
-    for row in CsvTable(folder, "inverters.csv", InverterColumns, problems):
+    for row in buses.table("inverters.csv", InverterColumns):
         it, name, bus = row.columns, row.columns.name, buses.find(row)
-        if bus is not None and not math.isnan(bus.V_nom):
-            row.require("P_rated_kW", _rating(bus, it.phases, load / 1e3))
-        if name:
-            _require_name(row, name)
         if it.parameters and sets is not None:
             _require_set(row, sets)
-        if name in inverters:
-            row.problem(f'inverter "{name}": there is one of this name already; names must differ')
+        row.is_new("inverter", name, inverters)
+        neutral = _check_place(row, bus, load, at, buses.floating, it.neutral, neutrals)
         if bus is None:
             continue
-        phases = "" if "phases" in row.wrong else it.phases
-        buses.require_phases(row, bus, phases)
-        buses.require_ground(row, bus, "an inverter")
-        nodes = [(bus.name, phase) for phase in phases]
-        if taken := next((node for node in nodes if node in at), None):
-            row.problem(f'bus "{bus.name}" has inverter "{at[taken]}" on phase {taken[1]} already; {ONE_EACH}')
-        for node in nodes:
-            at.setdefault(node, name)
-        try:
-            neutral = neutral_for(it.neutral, bus, phases, neutrals.get(bus.name, ""))
-        except ValueError as error:
-            neutral = ""
-            row.problem(str(error))
+        for phase in "" if "phases" in row.wrong else it.phases:
+            at.setdefault((bus.name, phase), name)
         inverters.setdefault(
             name,
             InverterRow(
@@ -166,7 +133,7 @@ def read_inverters(
             ),
         )
     if len(inverters) > MOST_INVERTERS:
-        problems.append(f"inverters.csv: has {len(inverters)} inverters; a run has at most {MOST_INVERTERS}")
+        buses.problems.append(f"inverters.csv: has {len(inverters)} inverters; a run has at most {MOST_INVERTERS}")
     return tuple(inverters.values())
 
 
@@ -180,23 +147,50 @@ def problems_of(inverter: InverterRow, bus: Bus, feeder: Feeder) -> list[str]:
     }
     cells.update({key: _cell(value, unit) for key, (value, unit) in numbers.items()})
     row = CsvRow(InverterColumns, f'inverter "{inverter.name}"', cells, problems)
-    row.require("P_rated_kW", _rating(bus, inverter.phases, sum(feeder.load_by_bus().values()) / 1e3))
-    if bus.name in buses_without_ground(feeder.transformers, feeder.lines, [*feeder.switches, *feeder.regulators]):
-        row.problem(GROUND_NEEDED.format(bus=bus.name, what="an inverter"))
-    if missing := [phase for phase in inverter.phases if phase not in bus.phases and "phases" not in row.wrong]:
-        row.problem(f'bus "{bus.name}" has no phase {", ".join(missing)}; it has {bus.phases}')
+    others = (*feeder.inverters, *feeder.spares)
+    at = {(other.bus, phase): other.name for other in others for phase in other.phases}
+    floating = buses_without_ground(feeder.transformers, feeder.lines, [*feeder.switches, *feeder.regulators])
+    load = sum(feeder.load_by_bus().values())
+    if any(inverter.name == other.name for other in others):
+        row.problem("there is one of this name already; names must differ")
+    _check_place(row, bus, load, at, floating, inverter.neutral, neutrals_of(feeder))
+    return problems
+
+
+def _check_place(
+    row: CsvRow[InverterColumns],
+    bus: Bus | None,
+    load: float,
+    at: Mapping[tuple[str, str], str],
+    floating: Container[str],
+    neutral: str,
+    neutrals: Mapping[str, str],
+) -> str:
+    """Note what is wrong with the name, the rating (beside the load, W) and the place of an inverter.
+
+    `at`: the inverters that stand at each node; `floating`: buses without ground; `neutral`: the node to which it shall
+    return; `neutrals`: those of the buses. Return the node to which it returns.
+    """
+    it = row.columns
+    if bus is not None and not math.isnan(bus.V_nom):
+        row.require("P_rated_kW", _rating(bus, it.phases, load / 1e3))
+    if it.name:
+        _require_name(row, it.name)
+    if bus is None:
+        return ""
+    phases = "" if "phases" in row.wrong else it.phases
+    require_phases(row, bus, phases)
+    require_ground(row, bus, "an inverter", floating)
+    if taken := next((phase for phase in phases if (bus.name, phase) in at), None):
+        row.problem(
+            f'bus "{bus.name}" has inverter "{at[bus.name, taken]}" on phase {taken} already; '
+            "only one can stand on each phase of a bus"
+        )
     try:
-        neutral_for(inverter.neutral, bus, inverter.phases, neutrals_of(feeder).get(bus.name, ""))
+        return neutral_for(neutral, bus, phases, neutrals.get(bus.name, ""))
     except ValueError as error:
         row.problem(str(error))
-    if row.columns.name:
-        _require_name(row, row.columns.name)
-    for other in (*feeder.inverters, *feeder.spares):
-        if inverter.name == other.name:
-            row.problem("there is one of this name already; names must differ")
-        if inverter.bus == other.bus and (taken := [phase for phase in inverter.phases if phase in other.phases]):
-            row.problem(f'bus "{bus.name}" has inverter "{other.name}" on phase {taken[0]} already; {ONE_EACH}')
-    return problems
+        return ""
 
 
 def _cell(value: Any, unit: float) -> str:
@@ -239,14 +233,14 @@ def _require_name(row: CsvRow[Any], name: str) -> None:
         row.problem(f'name "{name}" is taken: {TAKEN[name]}; name the inverter otherwise')
 
 
-def read_source(folder: Path, buses: BusTable, problems: list[str]) -> Source | None:
+def read_source(buses: BusTable) -> Source | None:
     """Read source.csv: the substation, at most one."""
     found: Source | None = None
-    for row in CsvTable(folder, "source.csv", SourceColumns, problems):
+    for row in buses.table("source.csv", SourceColumns):
         bus = buses.find(row)
         if found is not None:
             row.problem("a second source; a feeder has one at most")
         if bus is not None:
-            buses.require_phases(row, bus, "ABC")
+            require_phases(row, bus, "ABC")
             found = found or Source(bus=bus.name, V_pu=row.columns.V_pu, angle=radians(row.columns.angle_deg))
     return found

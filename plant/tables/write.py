@@ -8,192 +8,99 @@ from math import degrees, sqrt
 from pathlib import Path
 from typing import Any
 
-import msgspec
-
-from gridpeers.plant.equipment import Feeder, LineConfig
-from gridpeers.plant.equipment.inverter_parameters import OwnParameters
+from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Regulator, Transformer
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.equipment.inverter_parameters import OwnParameters, given
 from gridpeers.plant.equipment.neutrals import EARTH, neutrals_of
-from gridpeers.plant.tables import feeder_columns as columns
+from gridpeers.plant.tables.feeder_columns import LOAD_SETS, TABLES
 from gridpeers.plant.tables.parameter_sets import FILE
-from gridpeers.wire.schema.table_schema import fields_of
+from gridpeers.wire.schema.table_schema import named
 
-TAP_STEP = 0.00625
-"""Step (pu) in which the ratios of regulators are written."""
+TAP_STEP = 0.00625  # step (pu) in which the ratios of regulators are written
 
-Row = Sequence[Any]
-Table = tuple[str, type[msgspec.Struct], list[Row]]
+Row = Sequence[Any]  # cells in the order of a table's columns
 
 
 def write_feeder(feeder: Feeder, folder: Path) -> None:
     """Write a feeder's tables into a folder, which is made if need be; they replace those of a feeder that is there.
 
     Numbers are converted to the units of the tables, so what is read back may differ in the last digit.
-
-    Raises
-    ------
-    OSError
-        If the folder cannot be written.
     """
-    tables = list(_tables(feeder))
+    of_load_set = {f"{kind}{feeder.load_set}.csv": columns for kind, columns in LOAD_SETS.items()}
+    tables = dict(_tables(feeder))
     folder.mkdir(parents=True, exist_ok=True)
-    replaced = {*columns.TABLES, *(f"{kind}{feeder.load_set}.csv" for kind in columns.LOAD_SETS)}
-    for file in replaced - {file for file, *_ in tables}:
-        (folder / file).unlink(missing_ok=True)
-    for file, of_row, rows in tables:
+    for file, columns in (TABLES | of_load_set).items():
+        if file not in tables:
+            (folder / file).unlink(missing_ok=True)
+            continue
         with (folder / file).open("w", newline="", encoding="utf-8") as stream:
             writer = csv.writer(stream, lineterminator="\n")
-            writer.writerow(of_row.__struct_fields__)
-            writer.writerows(rows)
+            writer.writerow(columns.__struct_fields__)
+            writer.writerows(tables[file])
     (folder / "feeder.toml").write_text(f"f_nom_Hz = {feeder.f_nom!r}\n", encoding="utf-8")
 
 
-def _tables(feeder: Feeder) -> Iterator[Table]:
-    """Yield file, columns and rows of each table that the feeder has."""
+def _tables(feeder: Feeder) -> Iterator[tuple[str, list[Row]]]:
+    """Yield the file and the rows of each table that the feeder has."""
     kV = sqrt(3.0) / 1e3
-    neutrals = neutrals_of(feeder)
-    yield (
-        "buses.csv",
-        columns.BusColumns,
-        [(bus.name, bus.phases, bus.V_nom * kV, bus.zone, bus.x, bus.y) for bus in feeder.buses],
-    )
+    yield "buses.csv", [(it.name, it.phases, it.V_nom * kV, it.zone, it.x, it.y) for it in feeder.buses]
     if feeder.elements or not feeder.lines:
-        yield from _imported(feeder)
+        yield "elements.csv", [(it.name, " ".join(map(".".join, it.nodes)), _matrix(it.Y)) for it in feeder.elements]
+        yield f"load_parts_{feeder.load_set}.csv", [_load_part(it) for it in feeder.load_parts]
     if feeder.lines or feeder.loads:
-        yield from _own(feeder)
-    yield (
-        "switches.csv",
-        columns.SwitchColumns,
-        [
-            (switch.from_bus, switch.to_bus, switch.phases, "closed" if switch.closed else "open", switch.alias)
-            for switch in feeder.switches
-        ],
-    )
-    yield (
-        "inverters.csv",
-        columns.InverterColumns,
-        [
-            (
-                row.name,
-                row.kind,
-                row.bus,
-                row.microgrid,
-                row.P_rated / 1e3,
-                row.m_p,
-                row.m_q,
-                row.phases,
-                "yes" if row.spare else "",
-                row.parameters,
-                row.neutral or (EARTH if row.bus in neutrals else ""),
-            )
-            for row in (*feeder.inverters, *feeder.spares)
-        ],
-    )
+        yield "lines.csv", [(*_between(it), it.phases, it.config, it.length * 1e3) for it in feeder.lines]
+        yield "line_configs.csv", [row for it in feeder.line_configs for row in _upper_triangle(it)]
+        powers = ((it, (part / 1e3 for S in it.S for part in (S.real, S.imag))) for it in feeder.loads)
+        yield f"loads_{feeder.load_set}.csv", [(it.bus, it.connection, it.model, *parts) for it, parts in powers]
+        optional: dict[str, list[Row]] = {
+            "capacitors.csv": [(it.bus, *(Q / 1e3 for Q in it.Q), it.V_rated / 1e3) for it in feeder.capacitors],
+            "regulators.csv": [
+                (*_between(it), it.phases, (it.ratio - 1.0) / TAP_STEP, TAP_STEP) for it in feeder.regulators
+            ],
+            "transformers.csv": [
+                (*_between(it), it.connection, it.S_rated / 1e3, it.z.real * 100.0, it.z.imag * 100.0)
+                for it in feeder.transformers
+            ],
+        }
+        yield from ((file, rows) for file, rows in optional.items() if rows)
+    states = ((it, "closed" if it.closed else "open") for it in feeder.switches)
+    yield "switches.csv", [(it.from_bus, it.to_bus, it.phases, state, it.alias) for it, state in states]
+    neutrals = neutrals_of(feeder)
+    yield "inverters.csv", [_inverter(it, it.bus in neutrals) for it in (*feeder.inverters, *feeder.spares)]
     if feeder.parameter_sets:
-        yield (
-            FILE,
-            columns.ParameterColumns,
-            [
-                (name, field.key, str(value).lower() if isinstance(value, bool) else value)
-                for name, own in feeder.parameter_sets.items()
-                for field in fields_of(OwnParameters)
-                if (value := getattr(own, field.name)) is not None
-            ],
-        )
-    if feeder.source:
-        source = feeder.source
-        yield "source.csv", columns.SourceColumns, [(source.bus, source.V_pu, degrees(source.angle))]
+        yield FILE, [row for name, own in feeder.parameter_sets.items() for row in _parameters(name, own)]
+    if source := feeder.source:
+        yield "source.csv", [(source.bus, source.V_pu, degrees(source.angle))]
 
 
-def _imported(feeder: Feeder) -> Iterator[Table]:
-    """Yield the tables of a feeder from another program."""
-    yield (
-        "elements.csv",
-        columns.ElementColumns,
-        [
-            (
-                element.name,
-                " ".join(f"{bus}.{phase}" for bus, phase in element.nodes),
-                " ".join(_number(value) for row in element.Y for value in row),
-            )
-            for element in feeder.elements
-        ],
-    )
-    yield (
-        f"load_parts_{feeder.load_set}.csv",
-        columns.LoadPartColumns,
-        [
-            (
-                part.name,
-                part.bus,
-                *part.ends,
-                part.S.real / 1e3,
-                part.S.imag / 1e3,
-                part.V_nom / 1e3,
-                *part.exponents,
-                part.V_low,
-                part.V_min,
-                part.V_max,
-                part.edge,
-                part.V_off,
-                part.V_off_above,
-            )
-            for part in feeder.load_parts
-        ],
+def _between(row: Line | Regulator | Transformer) -> Row:
+    return row.name, row.from_bus, row.to_bus
+
+
+def _load_part(it: LoadPart) -> Row:
+    limits = it.V_low, it.V_min, it.V_max, it.edge, it.V_off, it.V_off_above
+    return it.name, it.bus, *it.ends, it.S.real / 1e3, it.S.imag / 1e3, it.V_nom / 1e3, *it.exponents, *limits
+
+
+def _inverter(it: InverterRow, has_neutral: bool) -> Row:
+    ratings = it.P_rated / 1e3, it.m_p, it.m_q
+    returns = it.neutral or (EARTH if has_neutral else "")
+    return (
+        it.name,
+        it.kind,
+        it.bus,
+        it.microgrid,
+        *ratings,
+        it.phases,
+        "yes" if it.spare else "",
+        it.parameters,
+        returns,
     )
 
 
-def _own(feeder: Feeder) -> Iterator[Table]:
-    """Yield the tables of lines, transformers, regulators, capacitors and loads."""
-    yield (
-        "lines.csv",
-        columns.LineColumns,
-        [(line.name, line.from_bus, line.to_bus, line.phases, line.config, line.length * 1e3) for line in feeder.lines],
-    )
-    yield (
-        "line_configs.csv",
-        columns.LineConfigColumns,
-        [row for config in feeder.line_configs for row in _upper_triangle(config)],
-    )
-    yield (
-        f"loads_{feeder.load_set}.csv",
-        columns.LoadColumns,
-        [
-            (load.bus, load.connection, load.model, *(part / 1e3 for S in load.S for part in (S.real, S.imag)))
-            for load in feeder.loads
-        ],
-    )
-    if feeder.capacitors:
-        yield (
-            "capacitors.csv",
-            columns.CapacitorColumns,
-            [(bank.bus, *(Q / 1e3 for Q in bank.Q), bank.V_rated / 1e3) for bank in feeder.capacitors],
-        )
-    if feeder.regulators:
-        yield (
-            "regulators.csv",
-            columns.RegulatorColumns,
-            [
-                (row.name, row.from_bus, row.to_bus, row.phases, (row.ratio - 1.0) / TAP_STEP, TAP_STEP)
-                for row in feeder.regulators
-            ],
-        )
-    if feeder.transformers:
-        yield (
-            "transformers.csv",
-            columns.TransformerColumns,
-            [
-                (
-                    row.name,
-                    row.from_bus,
-                    row.to_bus,
-                    row.connection,
-                    row.S_rated / 1e3,
-                    row.z.real * 100.0,
-                    row.z.imag * 100.0,
-                )
-                for row in feeder.transformers
-            ],
-        )
+def _parameters(name: str, own: OwnParameters) -> Iterator[Row]:
+    for field, value in given(own).items():
+        yield name, named(OwnParameters, field).key, str(value).lower() if isinstance(value, bool) else value
 
 
 def _upper_triangle(config: LineConfig) -> Iterator[Row]:
@@ -203,6 +110,7 @@ def _upper_triangle(config: LineConfig) -> Iterator[Row]:
             yield config.name, first, second, z.real, z.imag, config.B[i][k] * 1e6
 
 
-def _number(value: complex) -> str:
-    """Return a complex number as `complex` reads it, without brackets: 1.5-2.5j."""
-    return f"{value.real!r}{value.imag:+.17g}j" if value.imag else repr(value.real)
+def _matrix(Y: Sequence[Sequence[complex]]) -> str:
+    """Return the numbers of a matrix as `complex` reads them, without brackets: 1.5-2.5j."""
+    numbers = (value for row in Y for value in row)
+    return " ".join(f"{y.real!r}{y.imag:+.17g}j" if y.imag else repr(y.real) for y in numbers)

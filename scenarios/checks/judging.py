@@ -23,9 +23,8 @@ from gridpeers.scenarios.checks.check_verdict import (
     Violation,
 )
 from gridpeers.scenarios.checks.checked_case import CheckedCase
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, made
-from gridpeers.wire.plugins.registry import PluginError
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, named
 from gridpeers.wire.wording import printable
 
 PATIENCE = 10.0
@@ -101,7 +100,7 @@ def _verdict(name: str, plugin: Plugin, case: CheckedCase) -> CheckVerdict:
     violations: list[Violation] = []
     count, raised = 0, ""
     try:
-        with foreign_code(), _named_if_slow(name, plugin, case):
+        with _named_if_slow(name, plugin, case):
             found = made(CHECKS, plugin)(case)
             if not isinstance(found, Iterable) or isinstance(found, str | Mapping):
                 raise TypeError(f"returned {printable(repr(found), 60)}; return violations, none for a run that passes")

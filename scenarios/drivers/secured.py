@@ -9,8 +9,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.wire.trust.certificate_files import KeysError
-from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.key_folder import KeysError, open_credentials
 
 
 def secured(

@@ -64,7 +64,7 @@ class TelemetryClient:
         self._core = TelemetryEndpoint(name, run, self._stream)
         self._closed = False
         self.rejects = self._core.rejects
-        self.inbox = Inbox(holds=clock == "simulated")
+        self.inbox = Inbox(lossless=clock == "simulated")
         self.inbox.is_known, self.inbox.is_noted = self._core.is_known, self._core.is_noted
         self._session = self._open()
 
@@ -96,7 +96,7 @@ class TelemetryClient:
                 self._core.received(key, payload, self.message_at)
                 for message in self._core.take():
                     self._pass_on(message)
-        for loss in self._session.take_losses():
+        for loss in self.inbox.take_losses():
             self._core.lost(loss, monotonic())
         if not self._closed:
             now = monotonic()

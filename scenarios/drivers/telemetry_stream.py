@@ -11,8 +11,7 @@ from __future__ import annotations
 from gridpeers.wire.codec import RejectedError, encode
 from gridpeers.wire.keys import epoch_of
 from gridpeers.wire.messages import PLANT, Answer, AnyMessage, Command, Journal, LinkReport, LinkRequest, Telemetry
-from gridpeers.wire.node import Route
-from gridpeers.wire.plant_follower import PlantFollower
+from gridpeers.wire.node import PlantFollower, Route
 
 QUIET = 1.5
 """Time (s) without a message of a running plant after which it is asked; it reports five times a second."""

@@ -17,7 +17,7 @@ from gridpeers.scenarios.live.run_address import loopback_of
 from gridpeers.scenarios.live.run_monitor import line_of
 from gridpeers.scenarios.record.record_info import RecordInfo
 from gridpeers.scenarios.results.record import Recorded, Recorder, RecordError
-from gridpeers.wire.driver.machine import FreeLists, keep_out_of_the_heap
+from gridpeers.wire.driver.machine import keep_out_of_the_heap
 from gridpeers.wire.messages import LinkRequest, PlantEvent, Telemetry
 from gridpeers.wire.timing import RateLimit
 
@@ -118,13 +118,11 @@ class LiveRecorder:
             recorder.close()
 
     def _follow(self) -> None:
-        free_lists = FreeLists(monotonic())
         while not self.client.ended:
             for word in self.client.take(None):
                 if word == _STOP:
                     return
                 self.client.note_crash(*self._crashes.get())
-            free_lists.tend(monotonic())
         self.client.close()  # with it goes the token: the plant knows that the last telemetry is here
 
     def _take(self, message: Recordable) -> None:

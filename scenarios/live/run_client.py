@@ -13,7 +13,7 @@ from gridpeers.wire.driver.command_line import command_line
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.keys import ANY_ALIVE_PLANT, Keys
 from gridpeers.wire.messages import PLANT, AgentStatus, Answer, AnyMessage, LinkAcknowledgement, Telemetry
-from gridpeers.wire.trust.tls_refusal import tls_refusal
+from gridpeers.wire.trust.key_folder import tls_refusal
 
 
 class PlantSearch:

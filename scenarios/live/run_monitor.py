@@ -18,7 +18,7 @@ from gridpeers.wire.bounds import MOST_INVERTERS
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.membership import MOST_PROCESSES
 from gridpeers.wire.messages import AgentStatus, Pacing, PlantEvent, Telemetry
-from gridpeers.wire.plant_follower import MOST_PLANTS
+from gridpeers.wire.node import MOST_PLANTS
 
 
 class RunTokens:
@@ -37,7 +37,7 @@ class RunTokens:
         return runs | {self._run} if self.epochs else runs
 
     def is_noted(self, key: str) -> bool:
-        """Whether a token is noted, so that its end must be known: `gridpeers.wire.backlog`. From any thread."""
+        """Whether a token is noted, so that its end must be known; any thread may ask."""
         return key in self._noted
 
     def appeared(self, key: str) -> None:

@@ -21,9 +21,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
 from gridpeers.scenarios.results.metric import Measure, Quantity
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import Plugin, callable_objection, made, plugin_of
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
@@ -97,8 +96,7 @@ class Benchmark:
     def lines(self, findings: Findings) -> list[str]:
         """Return the summary of a run; one that raises an exception is a line that says why."""
         try:
-            with foreign_code():
-                return [printable(str(line), 1000) for line in self.summary(findings)]
+            return [printable(str(line), 1000) for line in self.summary(findings)]
         except ANYTHING as error:  # a benchmark is a user's code
             return [f"The benchmark's summary failed: {named(error)}"]
 
@@ -113,7 +111,7 @@ NO_BENCHMARK = Benchmark()  # The benchmark of a scenario that nobody has publis
 
 
 def _benchmark_objection(it: Any) -> str:
-    return "" if isinstance(it, Benchmark) else "it is no gridpeers.benchmarks.Benchmark"
+    return "" if isinstance(it, Benchmark) else "it is no gridpeers.Benchmark"
 
 
 BENCHMARKS: Registry[Benchmark] = Registry("benchmark", "benchmarks", _benchmark_objection)
@@ -174,8 +172,7 @@ def judge(findings: Findings, claims: Sequence[Claim]) -> tuple[Verdict, ...]:
     verdicts = []
     for claim in claims:
         try:
-            with foreign_code():
-                status, found = _judgement(claim, findings)
+            status, found = _judgement(claim, findings)
         except ANYTHING as error:  # a claim is a user's code
             status, found = "FAIL", f"cannot be judged: {named(error)}{_there(error, findings)}"
         verdicts.append(Verdict(claim=claim, status=status, found=found))

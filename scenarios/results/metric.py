@@ -17,9 +17,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
 from gridpeers.wire.plugins.plugin import KEYS, Plugin, callable_objection, made
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
@@ -108,10 +107,9 @@ def measured(metrics: Sequence[tuple[str, Callable[[WindowData], Any]]], data: W
     reasons: dict[str, str] = {}
     for name, metric in metrics:
         try:
-            with foreign_code():
-                result = metric(data)
-                several = dict(result) if isinstance(result, Mapping) else {"": result}
-                numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
+            result = metric(data)
+            several = dict(result) if isinstance(result, Mapping) else {"": result}
+            numbers = {printable(str(key), 60): _number(value) for key, value in several.items()}
         except ANYTHING as error:  # a metric is a user's code, and its result is too
             values[name], reasons[name] = None, f"failed: {_shown(error)}{_columns(error, data)}"
             continue

@@ -21,7 +21,7 @@ import msgspec
 from gridpeers.scenarios.results.link_record import LinkRecord
 from gridpeers.scenarios.results.run_files import write_whole
 from gridpeers.wire.messages import Journal, LinkReport, LinkRequest, PlantEvent, Telemetry
-from gridpeers.wire.packages import not_importable
+from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     from gridpeers.scenarios.record.record_info import RecordInfo

@@ -23,9 +23,8 @@ from gridpeers.scenarios.results.metric import ALWAYS, METRICS, good_name, name_
 from gridpeers.scenarios.schema.participants import with_agent
 from gridpeers.scenarios.schema.scenario_errors import Problems
 from gridpeers.scenarios.schema.scenario_model import Case, PluginKey, ScenarioModel
-from gridpeers.wire.plugins.module_folder import folder_of
 from gridpeers.wire.plugins.plugin import Plugin, plugin_of, plugin_problems, scalar_objection, table_of
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import PluginError, Registry, folder_of
 from gridpeers.wire.schema.table_reading import read_table
 from gridpeers.wire.wording import is_no_path
 

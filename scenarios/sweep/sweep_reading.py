@@ -152,6 +152,15 @@ def sweeps() -> tuple[str, ...]:
     return names_in(SWEEPS)
 
 
+def sweep_title(name: str) -> str:
+    """Return the title of a sweep of the catalogue, without checking its runs.
+
+    >>> sweep_title("gains")
+    'Gains k_p and k_q of the secondary law'
+    """
+    return str(read_toml(SWEEPS / f"{name}.toml")[1]["title"])
+
+
 def read_sweep(name: str | Path) -> Plan:
     """Read a sweep and check every sample's scenario before anything is started.
 

@@ -11,9 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain
+from gridpeers.lab.explanation.explanation import Explanation, NeighbourAccount, explain, trail
 from gridpeers.lab.explanation.law_step import LawStep
-from gridpeers.lab.explanation.trail import trail
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from tests.command_line import invoke
 from tests.record.recorded_runs import recorded_run
@@ -62,11 +61,35 @@ def assert_adds_up(explanation: Explanation, *, named: bool = True) -> LawStep:
     return step
 
 
-def test_a_link_cut(tmp_path: Path) -> None:
-    """The last state before the cut counts in full, at its age; the others are lost on the link, and counted."""
-    record = run(tmp_path, '[[link]]\non = "inv4 <-> inv7"\ncut = true\nfrom_s = 0.5\n')
+FAULTS = """
+[[link]]
+on = "inv4 <-> inv7"
+cut = true
+from_s = 0.5
+[[link]]
+on = "inv2 -> *"
+cut = true
+from_s = 0.1
+[[link]]
+on = "inv8 -> inv4"
+corrupt = { p = 1.0, checksum = false }
+from_s = 0.5
+[[node]]
+name = "inv9"
+kill = true
+from_s = 0.5
+"""
 
-    explanation = explain(record, "inv4", 0.7)
+
+@pytest.fixture(scope="module")
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> RunRecord:
+    """A run in which inverter 4 hears less and less."""
+    return run(tmp_path_factory.mktemp("faulty"), FAULTS)
+
+
+def test_a_link_cut(faulty: RunRecord) -> None:
+    """The last state before the cut counts in full, at its age; the others are lost on the link, and counted."""
+    explanation = explain(faulty, "inv4", 0.7)
 
     step = assert_adds_up(explanation)
     cut = account(explanation, "inv7")
@@ -74,9 +97,40 @@ def test_a_link_cut(tmp_path: Path) -> None:
     assert (cut.used, cut.input.weight) == (True, 1.0)
     assert cut.input.age == pytest.approx(0.22)
     assert cut.why == "10 states since: 10 cut off by a cut link"
-    assert {each.why for each in explanation.neighbours if each.name != "inv7"} == {""}
-    assert {term.neighbour for term in step.P_set.terms} == {"", *(each.name for each in explanation.neighbours)}
+    assert {each.name for each in explanation.neighbours if not each.why} == {"inv1", "inv3", "inv5", "inv6"}
+    assert {term.neighbour for term in step.P_set.terms} == {"", *(it.name for it in explanation.neighbours if it.used)}
     assert "10 states since: 10 cut off by a cut link" in str(explanation)
+
+
+def test_an_outage_that_began_before_the_island_formed(faulty: RunRecord) -> None:
+    """The last state that was heard is from the grid-connected time: the cut link is the cause, not another island."""
+    assert account(explain(faulty, "inv4", 0.5), "inv2").why == (
+        "its last state is from before the own island changed from grid to inv1; "
+        "20 states since: 20 cut off by a cut link"
+    )
+
+
+def test_a_rejected_message(faulty: RunRecord) -> None:
+    """States with a flipped bit arrive and are rejected; the last sound one counts."""
+    why = account(explain(faulty, "inv4", 0.7), "inv8").why
+
+    assert why == "10 states since: 10 damaged on the link, and rejected: its CRC-32 differs"
+
+
+def test_an_agent_that_was_not_there(faulty: RunRecord) -> None:
+    """A neighbour that has left is not met, and its last event says why; of itself its last decision is shown."""
+    other, own = explain(faulty, "inv4", 0.7), explain(faulty, "inv9", 0.7)
+
+    gone = account(other, "inv9")
+    assert (gone.input, gone.used) == (None, False)
+    assert gone.why.startswith("not met: ")
+    assert "inv9" in gone.why
+    assert own.t < 0.55
+    assert own.aftermath[0].startswith("it is the last decision before 0.7 s: inv9 dies at t = 0.5 s")
+    assert own.aftermath[1].startswith("at 0.7 s its inverter is on the network, delivers ")
+    assert own.aftermath[1].endswith(" kW, and keeps these set-points")
+    assert all(sentence in str(own) for sentence in own.aftermath)
+    assert explain(faulty, "inv9", own.t + 0.01).aftermath == ()
 
 
 def test_a_stale_neighbour(tmp_path: Path) -> None:
@@ -134,51 +188,6 @@ def test_an_island_change(tmp_path: Path) -> None:
     assert {each.name for each in apart.neighbours if not each.used} == {"inv1", "inv2", "inv3"}
     assert account(apart, "inv2").why == "in another island: inv1, not inv4"
     assert any(event.kind == "island" for event in apart.events)
-
-
-def test_an_outage_that_began_before_the_island_formed(tmp_path: Path) -> None:
-    """The last state that was heard is from the grid-connected time: the cut link is the cause, not another island."""
-    record = run(tmp_path, '[[link]]\non = "inv2 -> *"\ncut = true\nfrom_s = 0.1\n')
-
-    explanation = explain(record, "inv4", 0.5)
-
-    assert_adds_up(explanation)
-    assert account(explanation, "inv2").why == (
-        "its last state is from before the own island changed from grid to inv1; "
-        "20 states since: 20 cut off by a cut link"
-    )
-
-
-def test_a_rejected_message(tmp_path: Path) -> None:
-    """States with a flipped bit arrive and are rejected; the last sound one counts."""
-    more = '[[link]]\non = "inv7 -> inv4"\ncorrupt = { p = 1.0, checksum = false }\nfrom_s = 0.5\n'
-    record = run(tmp_path, more)
-
-    explanation = explain(record, "inv4", 0.7)
-
-    assert_adds_up(explanation)
-    assert (
-        account(explanation, "inv7").why == "10 states since: 10 damaged on the link, and rejected: its CRC-32 differs"
-    )
-
-
-def test_an_agent_that_was_not_there(tmp_path: Path) -> None:
-    """A neighbour that has left is not met, and its last event says why; of itself its last decision is shown."""
-    record = run(tmp_path, '[[node]]\nname = "inv9"\nkill = true\nfrom_s = 0.5\n')
-
-    other, own = explain(record, "inv4", 0.7), explain(record, "inv9", 0.7)
-
-    assert_adds_up(other)
-    gone = account(other, "inv9")
-    assert (gone.input, gone.used) == (None, False)
-    assert gone.why.startswith("not met: ")
-    assert "inv9" in gone.why
-    assert own.t < 0.55
-    assert own.aftermath[0].startswith("it is the last decision before 0.7 s: inv9 dies at t = 0.5 s")
-    assert own.aftermath[1].startswith("at 0.7 s its inverter is on the network, delivers ")
-    assert own.aftermath[1].endswith(" kW, and keeps these set-points")
-    assert all(sentence in str(own) for sentence in own.aftermath)
-    assert explain(record, "inv9", own.t + 0.01).aftermath == ()
 
 
 def test_an_agent_that_has_left(tmp_path: Path) -> None:

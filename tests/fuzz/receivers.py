@@ -35,8 +35,7 @@ from gridpeers.viewer.run_view import Cursor, RunView
 from gridpeers.wire.codec import CRC, RejectedError, decode, encode
 from gridpeers.wire.keys import Keys, epoch_of, run_of_plant
 from gridpeers.wire.messages import AgentStatus, Answer, LinkAcknowledgement, LinkReport, Telemetry
-from gridpeers.wire.trust.certificate_files import KeysError
-from gridpeers.wire.trust.key_folder import open_credentials
+from gridpeers.wire.trust.key_folder import KeysError, open_credentials
 from tests.fuzz.journals import Journals
 from tests.hostile.scenes import (
     EPOCH,

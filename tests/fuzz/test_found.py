@@ -20,8 +20,7 @@ from gridpeers.scenarios.results.run_journal import JOURNAL, rows_in
 from gridpeers.scenarios.sweep.sweep_case import SweepRow
 from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_COUNT
 from gridpeers.wire.messages import LinkReport
-from gridpeers.wire.trust.certificate_files import KeysError
-from gridpeers.wire.trust.key_folder import read_list
+from gridpeers.wire.trust.key_folder import KeysError, read_list
 from gridpeers.wire.trust.site_authority import issue, make_site
 from tests.fuzz.journals import judged, link_report
 from tests.hostile.cases import sealed
@@ -75,8 +74,7 @@ def test_a_certificate_of_an_unknown_curve_is_told_in_one_line(tmp_path: Path) -
     from cryptography.hazmat.primitives import serialization
     from cryptography.x509 import load_pem_x509_certificate
 
-    from gridpeers.wire.trust.certificate_files import KeysError
-    from gridpeers.wire.trust.key_folder import open_credentials
+    from gridpeers.wire.trust.key_folder import KeysError, open_credentials
     from gridpeers.wire.trust.site_authority import issue, make_site
 
     folder = tmp_path / "lab"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.cli.contributed import COMMANDS
+from gridpeers.cli.root import COMMANDS
 from gridpeers.scenarios.record.record_reader import RunRecord
 from tests.command_line import invoke
 

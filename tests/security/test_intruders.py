@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from gridpeers.scenarios.drivers.free_endpoint import parse_endpoint
 from gridpeers.wire.messages import Command, Measurement, Message, State
-from gridpeers.wire.trust.tls_refusal import tls_refusal
+from gridpeers.wire.trust.key_folder import tls_refusal
 from tests.processes.terminals import wait_for
 from tests.security.intruder import PATIENCE, Intruder, answered, credentials, forged, handshake
 from tests.security.recording import Recording
@@ -72,9 +72,9 @@ def test_a_command_learns_why_there_is_no_link(town: Town, lab: Path, tmp_path: 
     mixed = replace(foreign, ca=member.ca)
     told = [tls_refusal(endpoint.host, endpoint.port, shown, PATIENCE) for shown in (member, foreign, mixed, None)]
 
-    assert told == [
+    assert told[1].startswith(f"shows a certificate that {foreign.ca} does not accept ")
+    assert told[:1] + told[2:] == [
         "",
-        f"shows a certificate that {foreign.ca} has not signed: it is of another site",
         "does not accept the certificate of inv3: by the ca.pem there it is of another site",
         "asks for a certificate",
     ]

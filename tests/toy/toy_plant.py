@@ -7,9 +7,9 @@ process, like ``python -m gridpeers.plant``. From t = 0.1 s on it is an island.
 from __future__ import annotations
 
 import sys
-from typing import NamedTuple
 
 from gridpeers.plant.plant_config import PlantConfig
+from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.wire.driver.process import main
@@ -20,19 +20,6 @@ M_P, F_NOM, V_NOM, P_RATED, LOAD = 0.01, 60.0, 277.0, 100e3, 0.8
 
 ISLANDING = 0.1
 """Time (s) at which the grid is lost."""
-
-
-class Reading(NamedTuple):
-    """Sensor readings of one inverter."""
-
-    P: float
-    Q: float
-    V: float
-    f: float
-    P_set: float
-    V_set: float
-    grid_connected: bool
-    island: str
 
 
 class ToyPlant:

@@ -6,7 +6,6 @@ import logging
 from collections.abc import Sequence
 from time import monotonic
 
-from gridpeers.wire.driver.machine import FreeLists
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.node import Action, Core, Fetch, Listen, Log, Publish, WithdrawToken
 from gridpeers.wire.timing import RateLimit
@@ -18,17 +17,13 @@ class LogLimit(logging.Filter):
     def __init__(self) -> None:
         super().__init__()
         self._limit = RateLimit()
+        self.left_out = self._limit.left_out
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Return whether to write a line; add the number of omitted lines before it to its text."""
         line = self._limit.admit(record.getMessage(), monotonic())
         if line is not None:
             record.msg, record.args = line, ()
         return line is not None
-
-    def left_out(self) -> list[str]:
-        """Take out one line per kind on its omitted lines."""
-        return self._limit.left_out()
 
 
 def limit_log(log: logging.Logger) -> LogLimit:
@@ -53,7 +48,6 @@ class StoppedOnLeashError(StoppedError):
 
 
 def perform(actions: Sequence[Action | Log], session: Session, log: logging.Logger) -> None:
-    """Perform the actions of a core, in its order."""
     for action in actions:
         if isinstance(action, Publish):
             session.publish(action.key, action.payload)
@@ -75,7 +69,7 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
     The token is declared last: whoever sees it may rely on the rest.
     """
     core.start(monotonic())
-    _connect(core, session)
+    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
     for key in core.subscriptions:
         session.subscribe(key)
     session.watch(core.watched)
@@ -87,16 +81,12 @@ def drive(core: Core, session: Session, log: logging.Logger) -> None:
 def serve(core: Core, session: Session, log: logging.Logger) -> None:
     """Serve a started core, whose queryables are declared, until it has finished.
 
-    Raises
-    ------
-    StoppedError
-        If another thread asks the process to stop.
+    Raise StoppedError if another thread asks the process to stop.
     """
-    _connect(core, session)
+    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
     take = session.take
     limit = limit_log(log)
     now = monotonic()
-    free_lists = FreeLists(now)
     while True:
         perform(core.take_actions(), session, log)
         if core.finished:
@@ -118,19 +108,10 @@ def serve(core: Core, session: Session, log: logging.Logger) -> None:
                 core.vanished(key, now)
             else:
                 raise StoppedError(key)
-        for loss in session.take_losses():
+        for loss in session.inbox.take_losses():
             core.lost(loss, now)
-        for line in session.take_lines():
-            log.warning("%s", line)
         deadline = core.deadline  # a message may have postponed it
         if deadline is not None and now >= deadline:  # also when the inbox never runs empty
             core.expire(now)
-        if core.rejects.has_lines:
-            for line in core.rejects.take_lines():
-                log.warning("%s", line)
-        free_lists.tend(now)
-
-
-def _connect(core: Core, session: Session) -> None:
-    """Let the inbox ask the core which messages and tokens must not be lost."""
-    session.inbox.is_known, session.inbox.is_noted = core.is_known, core.is_noted
+        for line in (*session.take_lines(), *core.take_rejects()):
+            log.warning("%s", line)

@@ -1,4 +1,4 @@
-"""How a process ends: by a signal, by the loss of its output, or at once.
+"""How a process ends: by a signal, by the loss of its output, or although threads would keep it.
 
 Output is lost when its reader has gone, as by `| head -3`, or its disk is full. Python ignores SIGPIPE, and so must we:
 a Zenoh session or a child that disappears in the middle of a write would end the process too. So the write itself
@@ -23,7 +23,7 @@ from contextlib import contextmanager
 from math import inf
 from time import monotonic
 from types import FrameType
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from _typeshed import ReadableBuffer
@@ -32,14 +32,11 @@ SAME_REQUEST_TIME = 1.0
 """Time (s) in which further signals are the same request: `timeout` signals a command and then its group, and whoever
 ends all processes of a run signals those that their parent ends too. An end must not be interrupted by that."""
 
-Error = Callable[[str], BaseException]
-"""Makes the error that a signal raises, from its name."""
-
 
 class StopSignal:
-    """Handler of signals, for `signal.signal`."""
+    """Handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name."""
 
-    def __init__(self, error: Error, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(self, error: Callable[[str], BaseException], clock: Callable[[], float] = monotonic) -> None:
         self._error, self._clock = error, clock
         self._at = -inf
         self.requests = 0
@@ -51,27 +48,23 @@ class StopSignal:
         if now - self._at >= SAME_REQUEST_TIME:
             self._at = now
             self.requests += 1
-            raise self._error(signal.Signals(number).name)
+            name = signal.Signals(number).name
+            raise KeyboardInterrupt(name) if number == signal.SIGINT else self._error(name)
 
 
-def ctrl_c_or(error: Error) -> Error:
-    """Return what makes KeyboardInterrupt of SIGINT, and another error of any other signal."""
-    return lambda name: KeyboardInterrupt(name) if name == signal.SIGINT.name else error(name)
-
-
-def stop_at_signals(error: Error) -> StopSignal:
-    """Have SIGINT raise KeyboardInterrupt in the main thread and SIGTERM another error; return their handler.
+def stop_at_signals(error: Callable[[str], BaseException]) -> StopSignal:
+    """Have SIGINT and SIGTERM raise in the main thread; return their handler.
 
     A SIGINT that is ignored stays so: a shell ignores that of a program in the background.
     """
-    stop = StopSignal(ctrl_c_or(error))
+    stop = StopSignal(error)
     signal.signal(signal.SIGTERM, stop)
     if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
         signal.signal(signal.SIGINT, stop)
     return stop
 
 
-READER_GONE = 128 + getattr(signal, "SIGPIPE", 13)
+READER_GONE = 128 + signal.SIGPIPE
 """Exit status of a command whose reader has gone, as a shell counts signals."""
 
 UNWRITABLE = 2
@@ -89,41 +82,7 @@ class OutputLostError(SystemExit):
         return self._text
 
 
-class ReaderGoneError(OutputLostError):
-    """The reader of the output has gone."""
-
-    def __init__(self) -> None:
-        super().__init__(READER_GONE, "nobody reads its output any more")
-
-
-class UnwritableError(OutputLostError):
-    """The output cannot be written, e.g. to a full disk."""
-
-    def __init__(self, why: str) -> None:
-        super().__init__(UNWRITABLE, f"standard output cannot be written: {why}")
-
-
-class _Unclosed(io.IOBase):
-    """A layer of standard output or error that stays open when anybody closes it, and writes its buffer instead."""
-
-    def close(self) -> None:
-        """Write the buffer."""
-        self.flush()
-
-
-class _Text(_Unclosed, io.TextIOWrapper):
-    """The outermost layer, for text."""
-
-    def detach(self) -> BinaryIO:
-        """Raise `UnsupportedOperation`: without the layers below, nothing could be printed any more."""
-        raise io.UnsupportedOperation("standard output and error stay as they are; write to their .buffer")
-
-
-class _Buffer(_Unclosed, io.BufferedWriter):
-    """The layer between."""
-
-
-class _Watched(_Unclosed, io.FileIO):
+class _Watched(io.FileIO):
     """Standard output or error that detects its loss; from then on, a command's output is dropped.
 
     A process that continues tries again: a disk may have space again, but a reader never comes back.
@@ -137,24 +96,26 @@ class _Watched(_Unclosed, io.FileIO):
         self._raised = False
 
     def write(self, data: ReadableBuffer, /) -> int:
-        """Write, or drop the data if the output is lost."""
-        if not isinstance(self._lost, ReaderGoneError) and not self._raised:
+        if not (self._raised or self._reader_gone):
             try:
                 return super().write(data)
             except BrokenPipeError:
-                self._lost = ReaderGoneError()
+                self._lost = OutputLostError(READER_GONE, "nobody reads its output any more")
             except OSError as error:
-                self._lost = UnwritableError(error.strerror or str(error))
+                text = f"standard output cannot be written: {error.strerror or error}"
+                self._lost = OutputLostError(UNWRITABLE, text)
+        # A command that cannot write its error message still has its exit status.
+        ends = self.quits and (self._reader_gone or self.name != "<stderr>")
         # Raise once: the rest of the output is dropped. In another thread the error would end only that thread.
-        if self._ends() and not self._raised and threading.current_thread() is threading.main_thread():
+        if ends and not self._raised and threading.current_thread() is threading.main_thread():
             self._raised = True
             assert self._lost is not None
             raise self._lost
         return memoryview(data).nbytes
 
-    def _ends(self) -> bool:
-        """Whether the process quits; a command that cannot write its error message still has its exit status."""
-        return self.quits and (isinstance(self._lost, ReaderGoneError) or self.name != "<stderr>")
+    @property
+    def _reader_gone(self) -> bool:
+        return self._lost is not None and self._lost.code == READER_GONE
 
 
 @contextmanager
@@ -165,9 +126,10 @@ def speaking(program: str) -> Iterator[None]:
         try:
             yield
         finally:
-            flush_output()  # an error at the interpreter's own flush would print a traceback
-    except UnwritableError as error:
-        print(f"{program}: {error}", file=sys.stderr)
+            _flush()  # an error at the interpreter's own flush would print a traceback
+    except OutputLostError as error:
+        if error.code == UNWRITABLE:
+            print(f"{program}: {error}", file=sys.stderr)
         raise
 
 
@@ -175,22 +137,20 @@ def watch_readers(*, quits: bool) -> None:
     """Let standard output and error detect their loss; a later call changes the reaction.
 
     If a process quits, it ends by `OutputLostError` in its main thread; else it continues silently.
-
     Streams that are not the process's own, such as those of tests, stay as they are.
     """
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if not isinstance(stream, io.TextIOWrapper):  # closed from the beginning, or replaced
             continue
-        binary = stream.buffer
-        raw = getattr(binary, "raw", binary)  # python -u has no buffer between
+        raw = getattr(stream.buffer, "raw", stream.buffer)  # python -u has no buffer between
         if isinstance(raw, _Watched):
             raw.quits = quits
         elif stream is getattr(sys, f"__{name}__"):
             stream.flush()
             watched = _Watched(stream, quits=quits)
-            fresh = _Text(
-                watched if raw is binary else _Buffer(watched),
+            fresh = io.TextIOWrapper(
+                watched if raw is stream.buffer else io.BufferedWriter(watched),
                 encoding=stream.encoding,
                 errors=stream.errors,
                 line_buffering=stream.line_buffering,
@@ -199,15 +159,14 @@ def watch_readers(*, quits: bool) -> None:
             setattr(sys, name, fresh)
 
 
-def flush_output() -> None:
-    """Write all buffers, while their loss can still be detected; a stream that is closed or none has none."""
+def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOBase) and not stream.closed:
             stream.flush()
 
 
 GRACE = 1.0
-"""Time (s) for such threads to end by themselves."""
+"""Time (s) for threads to end by themselves that would keep a process."""
 
 
 def leave(status: int, tell: Callable[[str], None]) -> None:
@@ -221,5 +180,5 @@ def leave(status: int, tell: Callable[[str], None]) -> None:
     if still := [thread.name for thread in left if thread.is_alive()]:
         tell(f"ended although threads still ran that were started in it: {', '.join(still)}; make them daemons")
         atexit._run_exitfuncs()  # noqa: SLF001  Python would do this once they had ended
-        flush_output()
+        _flush()
         os._exit(status)

@@ -102,7 +102,6 @@ def _fork_twice() -> int | None:
 
 
 def _become(job: _Job) -> None:
-    """Take over the standard files, and the look of a process that was started for this job."""
     os.setsid()
     for number, file in enumerate(job.files):
         os.dup2(file, number)

@@ -1,175 +1,177 @@
-"""The queue of events for the one thread that owns the core."""
+"""The queue of events for the one thread that owns the core, and what may wait in it.
+
+Should the owner fall behind, or somebody send faster than it reads, then
+
+- up to `ROOM` short messages wait, whoever sent them. Beyond that a message waits only if it is of a known sender, up
+  to `MOST_OF_ONE` on each key: a flood by others never displaces a state, a measurement or a stop request;
+- messages above `SMALL` bytes have `BYTES` together, a quarter of it for strangers;
+- up to `MOST_TOKENS` tokens of strangers wait. One of a noted holder always waits, and so does its end; the end of any
+  other is of no use.
+
+A known sender is recognised by its name and epoch in the first bytes; whoever copies these has the room of that one
+sender, and no more. All checks of `gridpeers.wire.node` follow.
+"""
 
 from __future__ import annotations
 
-import threading
 from _thread import allocate_lock
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import suppress
-from math import inf
 from time import monotonic
+from typing import Literal
 
-from gridpeers.wire.backlog import ROOM, SMALL, Backlog, Kind, Loss, Stamped, TokenEvent, TokenQueue
-from gridpeers.wire.bounds import LONGEST_MESSAGE
+from gridpeers.wire.bounds import LONGEST_MESSAGE, MOST_INVERTERS
+from gridpeers.wire.membership import MOST_PROCESSES
+from gridpeers.wire.node import TOKENS, Loss
+
+Kind = Literal["message", "appeared", "vanished", "word"]
+"""A message or answer; a token that appeared or vanished; or a word from another thread of the own process."""
 
 Event = tuple[Kind, str, bytes]
 """Kind, key and payload."""
 
-HELD = 1.0
-"""Longest time (s) for which a known sender's message waits for room where none may be lost. Its sender waits
-meanwhile, and Zenoh closes a link only after 5 s. Then it comes in without room: a lost one would end the run, and a
-sender that waits so long for each cannot bring many."""
+Stamped = tuple[Kind, str, bytes, float]
+"""The same, and its time of arrival (s, monotonic): it may wait for its owner."""
+
+ROOM = 4_000
+"""Short messages that may wait, of anybody: four for each of the most inverters in a run."""
+
+SMALL = 4_096
+"""Bytes of a short message; the longer ones are reports, journals and telemetry."""
+
+MOST_OF_ONE = 64
+"""Messages of one known sender that may wait beyond `ROOM` on one key: more than a second of its states."""
+
+BYTES = 64_000_000
+"""Bytes of long messages that may wait."""
+
+MOST_TOKENS = MOST_PROCESSES * MOST_INVERTERS
+"""Strangers' tokens that may wait: as many as a process would note of all names together."""
 
 
 class Inbox:
-    """Queue events from Zenoh's threads to the owner's, within the bounds of `gridpeers.wire.backlog` and of tokens.
+    """Queue events from Zenoh's threads to the owner's.
 
-    The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine
-    this is one wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
+    The owner states how many messages it needs to continue, and wakes only then: in a full mesh of nine this is one
+    wake a tick instead of nine, and half of the time of a tick. Any other event wakes it at once.
 
-    Parameters
-    ----------
-    holds : bool, optional
-        Whether a known sender's message waits for room, as in simulated time, where none may be lost: then the sender
-        goes no faster than the owner.
-
-    Attributes
-    ----------
-    is_known : Callable[[str, bytes], bool]
-        Whether a message on a key is of a known sender; called from Zenoh's threads, and only when many wait.
-    is_noted : Callable[[str], bool]
-        Whether the owner has noted the holder of a token, so that it must learn of its end
-        (`gridpeers.wire.backlog`); called from Zenoh's threads. By default it has noted everybody, and no token is
-        lost.
+    `lossless` is for simulated time, where none may be lost: messages of known senders always wait. Each of them sends
+    only so much before it has an answer.
     """
 
-    def __init__(self, *, holds: bool = False) -> None:
+    def __init__(self, *, lossless: bool = False) -> None:
         self.is_known: Callable[[str, bytes], bool] = lambda key, payload: False
+        """Says whether a message on a key is of a known sender; called from Zenoh's threads, when many wait."""
         self.is_noted: Callable[[str], bool] = lambda key: True
-        self._holds = holds
+        """Says whether the owner has noted the holder of a token; called from Zenoh's threads. By default all count as
+        noted, and no token is lost."""
+        self._lossless = lossless
         self._events: deque[Stamped] = deque()
         self._needed = 1
         self._urgent = False
         self._wake = allocate_lock()
         self._wake.acquire()
-        self._backlog, self._tokens, self._guard = Backlog(), TokenQueue(), allocate_lock()
-        """The guard is held while backlog or tokens are read or changed, and while what they admit is put in."""
+        self._guard = allocate_lock()
+        """Held while any of the following is read or changed, and while what it admits is put in."""
         self._counted = False
-        """Whether the backlog has counted any of the messages that wait, or one waits for room."""
-        self._emptied = threading.Condition(self._guard)
+        """Whether any of these counts is to be set to zero once nothing waits."""
+        self._beyond: Counter[str] = Counter()
+        """Messages that wait beyond `ROOM`, by key."""
+        self._bytes = 0
+        """Bytes of the long messages that wait."""
+        self._appeared = 0
+        """Tokens that appeared and wait."""
+        self._waiting: dict[str, bool] = {}
+        """Whether each token is there, as the owner will see by what waits for it."""
+        self._taken: dict[str, bool] = {}
+        """The same by what it took last, and handles now."""
+        self._losses: dict[tuple[str, str], Loss] = {}
 
     def put(self, event: Event, *, asked: bool = False) -> None:
         """Put an event in, from any thread; drop and count a message or token for which there is no room.
 
         An answer to an own question (`asked`) has room as a known sender's message has.
         """
-        if event[0] == "appeared" or event[0] == "vanished":
-            self._put_token(event[0], event[1])
-        elif event[0] != "message":
+        kind, key, payload = event
+        if kind == "message" and len(self._events) < ROOM and len(payload) <= SMALL:
             self._events.append((*event, monotonic()))
-            self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
-        elif len(self._events) < ROOM and len(event[2]) <= SMALL and not self._tokens.waiting:
-            self._events.append((*event, monotonic()))
-        else:
+        elif kind == "message":
             self._put_if_admitted(event, asked=asked)
+        else:
+            with self._guard:
+                if kind == "word" or self._admits_token(kind, key):
+                    self._events.append((*event, monotonic()))
+                    self._urgent = True  # before the wake: `take` forgets one that comes while the owner computes
         if self._urgent or len(self._events) >= self._needed:
             with suppress(RuntimeError):  # awake already
                 self._wake.release()
 
-    def _put_token(self, kind: TokenEvent, key: str) -> None:
-        """Put a token in, or let it wait; the owner is woken for the first that waits too, as its time is near."""
-        at = monotonic()
-        with self._guard:
-            waited = self._tokens.waiting
-            comes = self._tokens.put(kind, key, at, self.is_noted)
-            if comes:
-                self._events.append((kind, key, b"", at))
-            if comes or (not waited and self._tokens.waiting):
-                self._urgent = True
+    def _admits_token(self, kind: Kind, key: str) -> bool:
+        there = self._waiting.get(key, self._taken.get(key))
+        if kind == "vanished":
+            if not (self.is_noted(key) if there is None else there):
+                return False
+        elif self._waiting.get(key):
+            return False
+        elif self._appeared >= MOST_TOKENS and not self.is_noted(key):
+            self._lose(TOKENS, "excess", f"{self._appeared} tokens were waiting, of others")
+            return False
+        self._appeared += kind == "appeared"
+        self._waiting[key] = kind == "appeared"
+        self._counted = True
+        return True
 
     def _put_if_admitted(self, event: Event, *, asked: bool) -> None:
-        """Put a message in that is one of many, long, or behind tokens, if it may wait.
-
-        One whose sender is not known stays behind the tokens: rejected before its sender's token, it would be lost.
-        """
         _, key, payload = event
         size, known = len(payload), asked or self.is_known(key, payload)
-        if size > LONGEST_MESSAGE and not asked:
-            self._refuse(key, size)
-            return
+        long = size if size > SMALL else 0
         with self._guard:
-            if known and self._holds:
-                self._wait_for_room(key, size)
-                self._backlog.add(key, size, waiting=len(self._events))
-            elif not self._backlog.admits(key, size, known=known, waiting=len(self._events) + self._tokens.messages):
+            waiting = len(self._events)
+            if size > LONGEST_MESSAGE and not asked:
+                self._lose(key, "oversized", f"{size} bytes, at most {LONGEST_MESSAGE} are allowed")
+                return
+            room = not long or self._bytes + long <= (BYTES if known else BYTES // 4)
+            room = room and (waiting < ROOM or (known and self._beyond[key] < MOST_OF_ONE))
+            if not (room or (known and self._lossless)):
+                self._lose(key, "excess", f"{waiting} messages were waiting, {self._bytes} bytes of them in long ones")
                 return
             self._counted = True  # before it is put in: `take` looks for it afterwards
-            if self._tokens.waiting and not known:
-                self._tokens.put_behind((*event, monotonic()))
-            else:
-                self._events.append((*event, monotonic()))
+            self._beyond[key] += waiting >= ROOM
+            self._bytes += long
+            self._events.append((*event, monotonic()))
 
-    def _wait_for_room(self, key: str, size: int) -> None:
-        """Wait until there is room, at most `HELD`; the guard is held, but for the wait."""
-        end = monotonic() + HELD
-        while not self._backlog.has_room(key, size, known=True, waiting=len(self._events)):
-            self._counted = self._urgent = True  # the owner may wait for more than there is room for
-            with suppress(RuntimeError):
-                self._wake.release()
-            left = end - monotonic()
-            if left <= 0.0:
-                return
-            self._emptied.wait(left)
-
-    def _refuse(self, key: str, size: int) -> None:
-        with self._guard:
-            self._backlog.lose(key, "oversized", f"{size} bytes, at most {LONGEST_MESSAGE} are allowed")
+    def _lose(self, key: str, kind: str, text: str) -> None:
+        """Count a message or token that is dropped unread; the guard is held."""
+        first = self._losses.get((key, kind))
+        self._losses[key, kind] = Loss(key, kind, text, 1) if first is None else first._replace(number=first.number + 1)
 
     def take_losses(self) -> tuple[Loss, ...]:
-        """Take out the messages and tokens that were dropped since the last call."""
-        if not (self._backlog.has_losses or self._tokens.has_loss):
+        if not self._losses:
             return ()
         with self._guard:
-            return self._backlog.take_losses() + self._tokens.take_loss()
+            losses, self._losses = tuple(self._losses.values()), {}
+            return losses
 
     def take(self, needed: int, timeout: float | None) -> list[Stamped]:
-        """Take all events out.
+        """Take all events out, in order, once so many messages or any other event wait, or the timeout (s) is over.
 
-        Parameters
-        ----------
-        needed : int
-            Number of messages to wait for; any other event ends the wait.
-        timeout : float or None
-            Longest wait (s); None for no limit.
-
-        Returns
-        -------
-        list[Stamped]
-            The present events, in order; perhaps fewer than needed, or, rarely, none before the timeout.
+        There may be fewer than needed, or, rarely, none before the timeout.
         """
         events = self._events
         self._wake.acquire(blocking=False)  # forget an old wake
         self._needed = needed
         if len(events) < needed and not self._urgent:
-            self._wake.acquire(timeout=self._longest(timeout))
+            self._wake.acquire(timeout=-1.0 if timeout is None else timeout)
         self._urgent = False
         taken = []
         while events:
             taken.append(events.popleft())
-        if self._counted or not self._tokens.is_idle:
+        if self._counted or self._taken:
             with self._guard:
-                while events:  # none that is counted waits any more, and no token that comes in now
+                while events:  # none that is counted waits any more
                     taken.append(events.popleft())
-                self._counted = False
-                taken += self._tokens.taken(monotonic())
-                self._backlog.emptied(self._tokens.message_bytes)
-                self._emptied.notify_all()
+                self._counted, self._bytes, self._appeared = False, 0, 0
+                self._beyond.clear()
+                self._taken, self._waiting = self._waiting, {}
         return taken
-
-    def _longest(self, timeout: float | None) -> float:
-        """Return how long to wait (s), until a token that waits may come in at the latest; -1 for no limit."""
-        due = self._tokens.due
-        if due == inf:
-            return -1.0 if timeout is None else timeout
-        return max(0.0, min(due - monotonic(), inf if timeout is None else timeout))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import errno
-import gc
 import os
 from contextlib import suppress
 
@@ -97,43 +96,3 @@ def keep_out_of_the_heap() -> None:
     """
     with suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
         ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)
-
-
-def give_back_freed() -> None:
-    """Give the heap's freed memory back to the system; nothing where the C library is not glibc.
-
-    It takes 1 ms in an agent, and more where more is free: 28 ms for 75 MB.
-    """
-    with suppress(OSError, AttributeError, TypeError):
-        ctypes.CDLL(None).malloc_trim(0)
-
-
-PERIOD = 60.0
-"""Time between two collections (s)."""
-
-
-class FreeLists:
-    """Empty the lists now and then.
-
-    Python keeps up to 2000 freed tuples of each length up to 20 for new ones, 5 MB in all. Messages of many lengths
-    fill these lists within half an hour. Only a full collection empties them, and one hardly ever comes in a process
-    that makes no garbage.
-    """
-
-    def __init__(self, now: float) -> None:
-        self._due = now + PERIOD
-        self._settled = False
-
-    def tend(self, now: float) -> bool:
-        """Collect if it is time (s); return whether it was.
-
-        The first time takes some ms, and what there is then stays: later collections pass it over and take some 0.1 ms.
-        """
-        if now < self._due:
-            return False
-        gc.collect()
-        if not self._settled:
-            gc.freeze()
-            self._settled = True
-        self._due = now + PERIOD
-        return True

@@ -65,7 +65,6 @@ MakeLinks = Callable[[str, Mapping[str, Any]], Links | None]
 
 
 def no_links(name: str, tree: Mapping[str, Any]) -> None:
-    """Return None: no links are emulated."""
     if tree:
         raise ConfigurationError(
             f"{name}: the configuration has emulated links; start it with gridpeers.scenarios.emulation"

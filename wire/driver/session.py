@@ -15,9 +15,8 @@ from time import monotonic
 from typing import TYPE_CHECKING, Any
 from weakref import WeakSet
 
-from gridpeers.wire.backlog import Loss, Stamped
-from gridpeers.wire.driver.inbox import Inbox
-from gridpeers.wire.driver.machine import give_back_freed, limit
+from gridpeers.wire.driver.inbox import Inbox, Stamped
+from gridpeers.wire.driver.machine import limit
 from gridpeers.wire.driver.sockets import LinkAddresses, address_in, do_not_linger, end_left_links, host_addresses
 from gridpeers.wire.driver.zenoh_settings import (
     ONE_THREAD,
@@ -25,12 +24,11 @@ from gridpeers.wire.driver.zenoh_settings import (
     RUNTIME,
     Clock,
     as_client,
-    runtime_objection,
     zenoh_settings,
 )
 from gridpeers.wire.keys import LATEST_ONLY, is_token
-from gridpeers.wire.packages import not_importable
 from gridpeers.wire.trust.credentials import Credentials, LinkCertificates
+from gridpeers.wire.wording import not_importable
 
 if TYPE_CHECKING:
     import zenoh
@@ -47,10 +45,6 @@ ADDRESSES_EVERY = 0.5
 
 _QUERY_TIMEOUT = 600.0
 """Time (s) after which Zenoh forgets a query; the asking node keeps its own deadline."""
-
-MOST_UNPREPARED = 64
-"""Publishers that are kept for keys that nobody has prepared, such as those of answers: anybody may ask, under as many
-names as he likes."""
 
 _open_sessions: WeakSet[Session] = WeakSet()
 """Sessions of this process that are not closed."""
@@ -71,39 +65,20 @@ class SessionError(ValueError):
 
 
 class Session:
-    """A peer of a run.
+    """A peer of a run; raises SessionError if Zenoh is not installed, or an endpoint cannot be listened on.
 
-    Parameters
-    ----------
-    who : str
-        Name of the process, for error messages.
-    listen : tuple[str, ...], optional
-        Endpoints to listen on, e.g. ("tcp/127.0.0.1:7447",). Without any, no peer can connect to this one.
-    connect : tuple[str, ...], optional
-        Endpoints to connect to, tried again until they answer.
-    gossip : bool, optional
-        Whether to learn of other peers from the connected ones, and to connect to them in turn.
-    clock : {"simulated", "wall"}, optional
-        Kind of time of the run.
-    rendezvous : bool, optional
-        Whether others connect to this peer by its address. In wall-clock time any other peer becomes the client of a
-        router that answers: between two peers that know each other both directly and through a router, Zenoh changes
-        the way of their declarations under way, and loses some.
-    inbox : Inbox, optional
-        Inbox of a former session, which this one replaces; by default a new one.
-    meets_all : bool, optional
-        Whether to connect to every peer, instead of the one with the greater id of each pair: for a peer that does not
-        listen.
-    star : bool, optional
-        Whether the rendezvous relays all messages, as a router: then every other session is its client, with one link.
-    credentials : Credentials or None, optional
-        Own certificate and the members of the site: links are then mutual TLS, and Zenoh lets each member send and
-        receive what its role may, and nothing else. Without them anybody who reaches an endpoint takes part.
+    `who` names the process in errors. `listen` and `connect` are endpoints, e.g. "tcp/127.0.0.1:7447"; those to connect
+    to are tried again until they answer. With `gossip` it learns of other peers from the connected ones. With
+    `meets_all` it connects to every peer, instead of the one with the greater id of each pair: for a peer that does not
+    listen. `inbox` is that of a former session, which this one replaces.
 
-    Raises
-    ------
-    SessionError
-        If Zenoh is not installed, the user's choice of its threads is wrong, or an endpoint cannot be listened on.
+    A `rendezvous` is the peer to which others connect by its address. In wall-clock time any other peer becomes the
+    client of a router that answers: between two peers that know each other both directly and through a router, Zenoh
+    changes the way of their declarations under way, and loses some. In a `star` the rendezvous relays all messages, as
+    a router: then every other session is its client, with one link.
+
+    With `credentials` links are mutual TLS, and Zenoh lets each member send and receive what its role may, and nothing
+    else. Without them anybody who reaches an endpoint takes part.
     """
 
     def __init__(
@@ -120,8 +95,6 @@ class Session:
         star: bool = False,
         credentials: Credentials | None = None,
     ) -> None:
-        if objection := runtime_objection(os.environ.get("ZENOH_RUNTIME", RUNTIME)):
-            raise SessionError(f"{who}: {objection}")
         try:
             load_zenoh(one_thread=star and not rendezvous)
             import zenoh
@@ -131,12 +104,10 @@ class Session:
             zenoh.try_init_log_from_env()  # type: ignore[no-untyped-call]  # as zenoh declares it
         elif credentials is not None and rendezvous:
             zenoh.init_log_from_env_or(_REFUSED_LINKS)
-        self.inbox = inbox or Inbox(holds=clock == "simulated")
+        self.inbox = inbox or Inbox(lossless=clock == "simulated")
         self._zenoh = zenoh
         self._drops = PROFILES[clock].may_drop
         self._publishers: dict[str, zenoh.Publisher] = {}
-        self._unprepared: list[str] = []
-        """Keys of the publishers that nobody has prepared, oldest first."""
         self._declared: list[Any] = []
         self._tokens: dict[str, zenoh.LivelinessToken] = {}
         self._certificates: LinkCertificates | None = None
@@ -202,7 +173,6 @@ class Session:
         self._changeable = False
 
     def _meets_router(self) -> bool:
-        """Wait for the first link; return whether it leads to a router."""
         linked = threading.Event()
 
         def on_event(event: zenoh.TransportEvent) -> None:
@@ -214,7 +184,6 @@ class Session:
         return bool(self._session.info.routers_zid())
 
     def setting(self, path: str) -> Any:
-        """Return a setting of Zenoh in force, by its path in Zenoh's configuration, e.g. "transport/link/tx/lease"."""
         return json.loads(self._config.get_json(path))
 
     @property
@@ -240,10 +209,6 @@ class Session:
                 self._certificates.note(self._session.info.links())
         return self.inbox.take(needed, timeout)
 
-    def take_losses(self) -> tuple[Loss, ...]:
-        """Take out the messages that were dropped unread since the last call."""
-        return self.inbox.take_losses()
-
     def subscribe(self, key: str) -> None:
         """Put messages on a key, without wildcards, into the inbox."""
         enqueue = self.inbox.put
@@ -256,8 +221,6 @@ class Session:
         self._declared.append(self._session.declare_subscriber(key, handler, allowed_origin=remote))
 
     def answer(self, key: str, payload: bytes) -> None:
-        """Answer every query on a key with the same bytes."""
-
         def on_query(query: zenoh.Query) -> None:
             with query:
                 query.reply(key, payload)
@@ -296,47 +259,35 @@ class Session:
         self._declared.append(self._session.liveliness().declare_subscriber(key, handler, history=True))
 
     def hold_token(self, key: str) -> None:
-        """Declare a liveliness token, until it is withdrawn, or the session or the process ends."""
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def withdraw_token(self, key: str) -> None:
-        """Undeclare a liveliness token."""
         self._tokens.pop(key).undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
 
     def publish(self, key: str, payload: bytes) -> None:
         """Publish bytes on a key; block rather than drop, except in wall-clock time for keys of `LATEST_ONLY`."""
         publisher = self._publishers.get(key)
-        if publisher is None:
-            publisher = self._prepare_for_now(key)
-        publisher.put(payload)
-
-    def _prepare_for_now(self, key: str) -> zenoh.Publisher:
-        """Declare the publisher of a key that nobody has prepared, and drop the oldest of these if there are many."""
-        if len(self._unprepared) >= MOST_UNPREPARED:
-            oldest = self._publishers.pop(self._unprepared.pop(0))
-            oldest.undeclare()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        self.prepare(key)
-        self._unprepared.append(key)
-        return self._publishers[key]
+        if publisher is not None:
+            publisher.put(payload)
+        else:  # as for an answer: anybody may ask, under as many names as he likes
+            self._session.put(key, payload, **self._delivery(key))
 
     def prepare(self, key: str) -> None:
-        """Declare the publisher of a key, once."""
         if key not in self._publishers:
-            drop = self._drops and key.split("/")[2] in LATEST_ONLY
-            control = self._zenoh.CongestionControl
-            self._publishers[key] = self._session.declare_publisher(
-                key,
-                congestion_control=control.DROP if drop else control.BLOCK,
-                allowed_destination=self._zenoh.Locality.REMOTE,
-            )
+            self._publishers[key] = self._session.declare_publisher(key, **self._delivery(key))
+
+    def _delivery(self, key: str) -> dict[str, Any]:
+        control = self._zenoh.CongestionControl
+        return {
+            "congestion_control": control.DROP if self.may_drop(key) else control.BLOCK,
+            "allowed_destination": self._zenoh.Locality.REMOTE,
+        }
 
     def may_drop(self, key: str) -> bool:
         """Return whether Zenoh drops a message on a key, instead of waiting, when a link is full."""
-        self.prepare(key)
-        return bool(self._publishers[key].congestion_control == self._zenoh.CongestionControl.DROP)
+        return self._drops and key.split("/")[2] in LATEST_ONLY
 
     def peers(self) -> int:
-        """Number of peers and routers connected now."""
         info = self._session.info
         return len(info.peers_zid()) + len(info.routers_zid())
 
@@ -345,10 +296,7 @@ class Session:
         return () if self._certificates is None else self._certificates.take_lines()
 
     def vouches(self, name: str) -> bool:
-        """Return whether a link of this session has had the certificate of a sender, the plant or an agent.
-
-        Without certificates everybody counts as vouched for.
-        """
+        """Whether a link has had the certificate of a sender, the plant or an agent; True without certificates."""
         if self._certificates is None or self._certificates.vouches(name):
             return True
         self._certificates.note(self._session.info.links())  # one may have just come
@@ -357,11 +305,8 @@ class Session:
     def close(self, *, replaced: bool = False) -> None:
         """Undeclare the tokens and close.
 
-        Parameters
-        ----------
-        replaced : bool, optional
-            Whether this process goes on with another session: then what Zenoh leaves of this one is cleared away, which
-            takes 50 ms. It is left if a further session is open, whose links look the same.
+        If it is `replaced` by another session of this process, what Zenoh leaves of it is cleared away, which takes
+        50 ms; not while a further session is open, whose links look the same.
         """
         # close() may raise when a peer has just gone; nothing can be done about it
         with contextlib.suppress(self._zenoh.ZError):
@@ -370,21 +315,13 @@ class Session:
             _open_sessions.discard(self)
             if replaced and not _open_sessions:
                 end_left_links()
-                give_back_freed()
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
-        """Run a callback in Zenoh's receiving thread: one hand-over less than through a thread of its own."""
         return self._zenoh.handlers.Callback(callback, indirect=False)
 
 
 def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
-    """Return why no session could be opened, without the places in Zenoh's own source.
-
-    Examples
-    --------
-    >>> _explain("inv1", ("tls/127.0.0.1:0",), "No key (os error 2) at /zenoh/utils.rs:523. at /zenoh/unicast.rs:4.")
-    'inv1: cannot open a Zenoh session (listening on tls/127.0.0.1:0): No key (os error 2)'
-    """
+    """Return why no session could be opened, without the places in Zenoh's own source."""
     error = re.sub(r" at /\S+\.rs:\d+\.?", "", error)
     endpoints = ", ".join(listen)
     if "in use" in error:

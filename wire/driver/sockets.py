@@ -140,7 +140,6 @@ def do_not_linger() -> None:
 
 
 def linger(connection: socket.socket) -> tuple[int, int]:
-    """Return whether closing a socket may block, and for how long (s)."""
     on, seconds = struct.unpack("ii", connection.getsockopt(socket.SOL_SOCKET, socket.SO_LINGER, len(_OFF)))
     return on, seconds
 
@@ -182,7 +181,6 @@ def end_left_links() -> None:
 
 
 def _end_links() -> bool:
-    """End the links that are there; return whether there were any."""
     ended = False
     for same in tcp_sockets():
         with suppress(OSError):  # ended by the other side

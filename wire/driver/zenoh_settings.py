@@ -5,8 +5,6 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Sequence
 from typing import Any, Literal, NamedTuple
 
 from gridpeers.wire.trust.credentials import Credentials
@@ -18,26 +16,6 @@ flood of messages can stall it."""
 ONE_THREAD = "(rx: (handover: app), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """All in one pool of one thread, for the client of a relay. It passes nothing on, so receiving never waits for sending;
 a message then wakes one thread of Zenoh instead of two."""
-
-_POOLS = "app|acc|tx|rx|net"
-_SETTING = rf"(?:(?:worker_threads|max_blocking_threads)\s*:\s*[1-9][0-9]{{0,2}}|handover\s*:\s*(?:{_POOLS}))\s*"
-_POOL = rf"(?:{_POOLS})\s*:\s*\(\s*(?:{_SETTING}(?:,\s*{_SETTING})*,?\s*)?\)\s*"
-_RUNTIME_FORM = re.compile(rf"\s*\(\s*(?:{_POOL}(?:,\s*{_POOL})*,?\s*)?\)\s*")
-
-LEASE = 86_400_000
-"""Time (ms) after which a silent link counts as dead, in lock-step. It is a day because it must not decide: the death
-of a process closes its links at once, the deadlines of the lock-step detect a frozen one, and a whole run may be frozen
-for hours."""
-
-WALL_LEASE = 2_000
-"""The same in wall-clock time: after a cut Zenoh must renew the link soon. Control does not wait for it."""
-
-WAIT_BEFORE_CLOSE = 5_000_000
-"""How long (us) a message that may not be dropped waits for a full link, in lock-step: Zenoh's default."""
-
-WALL_WAIT_BEFORE_CLOSE = 200_000
-"""The same in wall-clock time, where a waiting plant holds up the control of all others. Zenoh renews a closed link
-when its other end reads again."""
 
 
 class Profile(NamedTuple):
@@ -58,8 +36,12 @@ class Profile(NamedTuple):
 Clock = Literal["simulated", "wall"]
 
 PROFILES: dict[Clock, Profile] = {
-    "simulated": Profile(LEASE, (20, 50, 1.5), 10_000, WAIT_BEFORE_CLOSE, may_drop=False),
-    "wall": Profile(WALL_LEASE, (100, 500, 2.0), 1_000, WALL_WAIT_BEFORE_CLOSE, may_drop=True),
+    # The lease is a day because it must not decide: the death of a process closes its links at once, the deadlines of
+    # the lock-step detect a frozen one, and a whole run may be frozen for hours.
+    "simulated": Profile(86_400_000, (20, 50, 1.5), 10_000, 5_000_000, may_drop=False),
+    # After a cut Zenoh must renew the link soon; control does not wait for it. A plant that waits for a full link holds
+    # up the control of all others, and Zenoh renews a closed link when its other end reads again.
+    "wall": Profile(2_000, (100, 500, 2.0), 1_000, 200_000, may_drop=True),
 }
 
 MOST_BYTES = 8_000_000
@@ -92,36 +74,7 @@ def zenoh_settings(
     return config
 
 
-def runtime_objection(text: str) -> str:
-    """Return what is wrong with a value of the environment variable ZENOH_RUNTIME; empty if Zenoh can use it.
-
-    Zenoh itself aborts a thread over a wrong one, at the first link or later.
-
-    Examples
-    --------
-    >>> runtime_objection(RUNTIME), runtime_objection("(rx: (worker_threads: 2))")
-    ('', '')
-    >>> runtime_objection("(rx: (threads: 2))")[:62]
-    'the environment variable ZENOH_RUNTIME is "(rx: (threads: 2))"'
-    """
-    bodies = [text, *re.findall(r"\(([^()]*)\)", text)]
-    if _RUNTIME_FORM.fullmatch(text) and not any(map(_repeats, bodies)):
-        return ""
-    return (
-        f'the environment variable ZENOH_RUNTIME is "{text:.200}", which Zenoh cannot use; unset it, or write e.g. '
-        f"{RUNTIME}: pools app, acc, tx, rx and net, each at most once, with any of worker_threads and "
-        "max_blocking_threads (1 to 999) and handover (the pool that does its work)"
-    )
-
-
-def _repeats(body: str) -> bool:
-    """Return whether a key stands twice in a list of Zenoh's runtime."""
-    keys: Sequence[str] = re.findall(r"(\w+)\s*:\s*" + (r"\(" if "(" in body else ""), body)
-    return len(set(keys)) < len(keys)
-
-
 def as_client(config: dict[str, Any]) -> dict[str, Any]:
-    """Return the configuration of the same session as the client of the router that it has met."""
     return config | {"mode": "client", "listen": {"endpoints": []}}
 
 

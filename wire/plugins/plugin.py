@@ -9,8 +9,7 @@ from typing import Any
 
 import msgspec
 
-from gridpeers.wire.plugins.foreign_code import ANYTHING, foreign_code, named
-from gridpeers.wire.plugins.registry import PluginError, Registry
+from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
 from gridpeers.wire.schema.table_reading import in_words, parameter_values, read_parameters, shown
 from gridpeers.wire.schema.table_schema import Problem, fields_of
 from gridpeers.wire.wording import printable
@@ -24,13 +23,7 @@ Scalar = float | int | bool | str
 
 
 def scalar_objection(value: Any) -> str:
-    """Return why a value cannot be one of a parameter, whatever the parameter; "" if it can.
-
-    Examples
-    --------
-    >>> scalar_objection(10**30)
-    'a whole number has at most 64 bits; got 1000000000000000000000000000000'
-    """
+    """Return why a value cannot be one of a parameter, whatever the parameter; "" if it can."""
     written = printable(repr(value), 60)
     if not isinstance(value, str | int | float):
         return f"a parameter is a number, a text, or true or false; got {written}"
@@ -53,42 +46,23 @@ class Plugin(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
 
     @property
     def name(self) -> str:
-        """The plugin, for people; the same text in every process."""
         return self.use
 
 
 def table_of(key: str | Mapping[str, Any]) -> dict[str, Any]:
-    """Return a scenario's key as a table, a copy: a text alone is its `use`.
-
-    Examples
-    --------
-    >>> table_of("mine:Nearest")
-    {'use': 'mine:Nearest'}
-    """
+    """Return a scenario's key as a table, a copy: a text alone is its `use`."""
     return {"use": key} if isinstance(key, str) else dict(key)
 
 
 def plugin_of(text: str | Mapping[str, Any], folder: str = "") -> Plugin:
-    """Return what a scenario's key says: a text, or a table with `use` and parameters.
-
-    Examples
-    --------
-    >>> plugin_of({"use": "mine:Nearest", "k": 3}).parameters
-    (('k', 3),)
-    """
+    """Return what a scenario's key says: a text, or a table with `use` and parameters."""
     table = table_of(text)
     use, place = table.pop("use", ""), table.pop("folder", "")
     return Plugin(use=use, folder=place or folder, parameters=tuple(sorted(table.items())))
 
 
 def made(registry: Registry[Any], plugin: Plugin) -> Any:
-    """Return the plugged-in function, or an instance of the class with its parameters.
-
-    Raises
-    ------
-    PluginError
-        If there is none, or it cannot be made with these parameters; the text says what would be right.
-    """
+    """Return the plugged-in function, or an instance of the class with its parameters; PluginError without one."""
     found = registry.resolve(plugin.use, plugin.folder)
     given = dict(plugin.parameters)
     if not isinstance(found, type):
@@ -98,8 +72,7 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
     try:
         values = parameter_values(found, given)
         if any("__init__" in vars(base) for base in found.__mro__ if base is not object):
-            with foreign_code():
-                return found(**values)
+            return found(**values)
         it = found()
         for name, value in values.items():
             setattr(it, name, value)
@@ -110,7 +83,6 @@ def made(registry: Registry[Any], plugin: Plugin) -> Any:
 
 
 def plugin_problems(registry: Registry[Any], plugin: Plugin) -> list[Problem]:
-    """Return all that is wrong with a plugin, at its parameters, or at "" for the whole."""
     try:
         found = registry.resolve(plugin.use, plugin.folder)
     except PluginError as error:
@@ -128,17 +100,6 @@ def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...]
     """Return why something is no class of a kind, "" if it is.
 
     It is to define the method of `base` with these arguments, and none of its parameters may be named as one of `keys`.
-
-    Examples
-    --------
-    >>> class Base:
-    ...     def judge(self, message): ...
-    >>> class Mine(Base):
-    ...     def judge(self): ...
-    >>> class_objection(Base, Base, "judge", ("message",))
-    'it has no method judge(self, message)'
-    >>> class_objection(Mine, Base, "judge", ("message",))
-    'write its method judge(self, message): too many positional arguments'
     """
     if not (isinstance(it, type) and issubclass(it, base)):
         return f"derive a class from gridpeers.{base.__name__}"
@@ -153,31 +114,22 @@ def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...]
 
 
 def callable_objection(it: Any, argument: str, keys: tuple[str, ...] = KEYS) -> str:
-    """Return why something is neither a function of one argument nor a class of such functions; "" if it is.
-
-    Examples
-    --------
-    >>> callable_objection(len, "window"), callable_objection(lambda: 1, "window")
-    ('', 'it is called with one argument, the window: too many positional arguments')
-    """
+    """Return why something is neither a function of one argument nor a class of such functions; "" if it is."""
+    function, said = it, f"it is called with one argument, the {argument}"
     if isinstance(it, type):
-        call = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
-        if call is None:
+        function = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
+        if function is None:
             return f"the class needs a method __call__(self, {argument})"
-        try:
-            inspect.signature(call).bind(None, None)
-        except TypeError as error:
-            return f"write its method __call__(self, {argument}): {error}"
-        return _parameter_objection(it, keys)
-    if not callable(it):
+        said = f"write its method __call__(self, {argument})"
+    elif not callable(it):
         return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
     try:
-        inspect.signature(it).bind(None)
+        inspect.signature(function).bind(*[None] * (1 + isinstance(it, type)))
     except TypeError as error:
-        return f"it is called with one argument, the {argument}: {error}"
+        return f"{said}: {error}"
     except ValueError:  # a function of C tells no signature
         return ""
-    return ""
+    return _parameter_objection(it, keys) if isinstance(it, type) else ""
 
 
 def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:

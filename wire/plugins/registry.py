@@ -16,8 +16,7 @@ from importlib.util import find_spec
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
-from gridpeers.wire.plugins.foreign_code import foreign_code
-from gridpeers.wire.wording import printable, suggestion
+from gridpeers.wire.wording import is_no_path, printable, suggestion
 
 T = TypeVar("T")
 
@@ -31,6 +30,42 @@ NOTEBOOK = "__main__"
 """Module of what is defined in a notebook or in the script that runs: no other process can import it."""
 
 
+ANYTHING = (Exception, SystemExit, GeneratorExit)
+"""Exceptions of foreign code; only Ctrl+C and a request to stop end the run."""
+
+LONGEST_NAME = 100
+"""Characters of the name of a file that a message shows, from its end."""
+
+
+def named(error: BaseException) -> str:
+    """Return an error as one line; its text may fail too."""
+    try:
+        text = str(error)
+    except ANYTHING:
+        text = "its text cannot be had"
+    return printable(f"{type(error).__name__}: {text}", 200)
+
+
+def line_of(function: Callable[..., Any], error: BaseException, folder: str = "") -> str:
+    """Return where foreign code failed, as " (mine.py:12)": the innermost line in the folder of a function's file.
+
+    Without a traceback, as of a function that returned something wrong, it is the line of the function. A file in
+    `folder`, by default that of the function, is named from there. Empty for a function that is not written in Python.
+    """
+    of_instance = getattr(type(function), "__call__", None)  # noqa: B004 - its code is wanted
+    code = getattr(function, "__code__", None) or getattr(of_instance, "__code__", None)
+    if code is None:
+        return ""
+    file, line, home = code.co_filename, code.co_firstlineno, code.co_filename.rpartition("/")[0]
+    step = (error.__cause__ or error).__traceback__
+    while step is not None:
+        if step.tb_frame.f_code.co_filename.rpartition("/")[0] == home:
+            file, line = step.tb_frame.f_code.co_filename, step.tb_lineno
+        step = step.tb_next
+    name = printable(file.removeprefix(f"{folder or home}/"))
+    return f" ({name if len(name) <= LONGEST_NAME else '...' + name[-LONGEST_NAME:]}:{line})"
+
+
 class PluginError(ValueError):
     """A reference that leads to nothing usable; its text says why and what to write."""
 
@@ -38,16 +73,9 @@ class PluginError(ValueError):
 class Registry(Generic[T]):
     """Everything of one kind that can be plugged in.
 
-    Parameters
-    ----------
-    kind, plural : str
-        What is registered, for messages: "law", "laws".
-    objection : Callable[[Any], str]
-        Why an object is none of this kind, as the end of a sentence; "" if it is one.
-    own : dict[str, str], optional
-        References (`module:Name`) of those that come with gridpeers, by name; imported when they are asked for.
-    reserved : Collection[str], optional
-        Names of entry points of gridpeers that no decorator may take over.
+    `kind` and `plural` are the words for it, `objection` says why an object is none of this kind, as the end of a
+    sentence, and `own` has the references of those that come with gridpeers, imported when they are asked for. Names of
+    entry points that are `reserved` no decorator takes over.
 
     Examples
     --------
@@ -78,22 +106,14 @@ class Registry(Generic[T]):
 
     @property
     def group(self) -> str:
-        """Group of entry points by which an installed distribution adds to this registry."""
         return f"gridpeers.{self.plural.replace(' ', '_')}"
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names that can be resolved, gridpeers' own first."""
         return tuple(dict.fromkeys((*self.own, *self._added, *entry_points_of(self.group))))
 
     def register(self, name: str) -> Callable[[T], T]:
-        """Return a decorator that adds an object under a name, for this process; a name is never taken over.
-
-        Raises
-        ------
-        PluginError
-            If gridpeers, or another module, has an object of this name, or it is no name.
-        """
+        """Return a decorator that adds an object under a name, for this process; a name is never taken over."""
         if not isinstance(name, str) or not name.strip() or ":" in name:
             raise PluginError(
                 f'{name!r:.60} is no name of a {self.kind}; give the decorator a text without ":", e.g. "mine"'
@@ -113,10 +133,7 @@ class Registry(Generic[T]):
     def resolve(self, reference: str, folder: str = "") -> T:
         """Return the object of a name, or of `module:Name`, also from a `folder` that is not on the Python path.
 
-        Raises
-        ------
-        PluginError
-            If there is none, or it is none of this kind.
+        Raise PluginError if there is none, or it is none of this kind.
         """
         if reference in self._added:
             return self._added[reference]
@@ -140,10 +157,7 @@ class Registry(Generic[T]):
     def portable(self, reference: str) -> str:
         """Return the text by which another process finds the same object: `module:Name` for what a decorator added.
 
-        Raises
-        ------
-        PluginError
-            If it is defined in a notebook or script, where no other process can import it.
+        Raise PluginError if it is defined in a notebook or script, where no other process can import it.
         """
         text = self.reference(reference)
         module, _, name = text.partition(":")
@@ -165,66 +179,48 @@ class Registry(Generic[T]):
             try:
                 found = getattr(found, part)
             except AttributeError:
-                there = [key for key, value in vars(module).items() if not key.startswith("_") and self._fits(value)]
+                there = [
+                    key for key, value in vars(module).items() if not key.startswith("_") and not self._objection(value)
+                ]
                 hint = suggestion(part, there, "names there")
                 raise PluginError(f'{reference}: module {module_name} has no "{part}"; {hint}') from None
         self._check(found, reference)
         return found  # type: ignore[no-any-return]
 
     def _module(self, name: str, reference: str, folder: str) -> Any:
-        if folder and folder not in sys.path and _is_needed(name, folder):
+        top = name.partition(".")[0]
+        meant = PathFinder.find_spec(top, [folder]) if folder else None
+        if meant is not None and folder not in sys.path:
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
             _folders.add(folder)
         try:
-            known = name in sys.modules
-            spec = sys.modules[name].__spec__ if known else find_spec(name)
-            if (spec is None and not known) or is_of_another(spec, folder):
+            known = sys.modules.get(name)
+            spec = find_spec(name) if known is None else known.__spec__
+            if (known is None and spec is None) or (meant is None and _is_of_another(spec, folder)):
                 place = f" in {folder} or" if folder else ""
                 text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
                 raise PluginError(f"{reference}: {text}")
-            with foreign_code():
-                found = importlib.import_module(name)
-            _check_place(found, name, folder, reference)
-            return _as_it_is_now(found)
+            module = importlib.import_module(name)
+            found = getattr(sys.modules[top], "__spec__", None)
+            if meant is not None and found is not None and meant.origin != found.origin:
+                raise PluginError(
+                    f"{reference}: Python has another module {top}, from {found.origin}, than that in {folder}; give "
+                    "one of the two another name"
+                )
+            return _as_it_is_now(module)
         except PluginError:
             raise
-        except (Exception, SystemExit) as error:  # whatever a user's module does while it is imported
-            text = printable(f"{type(error).__name__}: {error}", 300)
-            raise PluginError(f"{reference}: importing {name} failed: {text}") from error
-
-    def _fits(self, it: Any) -> bool:
-        return not self._objection(it)
+        except ANYTHING as error:  # whatever a user's module does while it is imported
+            raise PluginError(f"{reference}: importing {name} failed: {named(error)}") from error
 
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
 
 
-def _is_needed(name: str, folder: str) -> bool:
-    """Whether a module stands in a folder that Python would not look in, nor by "", which is where a session runs."""
-    top = name.partition(".")[0]
-    meant, found = PathFinder.find_spec(top, [folder]), PathFinder.find_spec(top)
-    return meant is not None and (found is None or found.origin is None or found.origin != meant.origin)
-
-
-def _check_place(module: Any, name: str, folder: str, reference: str) -> None:
-    """Refuse a module of the same name as the one in a scenario's folder that is another."""
-    top = sys.modules[name.partition(".")[0]]
-    found = getattr(top, "__spec__", None)
-    meant = PathFinder.find_spec(top.__name__, [folder]) if folder else None
-    if found is None or meant is None or meant.origin == found.origin or _source(meant) == _source(found):
-        return
-    raise PluginError(
-        f"{reference}: Python has another module {top.__name__}, from {found.origin}, than that in {folder}; give one "
-        "of the two another name"
-    )
-
-
-def is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
+def _is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
     """Whether a module stands in the folder of another scenario: only this process would find it there."""
-    place = "" if spec is None or not spec.has_location or not spec.origin else spec.origin.rpartition("/")[0]
-    own = spec is not None and folder and PathFinder.find_spec(spec.name.partition(".")[0], [folder])
-    return place in _folders and place != folder and not own
+    return spec is not None and bool(spec.origin) and str(spec.origin).rpartition("/")[0] in _folders - {folder}
 
 
 def _as_it_is_now(module: ModuleType) -> ModuleType:
@@ -240,14 +236,7 @@ def _as_it_is_now(module: ModuleType) -> ModuleType:
     return module
 
 
-def _source(spec: Any) -> str | None:
-    """Text of a module, by which the same file is known under another path."""
-    text = getattr(spec.loader, "get_source", lambda name: None)(spec.name)
-    return None if text is None else str(text)
-
-
 def _home(it: Any) -> tuple[str, str]:
-    """Module and name under which an object can be imported."""
     kind = it if hasattr(it, "__qualname__") else type(it)
     return str(kind.__module__), str(kind.__qualname__)
 
@@ -258,3 +247,18 @@ def entry_points_of(group: str) -> dict[str, str]:
     from importlib import metadata  # a quarter of an agent's start, which resolves names of our own alone
 
     return {point.name: point.value for point in metadata.entry_points(group=group)}
+
+
+def folder_of(reference: str, folder: str) -> str:
+    """Return where another process finds the module of a reference: `folder` if it is there, else its own folder."""
+    top = reference.partition(":")[0].partition(".")[0]
+    if top == NOTEBOOK or is_no_path(folder) or is_no_path(f"{top}.py") or PathFinder.find_spec(top, [folder]):
+        return folder
+    try:
+        spec = find_spec(top)
+    except ValueError:  # a module without a specification, as of an embedded interpreter
+        return folder
+    if spec is None or spec.origin is None or spec.origin == "frozen" or _is_of_another(spec, folder):
+        return folder
+    place = spec.origin.rpartition("/")[0]
+    return place.rpartition("/")[0] if spec.submodule_search_locations else place

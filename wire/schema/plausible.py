@@ -35,7 +35,6 @@ class Range:
 
     @property
     def span(self) -> str:
-        """The range in words, "" if there is none."""
         if math.isfinite(self.low + self.high):
             return f"{_bound(self.low)} to {_bound(self.high)}"
         if math.isfinite(self.low):
@@ -43,13 +42,7 @@ class Range:
         return f"at most {_bound(self.high)}" if math.isfinite(self.high) else ""
 
     def objection(self, value: Any, unit: str = "") -> str:
-        """Return why a value is no number within the range, "" if it is.
-
-        Examples
-        --------
-        >>> Range(0.0, 60.0).objection(70, "s")
-        'must be from 0 to 60 s, got 70'
-        """
+        """Return why a value is no number within the range, "" if it is."""
         shown = printable(str(value), 60)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
             return f"must be a number, got {shown}"
@@ -79,7 +72,6 @@ class Plausible:
 
     @property
     def span(self) -> str:
-        """The range in words."""
         return f"{self.low:g} to {self.high:g}"
 
     def objection(self, value: float, unit: str = "") -> str:
@@ -87,17 +79,8 @@ class Plausible:
 
         Examples
         --------
-        >>> period, power = Plausible("a control period", 5e-4, 2.0, above_zero=True), Plausible("a power", 0.0, 1.2)
-        >>> period.objection(20.0, "s")
+        >>> Plausible("a control period", 5e-4, 2.0, above_zero=True).objection(20.0, "s")
         '20 s is not plausible for a control period (0.0005 to 2 s); did you mean 0.02 (20 ms)?'
-        >>> period.objection(-0.02, "s")
-        'a control period must be above 0, got -0.02 s; 0.0005 to 2 s makes sense'
-        >>> power.objection(64.7, "pu")
-        '64.7 pu is not plausible for a power (0 to 1.2 pu); did you mean 0.647 (64.7 %)?'
-        >>> power.objection(-0.1, "pu")
-        'a power must not be negative, got -0.1 pu; 0 to 1.2 pu makes sense'
-        >>> Plausible("a nominal voltage", 0.1, 150.0).objection(4160.0, "kV")
-        '4160 kV is not plausible for a nominal voltage (0.1 to 150 kV); did you mean 4.16 (4160 V)?'
         """
         text = f" {unit}" if unit else ""
         span = f"{self.span}{text}"
@@ -134,17 +117,10 @@ class Probability:
 
     @property
     def span(self) -> str:
-        """The range in words."""
         return "above 0, to 1" if self.above_zero else "0 to 1"
 
     def objection(self, value: float, unit: str = "") -> str:
-        """Return why a number is no such probability, "" if it is.
-
-        Examples
-        --------
-        >>> Probability("a loss").objection(30.0)
-        'a loss is a probability from 0 to 1, got 30; did you mean 0.3 (30 %)?'
-        """
+        """Return why a number is no such probability, "" if it is."""
         if (LEAST if self.above_zero else 0.0) <= value <= 1.0:
             return ""
         bounds = "above 0 and up to 1" if self.above_zero else "from 0 to 1"

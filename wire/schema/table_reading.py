@@ -38,7 +38,6 @@ _KIND_WORDS = {
 
 
 def shown(raw: object) -> str:
-    """Return a value as TOML writes it, or nearly."""
     try:
         text = json.dumps(raw, ensure_ascii=False, default=str)
     except (TypeError, ValueError, RecursionError):  # what Python has and no file
@@ -47,20 +46,13 @@ def shown(raw: object) -> str:
 
 
 def in_words(*kinds: Any) -> str:
-    """Return types in words.
-
-    Examples
-    --------
-    >>> in_words(Literal["a", "b"], list[float])
-    'one of "a", "b" or a list of numbers'
-    """
+    """Return types in words, such as 'one of "a", "b" or a list of numbers'."""
     kinds = tuple(part for kind in kinds for part in kinds_of(kind))
     words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(structs_in(kind))))
     return " or ".join(words)
 
 
 def wrong_type(field: Field, raw: Any) -> str:
-    """Say what a key takes in place of a value of another type."""
     kinds = kinds_of(field.type)
     literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
     if literal is not None and isinstance(raw, str):
@@ -73,7 +65,6 @@ def wrong_type(field: Field, raw: Any) -> str:
 
 
 def expected(field: Field) -> str:
-    """Say what to write for a key that is missing."""
     kind, example = without_none(field.type), field.mark(Example)
     if get_origin(kind) is dict:
         return f"write at least one table [{field.key}.NAME]"
@@ -90,7 +81,6 @@ def kinds_of(kind: Any) -> tuple[Any, ...]:
 
 
 def structs_in(kind: Any) -> list[Any]:
-    """Return the structs that a value may be."""
     return [part for part in kinds_of(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
 
 
@@ -103,19 +93,16 @@ def inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
 
 
 def keys_of(struct: type) -> list[str]:
-    """Return the keys of a table."""
     nameless = (OtherKeys, NamedTables)
     return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(nameless))]
 
 
 def _named(kinds: typing.Sequence[Any], field: Field) -> str:
-    """Name what a key takes, for people, with an example."""
     example = field.mark(Example)
     return in_words(*kinds) + (f" such as {example.text}" if example else "")
 
 
 def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
-    """Name one type."""
     origin = get_origin(kind)
     if origin is Literal:
         return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
@@ -135,7 +122,6 @@ def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
 
 
 def without_none(kind: Any) -> Any:
-    """Return a type without None: TOML has no null."""
     return functools.reduce(operator.or_, kinds_of(kind))
 
 
@@ -150,13 +136,9 @@ _KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", 
 
 
 def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Problem]]:
-    """Convert a file's tables to a struct.
+    """Convert a file's tables to a struct, which is of use only without problems.
 
-    Returns
-    -------
-    tuple[T, list[Problem]]
-        A key with a problem has its default, so that later checks find what else is wrong; the struct is of use only
-        without problems.
+    A key with a problem has its default, so that later checks find what else is wrong.
 
     Examples
     --------
@@ -172,12 +154,7 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
 
 
 def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Convert values for the parameters of a class, such as a law.
-
-    Returns
-    -------
-    tuple[dict[str, Any], list[Problem]]
-        The value of every parameter, by name; it is of use only without problems.
+    """Return the value of every parameter of a class, such as a law, by name; they are of use only without problems.
 
     Examples
     --------
@@ -195,10 +172,7 @@ def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any]
 def parameter_values(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the value of every parameter of a class, converted to its type.
 
-    Raises
-    ------
-    ValueError
-        If a value is wrong or missing; the text has all problems.
+    Raise ValueError if a value is wrong or missing; the text has all problems.
     """
     values, problems = read_parameters(cls, given)
     if problems:
@@ -225,13 +199,14 @@ class _Reader:
         inline = [field for field in fields_of(struct) if INLINE in field.marks]
         others = next((field for field in fields if field.mark(OtherKeys)), None)
         named = next((field for field in fields if field.mark(NamedTables)), None)
-        keys = [field.key for field in fields if field not in (others, named)]
-        keys += [key for field in inline for key in keys_of(field.type)]
+        inline_keys = [key for field in inline for key in keys_of(field.type)]
+        keys = [*(field.key for field in fields if field not in (others, named)), *inline_keys]
         values: dict[str, Any] = self._top if struct is self._root else {}
         tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
         is_table = isinstance(data, Mapping)
         if not is_table:
-            self._add(path, f"must be a table with the {self._noun}s {', '.join(keys)}, got {shown(data)}")
+            names = ", ".join([*_names(fields), *inline_keys])
+            self._add(path, f"must be a table with the {self._noun}s {names}, got {shown(data)}")
             data = {}
         for field in inline:
             values[field.name] = self.table(
@@ -251,7 +226,7 @@ class _Reader:
                 if key in tables and named:
                     values[named.name][key] = self.table(tables[key], data[key], _join(path, key))
                 else:
-                    self._add(_join(path, key), self._unknown(key, struct, [*keys, *tables]))
+                    self._add(_join(path, key), self._unknown(key, struct, [*_names(fields), *inline_keys]))
         for field in fields:
             if field in (others, named):
                 continue
@@ -311,7 +286,6 @@ class _Reader:
         return value
 
     def _chosen(self, structs: list[type[T]], raw: Mapping[str, Any], path: str) -> type[T] | None:
-        """Return the struct that a table names by its tag, after noting that it names none."""
         if len(structs) == 1:
             return structs[0]
         tags = {str(struct.__struct_config__.tag): struct for struct in structs}
@@ -365,8 +339,16 @@ def _tables(root: type) -> Iterator[tuple[str, type]]:
                 yield f"into [[{key}]]", inner
 
 
+def _names(fields: list[Field]) -> Iterator[str]:
+    """Yield the keys of fields, those of named tables among them."""
+    for field in fields:
+        if mark := field.mark(NamedTables):
+            yield from mark.known()
+        elif not field.mark(OtherKeys):
+            yield field.key
+
+
 def _fallback(field: Field) -> Any:
-    """Return what stands for a wrong value while the rest is read."""
     return _placeholder(field.type) if field.required else field.default
 
 

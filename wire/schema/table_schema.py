@@ -27,8 +27,6 @@ from gridpeers.wire.schema.plausible import Plausible, Probability, Range, Unit
 
 
 class Problem(NamedTuple):
-    """One problem of a table."""
-
     path: str
     """Which key, e.g. `link[2].loss.p`; relative to the table where the table finds it."""
     text: str
@@ -37,8 +35,6 @@ class Problem(NamedTuple):
 
 @dataclass(frozen=True)
 class Example:
-    """A right value, written as in the file."""
-
     text: str
 
 
@@ -50,27 +46,19 @@ class Shorthand:
     field: str
 
     def of(self, value: float) -> msgspec.Struct:
-        """Return the struct that a number stands for."""
         return self.struct(**{self.field: value})
 
 
 @dataclass(frozen=True)
 class OtherKeys:
-    """The field, a tuple, takes what stands under keys that no other field has.
-
-    Attributes
-    ----------
-    accepts : Callable[[str], bool]
-        Whether a key is one of them.
-    read : Callable[[str, Any, list[Problem]], tuple]
-        From a key and its value to elements of the tuple, problems noted.
-    write : Callable[[Any], tuple[str, Any]]
-        From an element of the tuple to its key and value.
-    """
+    """The field, a tuple, takes what stands under keys that no other field has."""
 
     accepts: Callable[[str], bool]
+    """Whether a key is one of them."""
     read: Callable[[str, Any, list[Problem]], tuple[Any, ...]]
+    """From a key and its value to elements of the tuple, problems noted."""
     write: Callable[[Any], tuple[str, Any]]
+    """From an element of the tuple to its key and value."""
 
 
 @dataclass(frozen=True)
@@ -109,8 +97,6 @@ _RANGES = (Plausible, Probability, Range)
 
 
 class Field(NamedTuple):
-    """One field of a table."""
-
     name: str
     """Of the attribute."""
     key: str
@@ -123,40 +109,33 @@ class Field(NamedTuple):
     """Makes the value if none is given; None if a table must have the key."""
 
     def mark(self, kind: Any) -> Any:
-        """Return the annotation of a class, None if there is none."""
         return next((mark for mark in self.marks if isinstance(mark, kind)), None)
 
     @property
     def number(self) -> Field:
-        """The field that says unit and range of the number: of a shorthand that of its struct, else this one."""
         shorthand = self.mark(Shorthand)
         return named(shorthand.struct, shorthand.field) if shorthand else self
 
     @property
     def unit(self) -> str:
-        """Unit of the number, "" if it has none."""
         unit = self.number.mark(Unit)
         return unit.text if unit else ""
 
     @property
     def span(self) -> str:
-        """Range of the number in words, "" if it has none."""
         allowed = self.number.mark(_RANGES)
         return allowed.span if allowed else ""
 
     @property
     def help(self) -> str:
-        """Sentence among the annotations, "" if there is none; else the docstring under the field has it."""
         return next((mark for mark in self.marks if isinstance(mark, str)), "")
 
     @property
     def required(self) -> bool:
-        """Whether a table must have the key."""
         return self.make_default is None
 
     @property
     def default(self) -> Any:
-        """Value if none is given."""
         assert self.make_default is not None, self.name
         return self.make_default()
 
@@ -172,10 +151,7 @@ class Field(NamedTuple):
 def fields_of(cls: type) -> tuple[Field, ...]:
     """Return the fields of a class in their order, those of its base classes first.
 
-    Raises
-    ------
-    TypeError
-        If an annotation of a class that is no struct cannot be read.
+    Raise TypeError if an annotation of a class that is no struct cannot be read.
 
     Examples
     --------
@@ -203,7 +179,6 @@ def fields_of(cls: type) -> tuple[Field, ...]:
 
 
 def _parameters(cls: type) -> Iterable[Field]:
-    """Yield the fields of a class that is no struct."""
     try:
         hints = get_type_hints(cls, include_extras=True)
     except Exception as error:  # a name in an annotation may lead to anything
@@ -215,7 +190,6 @@ def _parameters(cls: type) -> Iterable[Field]:
 
 
 def _apart(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """Return a type and its annotations."""
     return (get_args(hint)[0], get_args(hint)[1:]) if get_origin(hint) is Annotated else (hint, ())
 
 
@@ -224,18 +198,11 @@ def _constant(value: Any) -> Callable[[], Any]:
 
 
 def named(cls: type, name: str) -> Field:
-    """Return one field of a class."""
     return next(field for field in fields_of(cls) if field.name == name)
 
 
 def below(path: str, problems: Iterable[Problem]) -> list[Problem]:
-    """Return the same problems, seen from further up.
-
-    Examples
-    --------
-    >>> below("link[2]", [Problem("loss.p", "wrong"), Problem("", "empty")])
-    [Problem(path='link[2].loss.p', text='wrong'), Problem(path='link[2]', text='empty')]
-    """
+    """Return the same problems, seen from further up."""
     return [Problem(".".join(filter(None, (path, problem.path))), problem.text) for problem in problems]
 
 
@@ -261,7 +228,6 @@ class Below(Relation):
     """Whether both may be equal."""
 
     def objection(self, value: float, other: float, key: str) -> str:
-        """Return why a number is not below the one at `key`, "" if it is."""
         if value <= other if self.or_equal else value < other:
             return ""
         rule = "not be above" if self.or_equal else "be below"
@@ -273,7 +239,6 @@ class After(Relation):
     """An end (s) that must come after the beginning of another field."""
 
     def objection(self, value: float, other: float, key: str) -> str:
-        """Return why an end does not come after the beginning at `key`, "" if it does."""
         if value > other:
             return ""
         return f"{value:g} s is not after {key} = {other:g} s, so that the entry never holds"
@@ -284,13 +249,6 @@ class MultipleOf(Relation):
     """A time (s) that must be a whole multiple of the step (s) of another field."""
 
     def objection(self, value: float, other: float, key: str, rule: str = "") -> str:
-        """Return why a time is no multiple of the step at `key`, "" if it is, or if one of them is not above 0.
-
-        Examples
-        --------
-        >>> MultipleOf("T_c_s").objection(0.05, 0.02, "T_c_s")
-        '0.05 s is not a multiple of T_c_s = 0.02 s; the nearest is 0.04'
-        """
         if value <= 0 or other <= 0 or _whole(value / other):
             return ""
         near = f"{max(round(value / other), 1) * other:.9g}"
@@ -302,13 +260,6 @@ class Divides(Relation):
     """A step (s) that must divide the time (s) of another field."""
 
     def objection(self, value: float, other: float, key: str) -> str:
-        """Return why a step does not divide the time at `key`, "" if it does, or if one of them is not above 0.
-
-        Examples
-        --------
-        >>> Divides("T_c_s").objection(0.003, 0.02, "T_c_s")
-        '0.003 s does not divide T_c_s = 0.02 s; the nearest that does is 0.0025'
-        """
         if value <= 0 or other <= 0 or _whole(other / value):
             return ""
         ratio = other / value
@@ -319,14 +270,7 @@ class Divides(Relation):
 
 
 def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
-    """Return the numbers that do not stand to those of other fields as they must, where both fields are `known` right.
-
-    Examples
-    --------
-    >>> from gridpeers.plant.plant_config import GfmParameters
-    >>> contradictions(GfmParameters, GfmParameters(P_min=2.0))
-    [Problem(path='P_min_pu', text='2 must be below P_max_pu = 1; swap them or set both')]
-    """
+    """Return the numbers that contradict those of other fields, where both fields are `known` right."""
     found: dict[str, str] = {}
     for field in fields_of(cls):
         for relation in (mark for mark in field.marks if isinstance(mark, Relation)):
@@ -345,12 +289,6 @@ def problems_of(struct: msgspec.Struct) -> list[Problem]:
 
     Without one, return where its values contradict each other: by its annotations, and by its method `relations` if it
     has one.
-
-    Examples
-    --------
-    >>> from gridpeers.netem.models.loss import Bernoulli
-    >>> problems_of(Bernoulli(p=2.0))
-    [Problem(path='p', text='a loss is a probability from 0 to 1, got 2; did you mean 0.02 (2 %)?')]
     """
     found: list[Problem] = []
     for field in fields_of(type(struct)):

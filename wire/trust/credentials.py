@@ -18,7 +18,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import msgspec
 
-from gridpeers.wire.keys import ANY_TOKEN, KeySpec, Role, describe
+from gridpeers.wire.keys import ANY_TOKEN, KEY_SPECS, KeySpec, Role
 from gridpeers.wire.messages import PLANT
 from gridpeers.wire.wording import printable
 
@@ -30,8 +30,6 @@ LONGEST_COMMON_NAME = 64
 
 
 class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One name of the site."""
-
     name: str
     """Name; of an agent that of its inverter."""
     role: Role
@@ -133,12 +131,11 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
 
 
 def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
-    """Return what a process allows on a link whose other end has the certificate of a member."""
     return tuple(_rules(own, other, star=star))
 
 
 def _rules(own: Member, other: Member, *, star: bool) -> Iterator[Rule]:
-    for spec in describe():
+    for spec in KEY_SPECS:
         ways: tuple[tuple[Flow, Member, Member], ...] = (("ingress", other, own), ("egress", own, other))
         for flow, sender, receiver in ways:
             if key := _key(spec, sender, receiver, star=star):
@@ -201,7 +198,6 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         )
 
     def stranger(self, common_name: str) -> str:
-        """Return why the holder of a certificate that TLS has accepted has no access; empty if it has."""
         if any(common_name in member.accepted for member in self.members):
             return ""
         shown = printable(common_name, 64) or "nobody"
@@ -229,8 +225,6 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
 
 class Link(Protocol):
-    """A link of a session, as Zenoh describes it."""
-
     @property
     def auth_identifier(self) -> str | None:
         """Common name of the certificate of its other end; None without one."""
@@ -250,7 +244,6 @@ class LinkCertificates:
         self._lines: list[str] = []
 
     def note(self, links: Iterable[Link]) -> None:
-        """Note the certificates of the present links."""
         for link in links:
             name = link.auth_identifier or ""
             if name not in self._names:
@@ -259,7 +252,6 @@ class LinkCertificates:
                     self._lines.append(f"a link to {link.dst}: {why}; nothing passes on it")
 
     def take_lines(self) -> tuple[str, ...]:
-        """Take out lines on links whose other end has a certificate and no access."""
         lines, self._lines = tuple(self._lines), []
         return lines
 

@@ -3,34 +3,44 @@
 ``ca.pem`` is the certificate of the site's authority and ``ca.key`` its private key, which stays where certificates are
 issued. ``NAME.pem`` and ``NAME.key`` are those of a member. ``members.json`` lists all members, signed by the
 authority. A host needs ``ca.pem``, ``members.json`` and the two files of its own members, and no more.
+
+The package cryptography is imported where it is used: a run without certificates does without.
 """
 
 from __future__ import annotations
 
 import base64
+import socket
+import ssl
 import stat
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
 from gridpeers.wire.bounds import is_name
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.keys import Role
-from gridpeers.wire.trust.certificate_files import (
-    CA,
-    KeysError,
-    check_certificate,
-    check_key,
-    read_certificate,
-    read_file,
-)
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, Credentials, Member
 from gridpeers.wire.wording import printable
 
-LIST = "members.json"
-"""Name of its file."""
+if TYPE_CHECKING:
+    from cryptography import x509
+
+CA, CA_KEY, LIST = "ca.pem", "ca.key", "members.json"
+"""Names of the site's own files."""
+
+COMMANDING: tuple[Role, ...] = ("operator",)
+"""Roles that may command a run."""
+
+SOON = timedelta(days=30)
+"""Time before its end at which a certificate is said to end soon."""
+
+
+class KeysError(ValueError):
+    """Certificates or keys cannot be used; the message says which, why, and what to do."""
 
 
 class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -43,13 +53,10 @@ class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     members: tuple[Member, ...] = ()
 
     def of(self, name: str) -> Member | None:
-        """Return the member of a name; None if there is none."""
         return next((member for member in self.members if member.name == name), None)
 
 
 class SignedList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """The content of ``members.json``."""
-
     list: MemberList
     signature: str
     """Signature of the authority over the list as JSON (ECDSA with SHA-256, base64)."""
@@ -61,7 +68,13 @@ def read_list(folder: Path) -> MemberList:
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
 
-    _require_folder(folder)
+    try:
+        if not stat.S_ISDIR(folder.stat().st_mode):
+            raise KeysError(f"{folder}: is no folder; say the folder that gridpeers keys init has made")
+    except FileNotFoundError:
+        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one") from None
+    except OSError as error:
+        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
     if not (folder / CA).exists() and not (folder / LIST).exists():
         here = "the present folder" if folder == Path() else str(folder)
         raise KeysError(
@@ -69,10 +82,13 @@ def read_list(folder: Path) -> MemberList:
             "gridpeers keys init has made"
         )
     public = read_certificate(folder / CA).public_key()
-    data = read_file(folder / LIST)
     try:
-        signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, data)
+        signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, _read(folder / LIST))
         signature = base64.b64decode(signed.signature, validate=True)
+        if not all(is_name(member.name) for member in signed.list.members):
+            raise ValueError("a name in it is none")
+    except KeysError:
+        raise
     except ValueError as error:
         raise KeysError(f"{folder / LIST}: cannot be read: {error}; copy it anew from the site") from None
     try:
@@ -83,27 +99,7 @@ def read_list(folder: Path) -> MemberList:
         raise KeysError(
             f"{folder / LIST}: is not signed by {CA} beside it; copy both from the same site, unchanged"
         ) from None
-    if not all(is_name(member.name) for member in signed.list.members):
-        raise KeysError(f"{folder / LIST}: has a name that is none; copy it anew from the site")
     return signed.list
-
-
-def _require_folder(folder: Path) -> None:
-    try:
-        there = stat.S_ISDIR(folder.stat().st_mode)
-    except FileNotFoundError:
-        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one") from None
-    except OSError as error:
-        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
-    if not there:
-        raise KeysError(f"{folder}: is no folder; say the folder that gridpeers keys init has made")
-
-
-COMMANDING: tuple[Role, ...] = ("operator",)
-"""Roles that may command a run."""
-
-SOON = timedelta(days=30)
-"""Time before its end at which a certificate is said to end soon."""
 
 
 def open_credentials(
@@ -111,41 +107,38 @@ def open_credentials(
 ) -> tuple[Credentials, str]:
     """Check a member's files and return its credentials, and a sentence if its certificate ends soon.
 
-    Without a name the member is the first of these roles, the preferred one first, whose key is there.
-
-    Raises
-    ------
-    KeysError
-        If anything about the files is wrong.
+    Without a name the member is the first of these roles, the preferred one first, whose key is there. Raise KeysError
+    if anything about the files is wrong.
     """
     now = now or datetime.now(UTC)
     known = read_list(folder)
     member = known.of(name) if name else _present(folder, known, roles)
-    if member is None:
-        if name:
-            have = ", ".join(each.name for each in known.members if each.role in roles) or "none"
-            raise KeysError(
-                f'{folder}: no certificate was issued to "{printable(name)}"; those of role {_or(roles)}: {have}; '
-                f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
-            )
-        if tuple(roles) == COMMANDING and (viewer := _present(folder, known, ("viewer",))) is not None:
-            raise KeysError(_viewer_refusal(folder, known, viewer))
+    either = " or ".join(roles)
+    viewer = member or (None if name else _present(folder, known, ("viewer",)))
+    if tuple(roles) == COMMANDING and viewer is not None and viewer.role == "viewer":
+        raise KeysError(_viewer_refusal(folder, known, viewer))
+    if member is None and name:
+        have = ", ".join(each.name for each in known.members if each.role in roles) or "none"
         raise KeysError(
-            f"{folder}: has no key of a member with role {_or(roles)}; copy NAME.pem and NAME.key of one, or issue one "
+            f'{folder}: no certificate was issued to "{printable(name)}"; those of role {either}: {have}; '
+            f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
+        )
+    if member is None:
+        raise KeysError(
+            f"{folder}: has no key of a member with role {either}; copy NAME.pem and NAME.key of one, or issue one "
             "with gridpeers keys issue"
         )
-    if member.role == "viewer" and tuple(roles) == COMMANDING:
-        raise KeysError(_viewer_refusal(folder, known, member))
     if member.role not in roles:
-        raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {_or(roles)}")
+        raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {either}")
     if member.revoked:
         raise KeysError(
             f"{folder}/{member.name}.pem: was revoked; gridpeers keys issue {member.name} gives {member.name} a new one"
         )
     certificate, key = folder / f"{member.name}.pem", folder / f"{member.name}.key"
-    ca, own = read_certificate(folder / CA), read_certificate(certificate)
-    ends = check_certificate(own, ca, certificate, folder, member, now)
-    check_key(key, own)
+    own = read_certificate(certificate)
+    ends = _end_of(own, certificate, folder, member, now)
+    if load_key(key).public_key() != own.public_key():
+        raise KeysError(f"{key}: is not the key of {certificate.name}; copy both from the same site")
     soon = (
         f"the certificate of {member.name} ends on {ends:{DATE_AND_TIME}}; gridpeers keys issue {member.name} renews it"
     )
@@ -159,23 +152,18 @@ def open_credentials(
 
 
 def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
-    """Return the first member of these roles whose key is in the folder."""
     there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
     return next((member for role in roles for member in there if member.role == role), None)
 
 
 def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
-    """Return why a viewer cannot give a command, and who can."""
     who = [each for each in known.members if each.role in COMMANDING and not each.revoked]
     here = next((each.name for each in who if (folder / f"{each.name}.key").is_file()), "")
+    names = " or ".join(each.name for each in who)
+    way = f"give the command where the certificate of {names} is, or copy its files to {folder}"
     if here:
         way = f"--as {here} takes the certificate of one"
-    elif who:
-        way = (
-            f"give the command where the certificate of {' or '.join(each.name for each in who)} is, or copy its files "
-            f"to {folder}"
-        )
-    else:
+    elif not who:
         way = f"gridpeers keys issue NAME --role {COMMANDING[0]} makes one, where the site was made"
     return (
         f"{folder}: {viewer.name} has the role viewer, which may look at a run (status, watch, view) and not command "
@@ -183,5 +171,162 @@ def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
     )
 
 
-def _or(roles: Sequence[Role]) -> str:
-    return " or ".join(roles)
+def _end_of(own: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime) -> datetime:
+    """Return the end of a member's certificate, or of the authority's if that is earlier, if both are valid."""
+    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+
+    ca = read_certificate(folder / CA)
+    try:
+        own.verify_directly_issued_by(ca)
+    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
+        raise KeysError(
+            f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
+        ) from None
+    if (common_name := _common_name(own)) != member.common_name:
+        raise KeysError(
+            f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
+            f"{member.name}, or issue it anew"
+        )
+    for certificate, what in ((own, path), (ca, folder / CA)):
+        begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
+        if now > ends:
+            renewal = f"gridpeers keys issue {member.name}" if certificate is own else "gridpeers keys init"
+            raise KeysError(f"{what}: expired on {ends:{DATE_AND_TIME}}; {renewal} makes a new one")
+        if now < begins:
+            raise KeysError(
+                f"{what}: is valid from {begins:{DATE_AND_TIME}}, and the clock of this host shows "
+                f"{now:%Y-%m-%d %H:%M}; set the clock"
+            )
+    return min(own.not_valid_after_utc, ca.not_valid_after_utc)
+
+
+def _common_name(certificate: x509.Certificate) -> str:
+    from cryptography.x509.oid import NameOID
+
+    named = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
+    return str(named[0].value) if named else ""
+
+
+def read_certificate(path: Path) -> x509.Certificate:
+    from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
+
+    data = _read(path)
+    try:
+        certificate = x509.load_pem_x509_certificate(data)
+        certificate.public_key(), certificate.subject, certificate.not_valid_after_utc  # read when they are asked for
+        return certificate
+    except (ValueError, UnsupportedAlgorithm):
+        raise KeysError(f"{path}: is no certificate in PEM; copy it anew from the site") from None
+
+
+def load_key(path: Path) -> Any:
+    """Return the private key in a file that nobody but its owner may read or write."""
+    from cryptography.exceptions import UnsupportedAlgorithm
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key
+
+    data = _read(path)
+    mode = stat.S_IMODE(path.stat().st_mode)
+    if mode & 0o077:
+        raise KeysError(f"{path}: others may read or change it (mode {mode:04o}); chmod 600 {path}")
+    try:
+        return load_pem_private_key(data, None)
+    except (ValueError, TypeError, UnsupportedAlgorithm) as error:
+        raise KeysError(f"{path}: is no private key: {printable(str(error), 80)}; copy it anew from the site") from None
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if path.is_fifo():  # to read it would take for ever
+            raise KeysError(f"{path}: is no file; copy it anew from the site")
+        return path.read_bytes()
+    except FileNotFoundError:
+        raise KeysError(f"{path}: is missing; copy it from the folder where the site issues certificates") from None
+    except OSError as error:
+        raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
+
+
+def key_warnings(folder: Path) -> dict[str, str]:
+    """Return a sentence for each private key, by its file, that is not private, or not of the certificate beside it."""
+    found = {}
+    for path in sorted(folder.glob("*.key")):
+        certificate = path.with_suffix(".pem")
+        try:
+            key = load_key(path)
+            if certificate.exists() and key.public_key() != read_certificate(certificate).public_key():
+                found[path.name] = f"{path}: is not the key of {certificate.name}; copy both from the same site"
+        except KeysError as error:
+            found[path.name] = str(error)
+    return found
+
+
+def validity(folder: Path, member: Member, now: datetime) -> str:
+    """Return the state of a member's certificate, such as "valid" or "expired", with its times (UTC) or what is wrong.
+
+    The times are those of the certificate in the folder, as that is the one which a process here shows. Where it is not
+    there, or is of an earlier generation, the end is that of the list of members.
+    """
+    if member.revoked:
+        return "revoked"
+    path = folder / f"{member.name}.pem"
+    try:
+        own = read_certificate(path) if path.exists() else None
+    except KeysError as error:
+        return f"damaged  {error}"
+    if own is None or _common_name(own) != member.common_name:
+        gone = member.expires < f"{now:{DATE_AND_TIME}}"[: len(member.expires)]
+        return f"expired  {member.expires}" if gone else f"valid    until {member.expires}"
+    begins, ends = own.not_valid_before_utc, own.not_valid_after_utc
+    state = "expired" if ends < now else "not yet" if now < begins else "valid"
+    return f"{state:8} {begins:%Y-%m-%d %H:%M} to {ends:{DATE_AND_TIME}}"
+
+
+_EXPIRED = 10
+"""OpenSSL's X509_V_ERR_CERT_HAS_EXPIRED, of either certificate; no member's outlives its authority's."""
+
+_ALERTS = {
+    "CERTIFICATE_REQUIRED": "",
+    "UNKNOWN_CA": "by the ca.pem there it is of another site",
+    "DECRYPT_ERROR": "by the ca.pem there it is of another site",  # of the same name, with another key
+    "BAD_CERTIFICATE": "by the ca.pem there it is of another site",
+    "CERTIFICATE_EXPIRED": "it has expired by the clock there",
+}
+"""How OpenSSL's names of alerts end, and what they say of the own certificate; empty if they ask for one."""
+
+
+def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
+    """Return why the other end and this one do not agree on a link; empty if they do, or if it is not known.
+
+    It is the end of a sentence that begins with the other end. Zenoh tries again and again and says nothing, so the
+    handshake is done once here; each of its steps may take as long as `timeout` (s). In TLS 1.3 the end that connects
+    verifies first, and the other end's alert comes with the first bytes that it reads.
+    """
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname, context.verify_mode = False, ssl.CERT_NONE  # a member is known by its name alone
+    try:
+        if credentials is not None:
+            context.load_cert_chain(credentials.certificate, credentials.key)
+            context.load_verify_locations(credentials.ca)
+            context.verify_mode = ssl.CERT_REQUIRED
+        with socket.create_connection((host, port), timeout) as raw, context.wrap_socket(raw) as secured:
+            secured.recv(1)
+    except ssl.SSLCertVerificationError as error:
+        assert credentials is not None
+        if error.verify_code == _EXPIRED:
+            return (
+                "shows a certificate that has expired; gridpeers keys issue renews it where the site was made, unless "
+                f"{credentials.ca} has expired too: then gridpeers keys init makes a new site"
+            )
+        return (
+            f"shows a certificate that {credentials.ca} does not accept ({error.verify_message}): is it of this site?"
+        )
+    except ssl.SSLError as error:
+        _, alert, name = (error.reason or "").partition("ALERT_")
+        meaning = _ALERTS.get(name, f"TLS alert {printable(name, 60)}")
+        if not meaning or (alert and credentials is None and name == "HANDSHAKE_FAILURE"):  # the latter is of TLS 1.2
+            return "asks for a certificate"
+        if alert and credentials is not None:
+            return f"does not accept the certificate of {credentials.own.name}: {meaning}"
+    except OSError:  # nobody is there, or files of ours have gone
+        pass
+    return ""

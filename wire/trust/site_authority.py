@@ -7,7 +7,7 @@ import fcntl
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -17,9 +17,18 @@ import msgspec
 
 from gridpeers.wire.bounds import is_name
 from gridpeers.wire.keys import Role
-from gridpeers.wire.trust.certificate_files import CA, CA_KEY, KeysError, require_private
 from gridpeers.wire.trust.credentials import DATE_AND_TIME, LONGEST_COMMON_NAME, Member
-from gridpeers.wire.trust.key_folder import LIST, MemberList, SignedList, read_list
+from gridpeers.wire.trust.key_folder import (
+    CA,
+    CA_KEY,
+    LIST,
+    KeysError,
+    MemberList,
+    SignedList,
+    load_key,
+    read_certificate,
+    read_list,
+)
 from gridpeers.wire.wording import printable
 
 if TYPE_CHECKING:
@@ -38,20 +47,12 @@ SKEW = timedelta(minutes=5)
 RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
 """No names of members: those of the site's own files, with and without their suffix."""
 
-_TWIN = "{name}: differs from {twin} in case alone, and some disks take their files for the same; rename one of them"
-
 FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
 """Members of every new site."""
 
 
 def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = None) -> MemberList:
-    """Make a site's authority and its first certificates in a new folder, which is there whole or not at all.
-
-    Raises
-    ------
-    KeysError
-        If the folder is there, or cannot be made.
-    """
+    """Make a site's authority and its first certificates in a new folder, which is there whole or not at all."""
     from cryptography.hazmat.primitives.asymmetric import ec
 
     now = now or datetime.now(UTC)
@@ -91,18 +92,14 @@ def issue(
     """Issue a certificate to a name, or renew it; return the member.
 
     An agent's name is that of its inverter. Without a role a name keeps the one it has, and any other is an agent.
-
-    Raises
-    ------
-    KeysError
-        If the name cannot be used, has another role, or the authority's key is not here.
     """
     from cryptography.hazmat.primitives.asymmetric import ec
 
     now = now or datetime.now(UTC)
     with _changing(folder):
         known, ca, ca_key = _authority(folder)
-        role = role or _role_of(known, name)
+        before = known.of(name)
+        role = role or ("agent" if before is None else before.role)
         if problem := objection(known, name, role):
             raise KeysError(problem)
         if now >= ca.not_valid_after_utc:
@@ -110,7 +107,6 @@ def issue(
                 f"{folder / CA}: expired on {ca.not_valid_after_utc:{DATE_AND_TIME}}; gridpeers keys init makes a "
                 "new site"
             )
-        before = known.of(name)
         generation = 1 if before is None else before.generation + before.revoked
         ends = min(now + timedelta(days=days), ca.not_valid_after_utc)
         member = Member(name=name, role=role, generation=generation, expires=f"{ends:{DATE_AND_TIME}}")
@@ -122,18 +118,17 @@ def issue(
     return member
 
 
-def objection(known: MemberList, name: str, role: Role) -> str:
-    """Return why no certificate of a role can be issued to a name; empty if one can."""
+def objection(known: MemberList, name: str, role: Role | None) -> str:
+    """Return why no certificate of a role can be issued to a name; empty if one can; see `issue`."""
     if not is_name(name) or name[0] in ".-":  # which would hide its files, or be an option of a command
         return (
             f'"{printable(name)}" cannot be a name; use 1 to 64 letters, digits, "_", "-", ".", the first of them '
             "neither a dot nor a dash"
         )
     if name.casefold() in RESERVED:
-        return f'"{name}" cannot be a name: it is that of a file of the site; give the {role} another name'
+        return f'"{name}" cannot be a name: it is that of a file of the site; give the {role or "agent"} another name'
     before = known.of(name)
-    if before is None and (twin := _twin(name, [member.name for member in known.members])):
-        return _TWIN.format(name=name, twin=twin)
+    role = role or ("agent" if before is None else before.role)
     if before is not None and before.role != role:
         return f"{name}: has the role {before.role} already; give the {role} another name"
     if len(f"{role}:{name}") > LONGEST_COMMON_NAME - 4:  # room for later generations
@@ -141,34 +136,8 @@ def objection(known: MemberList, name: str, role: Role) -> str:
     return ""
 
 
-def objections(known: MemberList, names: Sequence[str], role: Role | None = None) -> list[str]:
-    """Return why certificates of a role cannot be issued to names, each a line; empty if all can; see `issue`."""
-    found = [objection(known, name, role or _role_of(known, name)) for name in names]
-    for k, name in enumerate(names):
-        if not found[k] and (twin := _twin(name, names[:k])):
-            found[k] = _TWIN.format(name=name, twin=twin)
-    return [problem for problem in found if problem]
-
-
-def _role_of(known: MemberList, name: str) -> Role:
-    """Return the role that a name has; of one without, that of an agent."""
-    before = known.of(name)
-    return "agent" if before is None else before.role
-
-
-def _twin(name: str, others: Sequence[str]) -> str:
-    """Return another name that differs in case alone; empty if there is none."""
-    return next((other for other in others if other != name and other.casefold() == name.casefold()), "")
-
-
 def revoke(folder: Path, name: str) -> Member:
-    """Revoke the certificate of a name, and delete its key here; return the member.
-
-    Raises
-    ------
-    KeysError
-        If there is no such certificate, or the authority's key is not here.
-    """
+    """Revoke the certificate of a name, and delete its key here; return the member."""
     with _changing(folder):
         known, _, ca_key = _authority(folder)
         member = known.of(name)
@@ -208,22 +177,11 @@ def _with(known: MemberList, member: Member) -> MemberList:
 
 
 def _authority(folder: Path) -> tuple[MemberList, x509.Certificate, EllipticCurvePrivateKey]:
-    """Return the members, and certificate and private key of the authority."""
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
-    from cryptography.hazmat.primitives.asymmetric import ec
-    from cryptography.hazmat.primitives.serialization import load_pem_private_key
-
     known, path = read_list(folder), folder / CA_KEY
     if not path.is_file():
         raise KeysError(f"{path}: is missing; certificates are issued and revoked where the site was made")
-    try:
-        key = load_pem_private_key(path.read_bytes(), None)
-    except (ValueError, TypeError, OSError, UnsupportedAlgorithm) as error:
-        raise KeysError(f"{path}: cannot be read: {printable(str(error), 80)}") from None
-    require_private(path)
-    ca = x509.load_pem_x509_certificate((folder / CA).read_bytes())
-    if not isinstance(key, ec.EllipticCurvePrivateKey) or key.public_key() != ca.public_key():
+    ca, key = read_certificate(folder / CA), load_key(path)
+    if key.public_key() != ca.public_key():
         raise KeysError(f"{path}: is not the key of {CA} beside it; copy both from the same site")
     return known, ca, key
 
@@ -243,17 +201,8 @@ def _certificate(
 
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
     authority = ca is None
-    usage = {
-        "digital_signature": not authority,
-        "key_cert_sign": authority,
-        "crl_sign": authority,
-        "content_commitment": False,
-        "key_encipherment": False,
-        "data_encipherment": False,
-        "key_agreement": False,
-        "encipher_only": False,
-        "decipher_only": False,
-    }
+    uses = dict.fromkeys(("content_commitment", "key_encipherment", "data_encipherment", "key_agreement"), False)
+    uses |= {"digital_signature": not authority, "key_cert_sign": authority, "crl_sign": authority}
     builder = (
         x509.CertificateBuilder()
         .subject_name(subject)
@@ -263,7 +212,7 @@ def _certificate(
         .not_valid_before(min(now - SKEW, now + life))
         .not_valid_after(now + life)
         .add_extension(x509.BasicConstraints(ca=authority, path_length=0 if authority else None), critical=True)
-        .add_extension(x509.KeyUsage(**usage), critical=True)
+        .add_extension(x509.KeyUsage(**uses, encipher_only=False, decipher_only=False), critical=True)
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(key.public_key()), critical=False)
         .add_extension(x509.AuthorityKeyIdentifier.from_issuer_public_key(ca_key.public_key()), critical=False)
     )

@@ -58,13 +58,13 @@ def init(
                 fail(["--switch, --leave-out and --inverters go with --feeder"], BAD_INPUT)
             with whole_folder(folder):
                 shutil.copytree(TEMPLATE, folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
-            following = command_line("run", "mine.toml", "--driver", "inprocess", within=folder)
+            following = command_line("run", "mine.toml", "--driver", "inprocess")
             if find_spec("pytest"):
-                following += f" && {command_line(program='pytest', within=folder)}"
+                following += f" && {command_line(program='pytest')}"
         else:
             with whole_folder(folder):
                 ROOMS.resolve("propose_project")(folder, feeder, switch or [], leave_out or [], inverters)
-            following = command_line("run", "islanding.toml", "--driver", "inprocess", within=folder)
+            following = command_line("run", "islanding.toml", "--driver", "inprocess")
     except FolderError as error:
         fail([str(error)], BAD_INPUT)
     for file in sorted(path.name for path in folder.iterdir()):

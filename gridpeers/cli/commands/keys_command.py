@@ -66,13 +66,12 @@ def issue(
     Example:  gridpeers keys issue inv1 inv2 --keys lab
     """
     with _errors(days):
-        from gridpeers.wire.trust.certificate_files import KeysError
-        from gridpeers.wire.trust.key_folder import read_list
-        from gridpeers.wire.trust.site_authority import issue, objections
+        from gridpeers.wire.trust.key_folder import KeysError, read_list
+        from gridpeers.wire.trust.site_authority import issue, objection
 
         names = list(dict.fromkeys(names))
         known = read_list(keys)
-        if problems := objections(known, names, role):
+        if problems := [why for name in names if (why := objection(known, name, role))]:
             raise KeysError("\n".join(problems))  # all of them, before any certificate is issued
         for name in names:
             member = issue(keys, name, role, days=days)
@@ -104,23 +103,22 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from gridpeers.wire.trust.certificate_files import CA_KEY, exposed_keys, mistaken_keys, validity
-        from gridpeers.wire.trust.key_folder import LIST, read_list
+        from gridpeers.wire.trust.key_folder import CA_KEY, LIST, key_warnings, read_list, validity
 
         known, now = read_list(keys), datetime.now(UTC)
-        mistaken = mistaken_keys(keys, known.members)
+        warnings = key_warnings(keys)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
-        if CA_KEY in mistaken:
-            authority = f"; {CA_KEY} is here, but is not the authority's: no certificates can be issued here"
+        if CA_KEY in warnings:
+            authority = f"; {CA_KEY} is here, but cannot be used: no certificates can be issued here"
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
             state = validity(keys, member, now)
             here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
-            if here and f"{member.name}.key" in mistaken:
-                here += ", but not this certificate's"
+            if here and f"{member.name}.key" in warnings:
+                here += ", but see below"
             typer.echo(f"{member.role:9} {member.name:{width}}  {state}{here}")
-        for warning in (*mistaken.values(), *exposed_keys(keys)):
+        for warning in warnings.values():
             typer.echo(f"WARNING  {warning}")
 
 
@@ -130,7 +128,7 @@ def _errors(days: float = 1.0) -> Iterator[None]:
     require({"cryptography": "certificates"}, "install it: pip install 'gridpeers[keys]'")
     if not 0.0 < days <= 3650.0:
         fail([f"--days: must be more than 0 and at most 3650 days, got {days:g}"], BAD_INPUT)
-    from gridpeers.wire.trust.certificate_files import KeysError
+    from gridpeers.wire.trust.key_folder import KeysError
 
     try:
         yield

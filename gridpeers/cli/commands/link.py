@@ -201,7 +201,7 @@ def _give(links: list[str], arrow: str, fault: dict[str, Any] | None, duration: 
 
 
 def _age_note(command: LinkCommand, agent: AgentConfig) -> str:
-    """Return a note if agents will ignore states for their age; else ""."""
+    """Return a note if agents will ignore states for their age."""
     from gridpeers.netem.models.delay import Constant, RandomDelay
 
     delay = command.fault.models().get("delay") if command.fault is not None else None

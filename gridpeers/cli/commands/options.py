@@ -142,7 +142,7 @@ def usage_errors() -> Iterator[None]:
     from gridpeers.scenarios.results.run_files import FolderError
     from gridpeers.wire.driver.process import ConfigurationError
     from gridpeers.wire.driver.session import SessionError
-    from gridpeers.wire.trust.certificate_files import KeysError
+    from gridpeers.wire.trust.key_folder import KeysError
 
     bad_input = (ConfigurationError, ListenError, FolderError, KeysError, NobodyError, RefusedError, SessionError)
     try:

@@ -119,7 +119,7 @@ def _check_keys(folder: Path, spec: ScenarioModel, feeder: Feeder) -> None:
     from gridpeers.scenarios.drivers.secured import secured
     from gridpeers.scenarios.schema.configs import configs
     from gridpeers.scenarios.schema.participants import inverters_of
-    from gridpeers.wire.trust.certificate_files import KeysError
+    from gridpeers.wire.trust.key_folder import KeysError
 
     inverters = tuple(row.name for row in inverters_of(spec, feeder))
     notes: dict[str, None] = {}

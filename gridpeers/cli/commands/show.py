@@ -1,14 +1,16 @@
-"""Commands that show what there is: `list`, `check`, `doc`."""
+"""Commands that show what there is: `list`, `check`, `doc`, `compare`, `metrics`; each imports what it needs on use."""
 
 from __future__ import annotations
 
+import re
 from itertools import chain
+from pathlib import Path
 from typing import Annotated, Literal, get_args
 
 import typer
 
-from gridpeers.cli.usage import BAD_INPUT, fail, load, require
-from gridpeers.wire.wording import counted
+from gridpeers.cli.usage import BAD_INPUT, fail, load, refuse, require, terminal
+from gridpeers.wire.wording import counted, printable
 
 Topic = Literal["keys", "messages", "scenario", "feeder", "laws", "metrics", "claims", "checks", "faults", "graphs"]
 """Values of the argument of `doc`."""
@@ -78,3 +80,84 @@ def doc(
     from gridpeers.scenarios.reference import page
 
     typer.echo(page(topic), nl=False)
+
+
+_Run = Annotated[Path, typer.Argument(metavar="RUN", help="Folder of a run, e.g. runs/islanding/latest.")]
+
+
+def compare(
+    first: _Run,
+    second: _Run,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE", help="Figure, as .png, .pdf or .svg; runs/comparison.png when left out.")
+    ] = Path("runs/comparison.png"),
+) -> None:
+    """Compare two runs: scenarios, metrics, and one figure of both.
+
+    Exit code: 0 they were compared, 2 bad usage, or no folder of a run.
+
+    Example:  gridpeers compare runs/islanding/latest runs/mine/latest
+    """
+    require({"matplotlib": "the figure", "pandas": "the tables"})
+    kinds = (".png", ".pdf", ".svg")
+    if out.suffix not in kinds:
+        fail([f"--out {out}: must end in {', '.join(kinds)}"], BAD_INPUT)
+
+    from gridpeers.runs.comparison import compare as compare_runs
+    from gridpeers.scenarios.results.run_files import FolderError, refusal, shown
+    from gridpeers.scenarios.schema import ScenarioError
+
+    try:
+        comparison = compare_runs(first, second, names=_names(first, second))
+        typer.echo(str(comparison))
+        figure = comparison.plot()
+        out.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(out)
+    except ScenarioError as error:
+        refuse(error)
+    except FolderError as error:
+        fail([str(error)], BAD_INPUT)
+    except OSError as error:
+        fail([refusal(out, error)], BAD_INPUT)
+    typer.echo(f"\nFigure: {shown(out)}")
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """Return short names of two folders that differ: as much of their paths as tells them apart, rather than a time."""
+    parts, others = ([printable(part) for part in path.resolve().parts] for path in (first, second))
+    of_runs = [re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d-\d\d-\d\d(-\d+)?", path[-1]) for path in (parts, others)]
+    if all(of_runs) and parts[-2] != others[-2]:
+        return parts[-2], others[-2]
+    for count in range(1, max(len(parts), len(others)) + 1):
+        names = "/".join(parts[-count:]), "/".join(others[-count:])
+        if names[0] != names[1]:
+            return names
+    return "first", "second"
+
+
+def metrics(
+    run: Annotated[
+        Path, typer.Argument(metavar="RUN", help="Folder of a case, e.g. runs/islanding/latest/IV, or its run.mcap.")
+    ],
+    case: Annotated[str, typer.Option(metavar="NAME", help="Case of the run, if RUN has several.")] = "",
+) -> None:
+    """Measure a run from its record, also one that was killed.
+
+    It shows what the report of a run shows, up to the end of the record, and says what is not measured. A run that came
+    to its end has the same numbers in its report.txt.
+
+    Exit code: 0 it was measured, 2 bad usage, no record, or nothing in it that can be measured.
+
+    Example:  gridpeers metrics runs/islanding/latest/IV
+    """
+    require({"mcap": "the record of a run"})
+
+    from gridpeers.scenarios.record.record_metrics import report_of
+    from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
+    from gridpeers.scenarios.results.report import show
+
+    try:
+        report = report_of(RunRecord.open(run, case))
+    except RecordFileError as error:
+        fail([str(error)], BAD_INPUT)
+    show(report, terminal())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -154,14 +153,6 @@ def _start(
         _finish(outcome, law_failed=stopped or (judged and not outcome.broke))
 
 
-def _takes_options_of_start(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `_start` that a person chooses."""
-    options = inspect.signature(_start, eval_str=True).parameters.values()
-    with_options(command, [one for one in options if one.name != "agents"])
-    return command
-
-
-@_takes_options_of_start
 def plant(**options: Any) -> None:
     """Run the plant of a scenario in this terminal, in real time. Agents come from others.
 
@@ -172,7 +163,6 @@ def plant(**options: Any) -> None:
     _start(**options, agents=False)
 
 
-@_takes_options_of_start
 def up(**options: Any) -> None:
     """Run the plant and all its agents at once, in real time.
 
@@ -183,6 +173,11 @@ def up(**options: Any) -> None:
     Example:  gridpeers up islanding --speed 0.5
     """
     _start(**options, agents=True)
+
+
+for _command in (plant, up):
+    _options = inspect.signature(_start, eval_str=True).parameters.values()
+    with_options(_command, [one for one in _options if one.name != "agents"])
 
 
 def agent(

@@ -113,7 +113,6 @@ def failure_lines(summary: Summary) -> list[str]:
 
 
 def _result_lines(summary: Summary) -> list[str]:
-    """Return the results of a sweep, in lines."""
     from gridpeers.scenarios.results.run_files import shown
 
     broke = sum(summary.broke.values())

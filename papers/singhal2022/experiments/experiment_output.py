@@ -21,7 +21,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
-from gridpeers.figures import PAGE, save
+import gridpeers as gp
 from gridpeers.measures import Floats
 from gridpeers.output_folders import write_whole
 from gridpeers.papers.singhal2022.experiments.experiment_data import INDEXES
@@ -184,7 +184,7 @@ DPI = 130
 
 def draw(page: Page, path: Path) -> Path:
     """Draw a page into a file, at once or not at all."""
-    with mpl.rc_context(PAGE):
+    with mpl.rc_context(gp.figures.PAGE):
         rows = -(-len(page.panels) // page.columns)
         width = {1: 6.4, 2: 8.4}.get(page.columns, 3.1 * page.columns)
         figure = Figure(figsize=(width, page.height * rows + 0.8), layout="constrained")
@@ -199,7 +199,7 @@ def draw(page: Page, path: Path) -> Path:
             columns = max(1, min(len(labels), int(15 * width / (max(map(len, labels)) + 6))))
             figure.legend(handles, labels, loc="outside lower center", ncols=columns)
         figure.suptitle(page.title, fontsize=10)
-        (file,) = save(figure, path.parent, path.stem, dpi=DPI)
+        (file,) = gp.figures.save(figure, path.parent, path.stem, dpi=DPI)
     return file
 
 

@@ -21,7 +21,6 @@ from gridpeers.papers.singhal2022.experiments.experiment_output import (
     TableCell,
     time_panels,
 )
-from gridpeers.random_graphs import Control, adjacency
 from gridpeers.theory import InverterGroup, predicted_times, var_growth
 
 DELAY, K_Q = "link[0].delay", "gains.k_q"
@@ -244,7 +243,9 @@ def topology(sweep: SweepData) -> ExperimentResult:
 
 def on_graph(sweep: SweepData, edges: str) -> InverterGroup:
     """Return the inverters on a graph of the sweep, written "inv1-inv2 inv2-inv5 ..."."""
-    first, rest = zip(*(edge.split("-") for edge in edges.split()), strict=True)
-    control = Control(secondary="all", graph="links", links=tuple(zip(first, rest, strict=True)))
-    rows = {inverter.name: inverter for inverter in sweep.feeder.inverters}
-    return replace(next(iter(sweep.inverters.values())), A=np.array(adjacency(control, rows)))
+    index = {inverter.name: i for i, inverter in enumerate(sweep.feeder.inverters)}
+    A = np.zeros((len(index), len(index)))
+    for edge in edges.split():
+        i, j = (index[name] for name in edge.split("-"))
+        A[i, j] = A[j, i] = 1.0
+    return replace(next(iter(sweep.inverters.values())), A=A)

@@ -14,7 +14,8 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-from gridpeers.benchmarks import HEADINGS, Quantity, Verdict
+from gridpeers import Verdict
+from gridpeers.measures import HEADINGS, Quantity
 from gridpeers.output_folders import set_status, versions, write_whole
 from gridpeers.papers.singhal2022.communication_claims import graph_runs
 from gridpeers.papers.singhal2022.paper_benchmarks import ComparedNumber, headline, numbers

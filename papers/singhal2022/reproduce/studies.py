@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import gridpeers as gp
-from gridpeers.benchmarks import Settling, Steady
+from gridpeers.measures import Settling, Steady
 from gridpeers.output_folders import feeder_folder
 from gridpeers.papers.singhal2022.communication_claims import GraphFindings, GraphRun
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
-from gridpeers.random_graphs import Edges, algebraic_connectivity, connected_graph, connected_graphs
 
 if TYPE_CHECKING:
     from gridpeers.papers.singhal2022.figures import EventValues
@@ -46,17 +45,17 @@ TellProgress = Callable[[int, int], None]
 """Is called with the number of runs that are done, and of all runs."""
 
 
-def graphs(inverters: int, seed: int) -> Iterator[Edges]:
+def graphs(inverters: int, seed: int) -> Iterator[gp.random_graphs.Edges]:
     """Return all graphs of the study, those that are not connected first."""
     for links in BELOW:
         for number in range(PER_COUNT_BELOW):
             rng = random.Random(f"{seed}/below/{links}/{number}")
-            tree = list(connected_graph(inverters, inverters - 1, rng))
+            tree = list(gp.random_graphs.connected_graph(inverters, inverters - 1, rng))
             while len(tree) > links:
                 tree.pop(int(rng.random() * len(tree)))
             yield tuple(tree)
     for links in LINKS:
-        yield from connected_graphs(inverters, links, PER_COUNT, seed)
+        yield from gp.random_graphs.connected_graphs(inverters, links, PER_COUNT, seed)
 
 
 def topology_study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str = "") -> GraphFindings:
@@ -76,7 +75,7 @@ def topology_study(seed: int, tell: TellProgress, *, jobs: int | None, dask: str
     return GraphFindings(results={}, graphs=tuple(_graph_run(len(names), edges, row) for edges, row in runs))
 
 
-def _graph_run(inverters: int, edges: Edges, row: Mapping[str, Any]) -> GraphRun:
+def _graph_run(inverters: int, edges: gp.random_graphs.Edges, row: Mapping[str, Any]) -> GraphRun:
     at = {name.removeprefix("event1."): value for name, value in row.items() if name.startswith("event1.")}
 
     def time(name: str) -> float | None:
@@ -84,7 +83,7 @@ def _graph_run(inverters: int, edges: Edges, row: Mapping[str, Any]) -> GraphRun
 
     return GraphRun(
         links=len(edges),
-        connected=algebraic_connectivity(inverters, edges) > NOT_CONNECTED,
+        connected=gp.random_graphs.algebraic_connectivity(inverters, edges) > NOT_CONNECTED,
         settled=Settling(
             t_f_s=time("t_f_s"),
             t_share_s=time("t_share_s"),

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import gridpeers as gp
-from gridpeers.benchmarks import Findings, Verdict, judge
+from gridpeers import Findings, Verdict, judge
 from gridpeers.cli.progress import TellPart as Tell
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS
 from gridpeers.papers.singhal2022.paper_benchmarks import CLAIMS
@@ -19,12 +19,9 @@ from gridpeers.papers.singhal2022.reproduce.studies import BANKS, END_S, bank_st
 from gridpeers.papers.singhal2022.tables import PaperTable, tables_of
 from gridpeers.theory import ScenarioModel
 
-if TYPE_CHECKING:
-    from gridpeers.figures import Format
-
 ReproduceDriver = Literal["processes", "inprocess"]
 
-FORMATS: tuple[Format, ...] = ("png", "pdf", "svg")
+FORMATS: tuple[gp.figures.Format, ...] = ("png", "pdf", "svg")
 """Files of each figure."""
 
 _STUDIES = ("topology", "var-sharing")
@@ -137,10 +134,8 @@ class Work:
 
         run = scenario.run(driver=self.driver, progress=note, folder=folder)
         if figures:
-            from gridpeers.figures import save  # matplotlib takes longer to import than a case to run
-
             for picture in part.picture:
-                save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
+                gp.figures.save(run.plot(picture.stem), folder / "plots", picture.stem, FORMATS[1:])
         return run.findings, run.sha256, run.numbers, folder / "plots"
 
     def _topology(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
@@ -149,10 +144,9 @@ class Work:
 
         found = topology_study(self.seed, note, jobs=self.jobs, dask=self.dask)
         if figures:
-            from gridpeers.figures import save
             from gridpeers.papers.singhal2022.figures import topologies
 
-            save(topologies(found.graphs), folder, part.picture[0].stem, FORMATS)
+            gp.figures.save(topologies(found.graphs), folder, part.picture[0].stem, FORMATS)
         return found, {}, None, folder
 
     def _banks(self, part: Part, folder: Path, tell: Tell, figures: bool) -> _PartOutput:
@@ -163,10 +157,9 @@ class Work:
 
         ours = bank_study(scenario, folder, note, self.jobs, self.dask)
         if figures:
-            from gridpeers.figures import save
             from gridpeers.papers.singhal2022.figures import var_sharing
 
-            save(var_sharing(ours), folder, part.picture[0].stem, FORMATS)
+            gp.figures.save(var_sharing(ours), folder, part.picture[0].stem, FORMATS)
         metrics = [
             {"variant": variant, "case": case, "MQSI": {event: values[case, event] for event in EVENTS}}
             for variant, values in ours.items()

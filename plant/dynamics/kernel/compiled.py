@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import hashlib
 import os
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from pickle import UnpicklingError
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
@@ -23,44 +21,32 @@ from numpy.typing import NDArray
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
+Complex = NDArray[np.complex128]
+Real = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
+
 _HERE = Path(__file__).parent
 
 
 def kernel_folder() -> Path | None:
     """Return where machine code of these sources is kept; None where the user has no home.
 
-    It is in `NUMBA_CACHE_DIR`, or in the user's cache, or beside the sources if a packager has put it there. An edit of
-    `gfm.py` changes the code of its callers in `step.py`, so its name carries a hash of all files here.
+    An edit of `gfm.py` changes the code of its callers in `step.py`, so its name carries a hash of all files here.
     """
-    digest = hashlib.sha256()
-    for source in sorted(_HERE.glob("*.py")):
-        digest.update(source.read_bytes())
-    name = f"kernels-{digest.hexdigest()[:16]}"
-    beside = _HERE / "__pycache__" / name
-    chosen = os.environ.get("NUMBA_CACHE_DIR")
-    base = Path(chosen) if chosen else user_cache()
-    return beside if beside.is_dir() else base / name if base else None
-
-
-def user_cache() -> Path | None:
-    """Return the user's cache folder for gridpeers, as the system has it; None where the user has no home."""
-    if os.name == "nt":
-        variable, within = "LOCALAPPDATA", "AppData/Local"
-    else:
-        variable, within = "XDG_CACHE_HOME", "Library/Caches" if sys.platform == "darwin" else ".cache"
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sorted(_HERE.glob("*.py")))).hexdigest()
     try:
-        folder = Path(os.environ.get(variable) or Path.home() / within)
+        cache = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "gridpeers"
+        base = Path(os.environ.get("NUMBA_CACHE_DIR") or cache)
     except RuntimeError:  # no HOME, and no entry in the list of users
         return None
-    return folder / "gridpeers" if folder.is_absolute() else None
+    return base / f"kernels-{digest[:16]}" if base.is_absolute() else None
 
 
 FOLDER = kernel_folder()
-"""Where machine code of these sources is kept."""
 
 
 def is_compiled(function: str) -> bool:
-    """Whether machine code of a function is on disk."""
     return FOLDER is not None and any(FOLDER.glob(f"*.{function}-*.nbi"))
 
 
@@ -94,34 +80,22 @@ class _Cache(FunctionCache):
     _impl_class = _Files
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        try:
+        with suppress(OSError):
             found = super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except (OSError, EOFError, UnpicklingError):  # no folder, or half a file
-            with suppress(OSError):
-                self.flush()  # type: ignore[no-untyped-call]
-            return None
-        # Two processes that compile a function for two types at a time may both give their code the same file.
-        return found if found is not None and tuple(found.signature.args) == tuple(sig) else None
+            # Two processes that compile a function for two types at a time may both give their code the same file.
+            return found if found is not None and tuple(found.signature.args) == tuple(sig) else None
+        return None
 
     def save_overload(self, sig: Any, data: Any) -> None:
         with suppress(OSError):
             super().save_overload(sig, data)  # type: ignore[no-untyped-call]
 
 
-def compiled(function: Callable[_P, _R]) -> Callable[_P, _R]:
+def compiled(function: Callable[_P, _R], *, nogil: bool = False) -> Callable[_P, _R]:
     """Compile a function at its first call and keep the machine code on disk.
 
     No fast-math: sums keep their order, so the same inputs give the same bytes in every process.
     """
-    return _compiled(function, nogil=False)
-
-
-def unlocked(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Compile a function beside whose calls other threads run."""
-    return _compiled(function, nogil=True)
-
-
-def _compiled(function: Callable[_P, _R], *, nogil: bool) -> Callable[_P, _R]:
     dispatcher: Any = njit(error_model="numpy", nogil=nogil)(function)
     if FOLDER:  # `cache=True` would take one of numba's own folders
         dispatcher._cache = _Cache(function)  # type: ignore[no-untyped-call]  # noqa: SLF001
@@ -129,13 +103,11 @@ def _compiled(function: Callable[_P, _R], *, nogil: bool) -> Callable[_P, _R]:
     return result
 
 
-A120 = complex(-0.5, 0.5 * np.sqrt(3.0))
-"""a = exp(j 120 deg)."""
+A120 = complex(-0.5, 0.5 * np.sqrt(3.0))  # a = exp(j 120 deg)
 
 
 @compiled
 def sat(x: float, low: float, high: float) -> float:
-    """Clip x to low..high."""
     return min(max(x, low), high)
 
 
@@ -155,18 +127,7 @@ def unit_phasor(angle: float) -> complex:
 def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
     """Predictor x0 + h d, or corrector x0 + h (d1 + d) / 2 in the second pass.
 
-    Parameters
-    ----------
-    x0
-        State at the start of the step.
-    d1
-        Slope of the first pass; not read in the first pass.
-    d
-        Slope of this pass.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `x0`: state at the start of the step; `d1`: slope of the first pass; not read in the first pass.
     """
     if second:
         return x0 + 0.5 * h * (d1 + d)
@@ -174,7 +135,7 @@ def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
 
 
 @compiled
-def multiply_add(AT: NDArray[np.float64], x: NDArray[np.float64], sign: float, y: NDArray[np.float64]) -> None:
+def multiply_add(AT: Real, x: Real, sign: float, y: Real) -> None:
     """Add sign * A x to y, A given transposed, in an order that depends on nothing but the sizes.
 
     A BLAS call may sum in another order with another number of threads or alignment; equal bytes across

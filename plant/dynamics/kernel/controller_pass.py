@@ -10,9 +10,17 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, magnitude, unit_phasor
+from gridpeers.plant.dynamics.kernel.compiled import (
+    A120,
+    Complex,
+    Flags,
+    Integers,
+    Real,
+    compiled,
+    magnitude,
+    unit_phasor,
+)
 from gridpeers.plant.dynamics.kernel.gfl import advance_gfl
 from gridpeers.plant.dynamics.kernel.gfm import advance_gfm, measure_positive_sequence
 
@@ -24,42 +32,29 @@ whether its phase currents were limited (1 or 0)."""
 class Units(NamedTuple):
     """The inverters of a run as the compiled functions take them: parameters, states, and their terminals."""
 
-    f_nom: float
-    """Nominal frequency (Hz)."""
-    gfm: Any
-    """Records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`."""
-    gfm_at: NDArray[np.int64]
-    """The inverter that each belongs to."""
-    gfm_state: Any
-    """Their states; advanced by a pass."""
-    gfm_0: Any
-    """Their states at the start of the step."""
-    gfm_d: Any
-    """Slopes of the step's first pass."""
-    gfl: Any
-    """The same for `gridpeers.plant.dynamics.kernel.gfl`."""
-    gfl_at: NDArray[np.int64]
+    f_nom: float  # nominal frequency (Hz)
+    gfm: Any  # records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`
+    gfm_at: Integers  # the inverter that each belongs to
+    gfm_state: Any  # their states; advanced by a pass
+    gfm_0: Any  # their states at the start of the step
+    gfm_d: Any  # slopes of the step's first pass
+    gfl: Any  # the same for `gridpeers.plant.dynamics.kernel.gfl`
+    gfl_at: Integers
     gfl_state: Any
     gfl_0: Any
     gfl_d: Any
-    online: NDArray[np.bool_]
-    """Inverters that are connected and in a live island."""
-    set_points: NDArray[np.float64]
-    """n_inv x 3: P_set, V_set, Q_set (pu)."""
-    J: NDArray[np.complex128]
-    """Injections (A), n_inv x 3: in, those of the network solution; out, the new ones."""
-    J_0: NDArray[np.complex128]
-    """Injections (A) at the start of the step."""
-    V: NDArray[np.complex128]
-    """Terminal voltages (V), n_inv x 3, of the last network solution."""
-    I: NDArray[np.complex128]  # noqa: E741  # the paper's symbol
+    online: Flags  # inverters that are connected and in a live island
+    set_points: Real  # n_inv x 3: P_set, V_set, Q_set (pu)
+    J: Complex  # injections (A), n_inv x 3: in, those of the network solution; out, the new ones
+    J_0: Complex  # injections (A) at the start of the step
+    V: Complex  # terminal voltages (V), n_inv x 3, of the last network solution
+    I: Complex  # noqa: E741  # the paper's symbol
     """Currents out of the inverters (A), n_inv x 3, of the last network solution."""
-    limiting: NDArray[np.bool_]
-    """Inverters whose phase currents were limited in the last network solution."""
+    limiting: Flags  # inverters whose phase currents were limited in the last network solution
 
 
 @compiled
-def read_voltage(i: int, V: NDArray[np.complex128], readings: NDArray[np.float64]) -> None:
+def read_voltage(i: int, V: Complex, readings: Real) -> None:
     """Write the mean of the phases' voltages, the lowest and the highest (V) into an inverter's reading."""
     a, b, c = magnitude(V[i, 0]), magnitude(V[i, 1]), magnitude(V[i, 2])
     readings[i, 3], readings[i, 4], readings[i, 5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
@@ -69,10 +64,10 @@ def read_voltage(i: int, V: NDArray[np.complex128], readings: NDArray[np.float64
 def read_terminal(
     i: int,
     y_f: complex,
-    J: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
-    readings: NDArray[np.float64],
+    J: Complex,
+    V: Complex,
+    I: Complex,  # noqa: E741  # the paper's symbol
+    readings: Real,
 ) -> None:
     """Write an inverter's phase currents (A), and P (W), Q (var) and V (V) into its reading (section 2).
 
@@ -87,7 +82,7 @@ def read_terminal(
 
 
 @compiled
-def read_offline(units: Any, readings: NDArray[np.float64]) -> None:
+def read_offline(units: Any, readings: Real) -> None:
     """Write the readings of the inverters that deliver nothing: `f_nom`, or 0 Hz where there is no voltage."""
     for i in range(units.online.size):
         if not units.online[i]:
@@ -98,7 +93,6 @@ def read_offline(units: Any, readings: NDArray[np.float64]) -> None:
 
 @compiled
 def keep_start(units: Any) -> None:
-    """Keep the present states and injections as the start of a step."""
     for k in range(units.gfm_at.size):
         units.gfm_0[k] = units.gfm_state[k]
     for k in range(units.gfl_at.size):
@@ -109,19 +103,10 @@ def keep_start(units: Any) -> None:
 
 
 @compiled
-def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDArray[np.complex128]) -> None:
+def turn_frames(units: Any, net: Any, theta: Real, rotation: Complex) -> None:
     """Write the factor that turns phasors into each island's frame, by the present angle of its leader.
 
-    Parameters
-    ----------
-    units
-        `Units`.
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    theta
-        Room for a number an inverter.
-    rotation
-        One factor an island, written here.
+    `theta`: room for a number an inverter; `rotation`: one factor an island, written here.
     """
     for k in range(units.gfm_at.size):
         theta[units.gfm_at[k]] = units.gfm_state[k].theta
@@ -132,19 +117,12 @@ def turn_frames(units: Any, net: Any, theta: NDArray[np.float64], rotation: NDAr
 
 
 @compiled
-def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.float64]) -> None:
+def advance_inverters(units: Any, h: float, second: bool, readings: Real) -> None:
     """Take one pass of every inverter on the network.
 
-    Parameters
-    ----------
-    units
-        `Units`: V is read; states, J and I are advanced.
-    h
-        Step (s); 0: only slopes and outputs at the present states.
-    second
-        Whether this is the step's second pass.
-    readings
-        n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network solution.
+    `units`: `Units`: V is read; states, J and I are advanced; `h`: step (s); 0: only slopes and outputs at the present
+    states; `readings`: n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network
+    solution.
     """
     set_points, J, V = units.set_points, units.J, units.V
     for k in range(units.gfm_at.size):
@@ -158,17 +136,7 @@ def advance_inverters(units: Any, h: float, second: bool, readings: NDArray[np.f
         if former.positive_sequence:
             P, Q, v = measure_positive_sequence(former, i, V, units.I)
         advance_gfm(
-            former,
-            set_points[i, 0],
-            set_points[i, 1],
-            units.gfm_0[k],
-            state,
-            units.gfm_d[k],
-            P,
-            Q,
-            v,
-            h,
-            second,
+            former, set_points[i, 0], set_points[i, 1], units.gfm_0[k], state, units.gfm_d[k], P, Q, v, h, second
         )
         J_A = state.E * former.V_b * unit_phasor(state.theta) * former.y_f
         J[i, 0], J[i, 1], J[i, 2] = J_A, J_A * A120.conjugate(), J_A * A120

@@ -12,8 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat, unit_phasor
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat, unit_phasor
 from gridpeers.plant.plant_config import GflParameters, Method
+
+_NUMBERS = (
+    *("X_f", "k_pPLL", "k_iPLL", "k_pc", "k_ic", "F_current", "T_if", "T_ff", "T_pf"),
+    *("T_vf", "T_qf", "db_UF", "db_OF", "db_UV", "db_OV", "P_max", "P_min", "S_max"),
+    *("Q_max", "Q_min", "i_max"),
+)  # of `GflParameters`, as they are
 
 PARAMETERS = np.dtype(
     [
@@ -31,27 +37,7 @@ PARAMETERS = np.dtype(
         ("volt_var", "b1"),
         ("R_p", "f8"),  # pu frequency per pu
         ("R_q", "f8"),  # pu voltage per pu
-        ("X_f", "f8"),
-        ("k_pPLL", "f8"),
-        ("k_iPLL", "f8"),
-        ("k_pc", "f8"),
-        ("k_ic", "f8"),
-        ("F_current", "f8"),
-        ("T_if", "f8"),
-        ("T_ff", "f8"),
-        ("T_pf", "f8"),
-        ("T_vf", "f8"),
-        ("T_qf", "f8"),
-        ("db_UF", "f8"),
-        ("db_OF", "f8"),
-        ("db_UV", "f8"),
-        ("db_OV", "f8"),
-        ("P_max", "f8"),
-        ("P_min", "f8"),
-        ("S_max", "f8"),
-        ("Q_max", "f8"),
-        ("Q_min", "f8"),
-        ("i_max", "f8"),
+        *((name, "f8") for name in _NUMBERS),
     ],
     align=True,
 )
@@ -99,10 +85,7 @@ def pack(
 
     In the method "second-order" the unit is a current source towards the network, in either model.
 
-    Raises
-    ------
-    ValueError
-        If the current controller's one-pass feedback cannot be stable (checklist row 23).
+    ValueError if the current controller's one-pass feedback cannot be stable (checklist row 23).
     """
     if method == "first-order" and par.model == "voltage_source" and abs(own_feedback(par)) >= 1.0:
         raise ValueError(
@@ -120,7 +103,7 @@ def pack(
     record["y_e"] = y
     record["y_f"] = 0.0 if par.model == "current_source" or method == "second-order" else y
     record["R_p"], record["R_q"] = m_p, m_q
-    for name in ("frequency_watt", "volt_var", *PARAMETERS.names[14:]):  # type: ignore[index]  # as in gfm
+    for name in ("frequency_watt", "volt_var", *_NUMBERS):
         record[name] = getattr(par, name)
     return record
 
@@ -128,23 +111,15 @@ def pack(
 def settle(
     g: np.void,
     state: np.void,
-    V: NDArray[np.complex128],
-    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    V: Complex,
+    I: Complex,  # noqa: E741  # the paper's symbol
     S: complex,
     v: float,
 ) -> None:
     """Set a state to rest, in step with the voltage (section 7).
 
-    Parameters
-    ----------
-    g, state
-        Records of `PARAMETERS` and `STATE`; the state is written.
-    V, I
-        Phase voltages (V) and currents out of the inverter (A).
-    S
-        Terminal power (pu).
-    v
-        Mean terminal voltage (pu).
+    `V`, `I`: phase voltages (V) and currents out of the inverter (A); `S`: terminal power (pu); `v`: mean terminal
+    voltage (pu).
     """
     theta = float(np.angle(V @ np.array([1.0, A120, A120**2])))
     turn = np.exp(-1j * theta) * np.array([1.0, A120, A120.conjugate()])
@@ -253,22 +228,9 @@ def advance_gfl(
 
     The order of the blocks is that of section 5 and matters in the first 20 ms.
 
-    Parameters
-    ----------
-    g
-        Record of `PARAMETERS`.
-    P_set, V_set, Q_set
-        Set-points (pu), equations (7) and (8).
-    x0, x, d
-        Records of `STATE`: start of the step; trial state, advanced here; first pass' slopes.
-    V_A, V_B, V_C
-        Terminal voltages (V) of this pass' network solution.
-    J_A, J_B, J_C
-        Injections (A) that went into that solution.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `P_set`, `V_set`, `Q_set`: set-points (pu), equations (7) and (8); `x0`, `x`, `d`: records of `STATE`: start of the
+    step; trial state, advanced here; first pass' slopes; `V_A`, `V_B`, `V_C`: terminal voltages (V) of this pass'
+    network solution; `J_A`, `J_B`, `J_C`: injections (A) that went into that solution.
     """
     # 1: measure in the frame the pass starts with
     to_dq = unit_phasor(-x.theta)

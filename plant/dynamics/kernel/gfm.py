@@ -11,8 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, heun, magnitude, sat
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, compiled, heun, magnitude, sat
 from gridpeers.plant.plant_config import GfmParameters
+
+_NUMBERS = (
+    *("T_p", "T_q", "T_v", "P_max", "P_min", "k_pp", "k_ip", "w_lim", "Q_max"),
+    *("Q_min", "k_pq", "k_iq", "V_lim", "k_pv", "k_iv", "E_min", "E_max"),
+)  # of `GfmParameters`, as they are
 
 PARAMETERS = np.dtype(
     [
@@ -24,23 +29,7 @@ PARAMETERS = np.dtype(
         ("m_q", "f8"),  # pu per pu
         ("positive_sequence", "b1"),  # measurements of REGFM_A1, section 3.8
         ("voltage_control", "b1"),
-        ("T_p", "f8"),
-        ("T_q", "f8"),
-        ("T_v", "f8"),
-        ("P_max", "f8"),
-        ("P_min", "f8"),
-        ("k_pp", "f8"),
-        ("k_ip", "f8"),
-        ("w_lim", "f8"),
-        ("Q_max", "f8"),
-        ("Q_min", "f8"),
-        ("k_pq", "f8"),
-        ("k_iq", "f8"),
-        ("V_lim", "f8"),
-        ("k_pv", "f8"),
-        ("k_iv", "f8"),
-        ("E_min", "f8"),
-        ("E_max", "f8"),
+        *((name, "f8") for name in _NUMBERS),
     ],
     align=True,
 )
@@ -68,20 +57,8 @@ STATE = np.dtype(
 def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them.
 
-    Parameters
-    ----------
-    par
-        Per-unit parameters of the type.
-    S_b
-        Rating (VA, three phases).
-    V_b
-        Nominal voltage (V, line-to-neutral).
-    m_p
-        P-f droop (pu frequency per pu power).
-    m_q
-        Q-V droop (pu voltage per pu reactive power).
-    f_nom
-        Nominal frequency (Hz), base of m_p.
+    `S_b`: rating (VA, three phases); `m_p`: P-f droop (pu frequency per pu power); `m_q`: Q-V droop (pu voltage per pu
+    reactive power); `f_nom`: nominal frequency (Hz), base of m_p.
     """
     Z_b = V_b**2 / (S_b / 3.0)
     record = np.zeros((), PARAMETERS)
@@ -90,7 +67,7 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
     record["m_p"], record["m_q"] = m_p * (2.0 * np.pi * f_nom), m_q
     record["I_limit"] = par.I_max * S_b / (3.0 * V_b)
     record["positive_sequence"], record["voltage_control"] = par.model == "regfm_a1", par.voltage_control
-    for name in PARAMETERS.names[8:]:  # type: ignore[index]  # a structured dtype has names
+    for name in _NUMBERS:
         record[name] = getattr(par, name)
     return record
 
@@ -98,16 +75,8 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
 def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> None:
     """Set a state to rest (section 7).
 
-    Parameters
-    ----------
-    g, state
-        Records of `PARAMETERS` and `STATE`; the state is written.
-    J_A
-        Injection of phase A (A), from which the internal voltage follows.
-    S
-        Measured power (pu).
-    v
-        Measured voltage (pu).
+    `J_A`: injection of phase A (A), from which the internal voltage follows; `S`: measured power (pu); `v`: measured
+    voltage (pu).
     """
     E = J_A / g["y_f"]
     state["p"], state["q"], state["v"] = S.real, S.imag, v
@@ -120,8 +89,8 @@ def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> No
 def measure_positive_sequence(
     g: Any,
     i: int,
-    V: NDArray[np.complex128],
-    I: NDArray[np.complex128],  # noqa: E741  # the paper's symbol
+    V: Complex,
+    I: Complex,  # noqa: E741  # the paper's symbol
 ) -> tuple[float, float, float]:
     """Return P, Q and V (pu) of inverter i's positive sequence, from its V (V) and I out of it (A); section 3.8."""
     V_1 = (V[i, 0] + A120 * V[i, 1] + A120.conjugate() * V[i, 2]) / 3.0
@@ -139,21 +108,9 @@ def advance_gfm(
     Integrator slopes are taken from the filters' values at the end of the pass, in both passes
     (section 5): that is what the reference implementation does, and the first 20 ms depend on it.
 
-    Parameters
-    ----------
-    g
-        Record of `PARAMETERS`.
-    P_set, V_set
-        Set-points (pu), equations (3) and (4).
-    x0, x, d
-        Records of `STATE`: at the start of the step; the trial state, advanced here; slopes of
-        the first pass, written in the first and read in the second.
-    P, Q, v
-        Power and voltage (pu) of this pass' network solution, as the model measures them.
-    h
-        Step (s).
-    second
-        Whether this is the corrector.
+    `P_set`, `V_set`: set-points (pu), equations (3) and (4); `x0`, `x`, `d`: records of `STATE`: at the start of the
+    step; the trial state, advanced here; slopes of the first pass, written in the first and read in the second; `P`,
+    `Q`, `v`: power and voltage (pu) of this pass' network solution, as the model measures them.
     """
     # measurement filters, 3.2
     dp = (P - x.p) / g.T_p

@@ -10,32 +10,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled
-
-Integers = NDArray[np.int64]
-Real = NDArray[np.float64]
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled
 
 
 class BlockFactors(NamedTuple):
     """A matrix of n x n blocks whose pattern is symmetric, as (L + 1) D (1 + D^-1 U); before, as its own blocks."""
 
-    start: Integers
-    """First entry of each node in `later`, n + 1."""
-    later: Integers
-    """Later nodes that each node is coupled with, ascending."""
-    D: Real
-    """Inverse pivots, n x 4; before, the diagonal."""
-    L: Real
-    """Blocks below the diagonal, [later, node], by columns."""
-    U: Real
-    """Blocks above it, [node, later], by rows."""
-
-
-def no_factors() -> BlockFactors:
-    """Return the factors of an empty matrix."""
-    return BlockFactors(np.zeros(1, np.int64), np.zeros(0, np.int64), *(np.zeros((0, 4)) for _ in range(3)))
+    start: Integers  # first entry of each node in `later`, n + 1
+    later: Integers  # later nodes that each node is coupled with, ascending
+    D: Real  # inverse pivots, n x 4; before, the diagonal
+    L: Real  # blocks below the diagonal, [later, node], by columns
+    U: Real  # blocks above it, [node, later], by rows
 
 
 @compiled
@@ -46,21 +32,13 @@ def add_tangent(
     across: Integers,
     a_first: Real,
     a_second: Real,
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
+    A: Complex,
+    B: Complex,
 ) -> None:
     """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
 
-    Parameters
-    ----------
-    f
-        The matrix; written.
-    first, second, a_first, a_second
-        Nodes of each branch, or -1, and the ratios with which they count.
-    across
-        Entry that couples the two nodes, or -1.
-    A, B
-        Factors of each branch (S).
+    `f`: the matrix; written; `first`, `second`, `a_first`, `a_second`: nodes of each branch, or -1, and the ratios with
+    which they count; `across`: entry that couples the two nodes, or -1; `A`, `B`: factors of each branch (S).
     """
     for b in range(first.size):
         p, q, r, s = A[b].real + B[b].real, B[b].imag - A[b].imag, A[b].imag + B[b].imag, A[b].real - B[b].real
@@ -82,7 +60,6 @@ def add_tangent(
 
 @compiled
 def subtract_product(to: Real, left: Real, right: Real) -> None:
-    """Subtract the product of two blocks from a third."""
     to[0] -= left[0] * right[0] + left[1] * right[2]
     to[1] -= left[0] * right[1] + left[1] * right[3]
     to[2] -= left[2] * right[0] + left[3] * right[2]
@@ -147,8 +124,7 @@ def solve_blocks(f: BlockFactors, x: Real) -> None:
         x[two * row], x[two * row + one] = D[row, 0] * re + D[row, 1] * im, D[row, 2] * re + D[row, 3] * im
 
 
-COPY = -2
-"""In place of the position of a terminal that copies the first one of its single-phase inverter."""
+COPY = -2  # in place of the position of a terminal that copies the first one of its single-phase inverter
 
 
 class SparseMaps(NamedTuple):
@@ -157,59 +133,32 @@ class SparseMaps(NamedTuple):
     Unknowns are node voltages, [Re V_1, Im V_1, Re V_2, ...].
     """
 
-    factored: BlockFactors
-    """Of the admittances and the loads' tangent."""
-    constant: Real
-    """Right-hand side (A) without injections: sources, and the constant part of the tangent."""
-    first: Integers
-    """Position of the node at each branch's beginning, or -1: at a source."""
-    second: Integers
-    """The same at its end, or -1: ground, or a source."""
-    a_first: Real
-    """Ratio with which the first node's voltage counts in the branch's."""
-    a_second: Real
-    """The same for the second."""
-    from_sources: NDArray[np.complex128]
-    """Part of each branch's voltage that the ideal sources give (V)."""
+    factored: BlockFactors  # of the admittances and the loads' tangent
+    constant: Real  # right-hand side (A) without injections: sources, and the constant part of the tangent
+    first: Integers  # position of the node at each branch's beginning, or -1: at a source
+    second: Integers  # the same at its end, or -1: ground, or a source
+    a_first: Real  # ratio with which the first node's voltage counts in the branch's
+    a_second: Real  # the same for the second
+    from_sources: Complex  # part of each branch's voltage that the ideal sources give (V)
     terminals: Integers
     """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
-    fixed: NDArray[np.complex128]
-    """Voltages (V) of the terminals that have no position: a source's, or 0."""
-    feeds: NDArray[np.bool_]
-    """Which inverters inject."""
-    scratch: Real
-    """Room for the solution and its right-hand side."""
-    increments: Real
-    """How the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last."""
+    fixed: Complex  # voltages (V) of the terminals that have no position: a source's, or 0
+    feeds: Flags  # which inverters inject
+    scratch: Real  # room for the solution and its right-hand side
+    increments: Real  # how the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last
     rate: Real
     """Part of an iteration's change that the next one has, when last seen, 1: unknown; and how much it can grow by a
     change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
 
 
-def no_maps() -> SparseMaps:
-    """Return the maps of a network that is solved by dense matrices."""
-    nowhere, values = np.zeros(0, np.int64), np.zeros(0)
-    terminals, fixed = np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128)
-    none = np.zeros(0, np.complex128)
-    held, increments = np.zeros(0, np.bool_), np.zeros((4, 0))
-    return SparseMaps(
-        no_factors(),
-        values,
-        nowhere,
-        nowhere,
-        values,
-        values,
-        none,
-        terminals,
-        fixed,
-        held,
-        values,
-        increments,
-        values,
-    )
+_NOTHING, _NOWHERE, _NO_PHASOR = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.complex128)
 
-
-NO_MAPS = no_maps()
+NO_MAPS = SparseMaps(
+    BlockFactors(np.zeros(1, np.int64), _NOWHERE, *(np.zeros((0, 4)) for _ in range(3))),
+    *(_NOTHING, _NOWHERE, _NOWHERE, _NOTHING, _NOTHING, _NO_PHASOR),
+    *(np.zeros((0, 3), np.int64), np.zeros((0, 3), np.complex128), np.zeros(0, np.bool_)),
+    *(_NOTHING, np.zeros((4, 0)), _NOTHING),
+)
 
 
 @compiled
@@ -234,29 +183,12 @@ def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
 
 
 @compiled
-def draw_remainders(
-    maps: SparseMaps,
-    I_b: NDArray[np.complex128],
-    i_c: NDArray[np.complex128],
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
-    x: Real,
-    right: Real,
-) -> None:
+def draw_remainders(maps: SparseMaps, I_b: Complex, i_c: Complex, A: Complex, B: Complex, x: Real, right: Real) -> None:
     """Take what the branches draw (A) beyond the loads' tangent from the nodes at their ends.
 
-    Parameters
-    ----------
-    maps
-        The network.
-    I_b
-        Currents of the branches (A) at x.
-    i_c, A, B
-        The tangent; see `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    x
-        [Re V_b; Im V_b] of the branches (V).
-    right
-        Currents into the nodes (A); written.
+    `I_b`: currents of the branches (A) at x; `i_c`, `A`, `B`: the tangent; see
+    `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`; `x`: [Re V_b; Im V_b] of the branches (V); `right`:
+    currents into the nodes (A); written.
     """
     first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
     m = first.size
@@ -285,16 +217,13 @@ def extrapolate(maps: SparseMaps, x: Real) -> None:
 
 @compiled
 def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
-    """Note how a solution x differs from the one before, x_0 (V)."""
     increments = maps.increments
     for i in range(increments.shape[1]):
         increments[0, i], increments[1, i], increments[2, i] = increments[1, i], increments[2, i], increments[3, i]
         increments[3, i] = x[i] - x_0[i]
 
 
-Complex = NDArray[np.complex128]
-
-NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), np.zeros(0)
+NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), _NOTHING
 """In place of the dense matrices of a network that is solved by sparse factors."""
 
 
@@ -304,39 +233,22 @@ class Reduced(NamedTuple):
     Real matrices act on [Re; Im] and are stored transposed, rows contiguous.
     """
 
-    S: Complex
-    """Constant power of the live branches (VA)."""
-    I0: Complex
-    """Constant current of the live branches (A)."""
-    limited_at: NDArray[np.int64]
-    """Live branches with the law of a `LoadPart`."""
-    law: Real
-    """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
-    i_c: Complex
-    """Tangent of the load law, constant part (A)."""
-    A: Complex
-    """Tangent, factor of V_b (S)."""
-    B: Complex
-    """Tangent, factor of V_b^* (S)."""
-    branch_island: NDArray[np.int64]
-    """Island of each live branch."""
-    inverter_island: NDArray[np.int64]
-    """Island of each inverter."""
-    leader: NDArray[np.int64]
+    S: Complex  # constant power of the live branches (VA)
+    I0: Complex  # constant current of the live branches (A)
+    limited_at: Integers  # live branches with the law of a `LoadPart`
+    law: Real  # their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`
+    i_c: Complex  # tangent of the load law, constant part (A)
+    A: Complex  # tangent, factor of V_b (S)
+    B: Complex  # tangent, factor of V_b^* (S)
+    branch_island: Integers  # island of each live branch
+    inverter_island: Integers  # island of each inverter
+    leader: Integers
     """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
-    theta_lin: Real
-    """That inverter's angle at the point of linearisation (rad)."""
-    PT: Real = NO_MATRIX
-    """J to x, (6 n_inv) x (2 m)."""
-    QT: Real = NO_MATRIX
-    """N to x, (2 m) x (2 m)."""
-    x_c: Real = NO_VECTOR
-    """Constant part of x, 2 m (V)."""
-    GGT: Real = NO_MATRIX
-    """J to V_G, (6 n_inv) x (6 n_inv)."""
-    GBT: Real = NO_MATRIX
-    """I_b to V_G, (2 m) x (6 n_inv)."""
-    s_G: Real = NO_VECTOR
-    """Constant part of V_G, 6 n_inv (V)."""
-    sparse: SparseMaps = NO_MAPS
-    """Sparse factors in place of the dense matrices."""
+    theta_lin: Real  # that inverter's angle at the point of linearisation (rad)
+    PT: Real = NO_MATRIX  # J to x, (6 n_inv) x (2 m)
+    QT: Real = NO_MATRIX  # N to x, (2 m) x (2 m)
+    x_c: Real = NO_VECTOR  # constant part of x, 2 m (V)
+    GGT: Real = NO_MATRIX  # J to V_G, (6 n_inv) x (6 n_inv)
+    GBT: Real = NO_MATRIX  # I_b to V_G, (2 m) x (6 n_inv)
+    s_G: Real = NO_VECTOR  # constant part of V_G, 6 n_inv (V)
+    sparse: SparseMaps = NO_MAPS  # sparse factors in place of the dense matrices

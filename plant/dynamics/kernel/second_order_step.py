@@ -13,9 +13,8 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Real, compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
@@ -23,8 +22,7 @@ from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
 CONSISTENT = 1e-10
 """Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
 
-LOOSE = 0.01
-"""Tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)."""
+LOOSE = 0.01  # tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)
 
 MAX_ROUNDS = 60
 
@@ -32,57 +30,34 @@ MAX_ROUNDS = 60
 class Slopes(NamedTuple):
     """States and slopes of all inverters as tables of numbers, a row each: the memory of the records in `Units`."""
 
-    gfm: NDArray[np.float64]
-    """States."""
-    gfm_0: NDArray[np.float64]
-    """States at the start of the step."""
-    gfm_d: NDArray[np.float64]
-    """Slopes of the last pass; 0 for an output."""
-    gfm_d0: NDArray[np.float64]
-    """Slopes at the start of the step."""
-    gfl: NDArray[np.float64]
-    """The same for the GFL."""
-    gfl_0: NDArray[np.float64]
-    gfl_d: NDArray[np.float64]
-    gfl_d0: NDArray[np.float64]
+    gfm: Real  # states
+    gfm_0: Real  # states at the start of the step
+    gfm_d: Real  # slopes of the last pass; 0 for an output
+    gfm_d0: Real  # slopes at the start of the step
+    gfl: Real  # the same for the GFL
+    gfl_0: Real
+    gfl_d: Real
+    gfl_d0: Real
 
 
 class FeedForward(NamedTuple):
     """How each inverter's current depends at once on the terminal's voltage and on itself."""
 
-    y: NDArray[np.complex128]
+    y: Complex
     """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
     itself, or its internal voltage is a state and the admittance is part of the network."""
-    gain: NDArray[np.complex128]
+    gain: Complex
     """1 / (1 - a), where the current after a pass changes by a times what the current before it changes."""
-    I_b: NDArray[np.float64]
-    """Rated currents (A)."""
-    V_b: float
-    """Highest nominal voltage (V)."""
+    I_b: Real  # rated currents (A)
+    V_b: float  # highest nominal voltage (V)
 
 
 @compiled
-def take_round(
-    units: Any,
-    forward: Any,
-    used: NDArray[np.complex128],
-    change: NDArray[np.complex128],
-    readings: NDArray[np.float64],
-) -> float:
+def take_round(units: Any, forward: Any, used: Complex, change: Complex, readings: Real) -> float:
     """Write slopes and injections that belong to the present voltages; returns a current's largest change (pu).
 
-    Parameters
-    ----------
-    units
-        `Units` whose states at the start of the step are the present ones.
-    forward
-        `FeedForward`.
-    used
-        Injections (A) of the network solution.
-    change
-        How the injections change (A); written.
-    readings
-        As in `advance_inverters`.
+    `units`: `Units` whose states at the start of the step are the present ones; `used`: injections (A) of the network
+    solution; `change`: how the injections change (A); written.
     """
     advance_inverters(units, 0.0, False, readings)
     largest = 0.0
@@ -101,12 +76,12 @@ def solve_together(
     net: Any,
     units: Any,
     forward: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
+    rotation: Complex,
+    x: Real,
+    I_b: Complex,
     tolerance: float,
-    work: NDArray[np.float64],
-    readings: NDArray[np.float64],
+    work: Real,
+    readings: Real,
 ) -> int:
     """Solve network and inverters at the present states; returns the iterations, or -1.
 
@@ -114,25 +89,10 @@ def solve_together(
     current reference P / u_d, weighted by k_pc: each round gains a decade, and the secant through the last two rounds
     (Anderson acceleration of depth 1, each island by itself) two.
 
-    Parameters
-    ----------
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        `Units` whose states at the start of the step are the present ones.
-    forward
-        `FeedForward`.
-    rotation
-        Factor that turns phasors into each island's frame.
-    x, I_b, tolerance, work
-        As in `solve_within_limits`.
-    readings
-        n_inv x READING, written here.
+    `units`: `Units` whose states at the start of the step are the present ones; `rotation`: factor that turns phasors
+    into each island's frame; `readings`: n_inv x READING, written here.
 
-    Returns
-    -------
-    int
-        Iterations of the network, without the one that each round after the first takes at least.
+    Return iterations of the network, without the one that each round after the first takes at least.
     """
     n, islands = units.online.size, net.leader.size
     J = units.J
@@ -180,33 +140,15 @@ def run_second_order_steps(
     present: Any,
     slopes: Any,
     forward: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
+    x: Real,
+    out: Real,
 ) -> int:
     """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
 
-    Parameters
-    ----------
-    begin
-        Solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the end.
-    steps, h
-        Number of steps and their length (s).
-    tolerance
-        Of the network solution (V).
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
-    present
-        The same, with the present states in place of those at the start of the step.
-    slopes
-        `Slopes` of the same memory.
-    forward
-        `FeedForward`.
-    x
-        Branch voltages in the islands' frames, the first guess of the next solution.
-    out
-        steps x n_inv x READING: f, P, Q and V at the end of each step.
+    `begin`: solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the
+    end; `present`: the same, with the present states in place of those at the start of the step; `slopes`: `Slopes` of
+    the same memory; `x`: branch voltages in the islands' frames, the first guess of the next solution; `out`: steps x
+    n_inv x READING: f, P, Q and V at the end of each step.
     """
     total = 0
     if steps == 0:

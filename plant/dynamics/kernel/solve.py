@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import A120, compiled, multiply_add
+from gridpeers.plant.dynamics.kernel.compiled import A120, Complex, Flags, Integers, Real, compiled, multiply_add
 from gridpeers.plant.dynamics.kernel.network_arrays import COPY, branch_voltages, draw_remainders, solve_blocks
 
 COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "V_off", "V_off_above")
@@ -35,15 +34,10 @@ def power(m: float, n: float) -> float:
 
 
 @compiled
-def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, complex]:
+def limited_admittance(row: Real, V: float) -> tuple[complex, complex]:
     """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
 
-    Parameters
-    ----------
-    row
-        A row of `COLUMNS`.
-    V
-        Magnitude of the voltage across the load (V).
+    `V`: magnitude of the voltage across the load (V).
     """
     P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off, V_off_above = row
     per_square = 1.0 / (V_nom * V_nom)
@@ -73,9 +67,7 @@ def limited_admittance(row: NDArray[np.float64], V: float) -> tuple[complex, com
 
 
 @compiled
-def limited_currents(
-    at: NDArray[np.int64], law: NDArray[np.float64], x: NDArray[np.float64], I_b: NDArray[np.complex128]
-) -> None:
+def limited_currents(at: Integers, law: Real, x: Real, I_b: Complex) -> None:
     """Write the currents (A) of the branches `at`, one for each row of `law`, at x = [Re V_b; Im V_b]."""
     m = I_b.size
     for k in range(at.size):
@@ -85,13 +77,7 @@ def limited_currents(
 
 
 @compiled
-def limited_tangents(
-    at: NDArray[np.int64],
-    law: NDArray[np.float64],
-    V: NDArray[np.complex128],
-    A: NDArray[np.complex128],
-    B: NDArray[np.complex128],
-) -> None:
+def limited_tangents(at: Integers, law: Real, V: Complex, A: Complex, B: Complex) -> None:
     """Write the factors (S) by which the branches' currents follow their voltages (V) and these conjugate."""
     for k in range(at.size):
         b = at[k]
@@ -103,22 +89,14 @@ def limited_tangents(
 
 MAX_ITERATIONS = 60
 
-CAUTION = 0.1
-"""Part of the tolerance that what is left of an iteration may have by its rate so far."""
+CAUTION = 0.1  # part of the tolerance that what is left of an iteration may have by its rate so far
 
 NOISE = 100.0
 """Change of an iteration, as a multiple of the tolerance, from which on the next one tells its rate, not rounding."""
 
 
 @compiled
-def load_currents(
-    S: NDArray[np.complex128],
-    I0: NDArray[np.complex128],
-    limited_at: NDArray[np.int64],
-    law: NDArray[np.float64],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-) -> None:
+def load_currents(S: Complex, I0: Complex, limited_at: Integers, law: Real, x: Real, I_b: Complex) -> None:
     """Write the branch currents (A) of all loads at x = [Re V_b; Im V_b]."""
     m = S.size
     if limited_at.size < m:
@@ -140,15 +118,7 @@ def remainder(current: complex, V_b: complex, i_c: complex, A: complex, B: compl
 
 
 @compiled
-def solve_sparse(
-    net: Any,
-    J: NDArray[np.complex128],
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    tolerance: float,
-) -> int:
+def solve_sparse(net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float) -> int:
     """Solve as `solve_network` does, with the factors of a sparse matrix."""
     maps = net.sparse
     n, u = J.shape[0], maps.constant.size
@@ -196,35 +166,17 @@ def solve_sparse(
 
 @compiled
 def solve_network(
-    net: Any,
-    J: NDArray[np.complex128],
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
+    net: Any, J: Complex, rotation: Complex, x: Real, I_b: Complex, V: Complex, tolerance: float, work: Real
 ) -> int:
     """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
-    Parameters
-    ----------
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    J
-        Injections, n_inv x 3 (A).
-    rotation
-        exp(-j angle) into each island's frame.
-    x
-        Branch voltages in that frame (V), [Re; Im]: first guess, then solution.
-    I_b
-        Branch currents in that frame (A), written here.
-    V
-        Terminal voltages, n_inv x 3 (V), written here.
-    tolerance
-        Largest change of a branch voltage in the last iteration (V).
-    work
-        Room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
+    `J`: injections, n_inv x 3 (A);
+    `rotation`: exp(-j angle) into each island's frame;
+    `x`: branch voltages in that frame (V), [Re; Im]: first guess, then solution;
+    `I_b`: branch currents in that frame (A), written here;
+    `V`: terminal voltages, n_inv x 3 (V), written here;
+    `tolerance`: largest change of a branch voltage in the last iteration (V);
+    `work`: room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
     """
     if net.sparse.constant.size:
         return solve_sparse(net, J, rotation, x, I_b, V, tolerance)
@@ -286,23 +238,22 @@ EXACT, SETTLED = 1e-13, 1e-11
 
 PATIENCE = 100
 
-NO_NETWORK = -1
-"""Result of `settle_powers` where the network has no solution at the injections."""
+NO_NETWORK = -1  # result of `settle_powers` where the network has no solution at the injections
 
 
 @compiled
 def settle_powers(
     most: int,
     net: Any,
-    J: NDArray[np.complex128],
-    S: NDArray[np.complex128],
-    y: NDArray[np.complex128],
-    rated: NDArray[np.float64],
-    delivers: NDArray[np.bool_],
-    balanced: NDArray[np.bool_],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    V: NDArray[np.complex128],
+    J: Complex,
+    S: Complex,
+    y: Complex,
+    rated: Real,
+    delivers: Flags,
+    balanced: Flags,
+    x: Real,
+    I_b: Complex,
+    V: Complex,
     tolerance: float,
 ) -> tuple[int, float]:
     """Find the injections with which every inverter delivers its power; return the rounds taken, and the last change.
@@ -310,26 +261,13 @@ def settle_powers(
     The change is that of an injection (pu of its rated current). Where they have not settled, one round more than
     `most` is returned; where the network has no solution at the injections J, `NO_NETWORK`.
 
-    Parameters
-    ----------
-    most
-        Most rounds.
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest.
-    J
-        Injections (A), n_inv x 3: first guess, then solution.
-    S
-        Powers of all three phases (VA).
-    y
-        Admittances of the inverters that are part of the network (S).
-    rated
-        Ratings over nominal voltages (A).
-    delivers
-        Inverters whose injection is to be found; the others keep theirs.
-    balanced
-        Inverters of equal powers, in place of a balanced injection.
-    x, I_b, V, tolerance
-        As in `solve_network`.
+    `net`: a `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest;
+    `J`: injections (A), n_inv x 3: first guess, then solution;
+    `S`: powers of all three phases (VA);
+    `y`: admittances of the inverters that are part of the network (S);
+    `rated`: ratings over nominal voltages (A);
+    `delivers`: inverters whose injection is to be found; the others keep theirs;
+    `balanced`: inverters of equal powers, in place of a balanced injection.
     """
     n = J.shape[0]
     work = np.empty(12 * n + 6 * net.S.size)

@@ -10,12 +10,12 @@ its next pass gives the unlimited injection again.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from gridpeers.plant.dynamics.kernel.compiled import compiled, unlocked
+from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real, compiled
 from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, keep_start, read_offline, turn_frames
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.solve import solve_network
@@ -25,20 +25,11 @@ MAX_LIMITING = 2000
 
 
 @compiled
-def limit_currents(
-    gfm: Any,
-    gfm_at: NDArray[np.int64],
-    online: NDArray[np.bool_],
-    J: NDArray[np.complex128],
-    V: NDArray[np.complex128],
-    limiting: NDArray[np.bool_],
-) -> float:
+def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Complex, limiting: Flags) -> float:
     """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V).
 
-    Parameters
-    ----------
-    gfm, gfm_at, online, J, V, limiting
-        As in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is reduced, and `limiting` says whose.
+    `gfm`, `gfm_at`, `online`, `J`, `V`, `limiting`: as in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is
+    reduced, and `limiting` says whose.
     """
     largest = 0.0
     for k in range(gfm_at.size):
@@ -58,24 +49,11 @@ def limit_currents(
 
 
 @compiled
-def solve_on(
-    net: Any,
-    units: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
-) -> int:
+def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real) -> int:
     """Solve again and again until no phase is beyond its limit; return the iterations, or -1 as `solve_network`.
 
-    Parameters
-    ----------
-    net, rotation, x, I_b, tolerance, work
-        As for `solve_network`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the last
-        solution.
+    `units`: a `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the
+    last solution.
     """
     total = 0
     for _ in range(MAX_LIMITING):
@@ -91,13 +69,7 @@ def solve_on(
 
 @compiled
 def solve_within_limits(
-    net: Any,
-    units: Any,
-    rotation: NDArray[np.complex128],
-    x: NDArray[np.float64],
-    I_b: NDArray[np.complex128],
-    tolerance: float,
-    work: NDArray[np.float64],
+    net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real
 ) -> int:
     """Solve the network with every phase within its limit; arguments and result as of `solve_on`.
 
@@ -113,37 +85,15 @@ FAILURES = 3
 
 
 @compiled
-def run_steps(
-    begin: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    net: Any,
-    units: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> int:
+def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real) -> int:
     """Advance to the end of `steps` steps; returns the network iterations, or -1 - (FAILURES k + what) for step k.
 
     A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with
     `begin` = 2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0` of the units.
 
-    Parameters
-    ----------
-    begin
-        Network solution to begin with, two a step.
-    steps, h
-        Number of steps and their length (s).
-    tolerance
-        Of the network solution (V).
-    net
-        A `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`.
-    units
-        A `gridpeers.plant.dynamics.kernel.controller_pass.Units`.
-    x
-        Branch voltages in the islands' frames, the first guess of the next solution.
-    out
-        steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second solution.
+    `begin`: network solution to begin with, two a step; `x`: branch voltages in the islands' frames, the first guess of
+    the next solution; `out`: steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second
+    solution.
     """
     n, m = units.J.shape[0], net.S.size
     work = np.empty(12 * n + 6 * m)
@@ -182,16 +132,9 @@ def run_steps(
     return total
 
 
-@unlocked
+@partial(compiled, nogil=True)
 def run_steps_unlocked(
-    begin: int,
-    steps: int,
-    h: float,
-    tolerance: float,
-    net: Any,
-    units: Any,
-    x: NDArray[np.float64],
-    out: NDArray[np.float64],
+    begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real
 ) -> int:
     """Do the same without Python's lock, for networks so large that it is worth handing it back and forth."""
     return run_steps(begin, steps, h, tolerance, net, units, x, out)

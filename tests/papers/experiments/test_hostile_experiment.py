@@ -16,7 +16,7 @@ from gridpeers.papers.singhal2022.experiments.experiment_data import SweepData
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import GRAPHS, attack_words, defence_words, hostile
 from gridpeers.scenarios.schema import load_scenario
 from gridpeers.scenarios.sweep.sweep_case import run_one
-from gridpeers.sweep_files import read_sweep
+from gridpeers.scenarios.sweep.sweep_reading import read_sweep
 from tests.papers.experiments.experiment_runs import theory
 from tests.unit.agents.test_resilient_law import spread_after
 

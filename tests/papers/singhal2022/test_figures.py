@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from gridpeers.benchmarks import Settling, Steady
+from gridpeers.measures import Settling, Steady
 from gridpeers.papers.singhal2022.communication_claims import GraphRun
 from gridpeers.papers.singhal2022.figures import topologies, var_sharing
 from gridpeers.papers.singhal2022.islanding_claims import CASES, EVENTS

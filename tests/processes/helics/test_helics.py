@@ -102,15 +102,10 @@ def test_our_agents_control_a_grid_of_somebody_else_alike_under_both_drivers() -
 @pytest.mark.parametrize(
     ("what", "said", "deadline", "wait"),
     [
-        ("lacks a topic", "nobody publishes grid/inv3/V (in the federation: strange)", 30.0, 30.0),
-        ("never publishes", "t = 0 s: no value yet of grid/inv3/V", 30.0, 30.0),
-        ("text", "t = 0 s: grid/inv1/f is not a finite number", 30.0, 30.0),
-        ("not a number", "t = 0.1 s: grid/inv3/V is not a finite number", 30.0, 30.0),
-        ("leaves", " s: strange left the federation before the end", 30.0, 30.0),  # when, the broker decides
         ("error", "t = 0.09 s: the federation ended: no solution of my power flow", 30.0, 30.0),
-        ("hangs", "strange did not let time go on to 0.1 s within 4 s: strange stands at t = 0.1 s", 4.0, 30.0),
+        ("hangs", "strange did not let time go on to 0.1 s within 2 s: strange stands at t = 0.1 s", 2.0, 30.0),
         ("dies", "t = 0.09 s: strange died: nothing listens at tcp://127.0.0.1:", 30.0, 30.0),
-        ("not beginning", "did not begin within 2 s (the broker waits for 2 federates)", 30.0, 2.0),
+        ("not beginning", "did not begin within 1 s (the broker waits for 2 federates)", 30.0, 1.0),
     ],
 )
 def test_a_federate_of_others_that_fails_ends_the_run_with_one_line(
@@ -149,9 +144,8 @@ def test_a_broker_that_is_missing_is_one_line() -> None:
         scenario.run("IV")
 
 
-@pytest.mark.parametrize("begun", [False, True])
-def test_a_broker_that_is_killed_is_named_by_those_who_wait(begun: bool) -> None:
-    """Within seconds, before t = 0 and later; HELICS itself says nothing for half a minute."""
+def test_a_broker_that_is_killed_is_named_by_those_who_wait() -> None:
+    """Within seconds; HELICS itself says nothing for half a minute."""
     address = free_broker()
     me, other = (HelicsSettings(broker=address, name=name) for name in ("me", "other"))
     P_set, V_set = topics.set_points("grid", "inv2")
@@ -159,10 +153,9 @@ def test_a_broker_that_is_killed_is_named_by_those_who_wait(begun: bool) -> None
         one = HelicsFederate(me, 30.0)
         two = HelicsFederate(other, 30.0)
         waits = pool.submit(one.begin, [], [P_set, V_set], {})
-        if begun:
-            two.begin([P_set, V_set], [], {})
-            waits.result()
-            waits = pool.submit(one.step, {}, 1.0)
+        two.begin([P_set, V_set], [], {})
+        waits.result()
+        waits = pool.submit(one.step, {}, 1.0)
         broker.kill()
         with pytest.raises(HelicsError, match=f"the broker at {address} has ended"):
             waits.result()

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from itertools import count
-from threading import Event
 from time import monotonic
 from typing import Any, cast
 
@@ -13,16 +11,14 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents import agent_process
-from gridpeers.agents.agent_process import _opened, run_agents, take_part
+from gridpeers.agents.agent_process import _opened, take_part
 from gridpeers.agents.realtime_agent import RealtimeAgent
-from gridpeers.agents.session_health import SessionHealth
-from gridpeers.wire.backlog import Stamped
 from gridpeers.wire.codec import encode
 from gridpeers.wire.driver.drive import StoppedError, StoppedOnLeashError
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.inbox import Inbox, Stamped
 from gridpeers.wire.driver.session import Session, SessionError
 from gridpeers.wire.keys import Keys
-from gridpeers.wire.messages import Measurement, Stop
+from gridpeers.wire.messages import Stop
 from tests.toy.toy_configs import agent_config
 
 KEYS = Keys("toy")
@@ -80,88 +76,6 @@ def test_an_agent_whose_run_ends_has_not_left() -> None:
 def test_an_agent_whose_run_goes_on_leaves(stop: StoppedError) -> None:
     """One that a person started at once, one that its run started when the plant is still there after a moment."""
     assert ended(stop).left == 1
-
-
-class Measuring(Played):
-    """A session over which the plant measures; a request to end comes at one place of one of several sessions."""
-
-    id = "me"
-    opened: list[Measuring]
-    """All sessions so far."""
-    asked: str
-    """Where the request comes: the number of the session, and the place in it."""
-    numbers: count[int]
-
-    def __init__(self, name: str, **words: Any) -> None:
-        super().__init__(("appeared", PLANT_TOKEN, b"", monotonic()))
-        self.opened.append(self)
-        self.closed = 0
-        self._ask("open")
-
-    def _ask(self, where: str) -> None:
-        if self.asked == f"{len(self.opened)} {where}":
-            type(self).asked = ""
-            raise StoppedError("SIGTERM")
-
-    def subscribe(self, key: str) -> None:
-        """Do nothing with the key."""
-        self._ask("subscribe")
-
-    def take(self, needed: int, timeout: float | None) -> list[Stamped]:
-        """Return the next event, or the next measurement."""
-        if self._events:
-            return super().take(needed, timeout)
-        if self is not self.opened[0]:
-            self._ask("take")
-        Event().wait(timeout)
-        k = next(self.numbers)
-        said = Measurement(
-            sender="plant", epoch=1, seq=k, t=k * 0.02, to="inv1", P=50e3, Q=0.0, V=277.0, f=60.0, P_set=50e3,
-            V_set=277.0, grid_connected=False, island="inv1", roster=("inv1",),
-        )  # fmt: skip
-        return [("message", KEYS.measurement("inv1"), encode(said), monotonic())]
-
-    def close(self, *, replaced: bool = False) -> None:
-        """Count it."""
-        self._ask("close")
-        self.closed += 1
-
-
-@pytest.mark.parametrize("asked", ["1 close", "2 open", "2 subscribe", "2 take"])
-def test_an_agent_that_is_asked_to_end_between_two_sessions_leaves_over_a_new_one(
-    asked: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Without one the plant took it for dead, and its inverter stayed on; no session stays open behind it."""
-    problems = iter(["the test breaks it"])
-    monkeypatch.setattr(SessionHealth, "problem", lambda *given, **named: next(problems, ""))
-    monkeypatch.setattr(agent_process, "Session", Measuring)
-    Measuring.opened, Measuring.asked, Measuring.numbers = [], asked, count()
-
-    with pytest.raises(StoppedError, match="SIGTERM"):
-        run_agents(replace(agent_config("inv1"), clock="wall"))
-
-    assert Measuring.asked == ""
-    assert [session.left for session in Measuring.opened] == [0] * (len(Measuring.opened) - 1) + [1]
-    assert all(session.closed or asked == "2 open" for session in Measuring.opened)
-
-
-def test_a_second_request_to_end_between_two_sessions_is_not_put_off(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whoever asks again does not want to wait for the plant."""
-    problems = iter(["the test breaks it"])
-    monkeypatch.setattr(SessionHealth, "problem", lambda *given, **named: next(problems, ""))
-    monkeypatch.setattr(agent_process, "Session", Measuring)
-    monkeypatch.setattr(Measuring, "_ask", _ask_in_each_but_the_first)
-    Measuring.opened, Measuring.numbers = [], count()
-
-    with pytest.raises(StoppedError, match="SIGTERM"):
-        run_agents(replace(agent_config("inv1"), clock="wall"))
-
-    assert len(Measuring.opened) == 3
-
-
-def _ask_in_each_but_the_first(session: Measuring, where: str) -> None:
-    if where == "subscribe" and len(session.opened) > 1:
-        raise StoppedError("SIGTERM")
 
 
 def test_a_session_in_place_of_a_broken_one_is_tried_again(

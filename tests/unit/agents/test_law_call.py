@@ -22,10 +22,6 @@ class UntoldError(Exception):
         raise RuntimeError("no text")
 
 
-class PanicException(BaseException):
-    """What a library written in Rust raises when it panics."""
-
-
 class Unshown:
     """An object that cannot be shown."""
 
@@ -48,7 +44,6 @@ def raises(error: BaseException) -> Any:
     (lambda: SetPoints("0.5", 1.0), r"returned P_set = '0.5'; it must be a number"),  # type: ignore[arg-type]
     (lambda: SetPoints(0.5, [1.0]), r"returned V_set = \[1.0\]; it must be a number"),  # type: ignore[arg-type]
     (lambda: SetPoints(10**400, 1.0), r"returned P_set = 10{96}...; it must be a number"),
-    (lambda: raises(PanicException("no index")), r"raised ForeignError: PanicException: no index"),
     (lambda: raises(UntoldError()), r"raised UntoldError: its text cannot be had"),
     (Unshown, r"returned a Unshown that cannot be shown; return SetPoints"),
     (lambda: (SetPoints(0.5, 1.0) for _ in "1"), r"returned <generator object .*>>; return "),

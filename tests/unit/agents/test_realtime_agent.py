@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.wire.messages import Leave, Stop
-from gridpeers.wire.plant_follower import MOST_PLANTS
+from gridpeers.wire.node import MOST_PLANTS
 from tests.toy.toy_configs import agent_config
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 

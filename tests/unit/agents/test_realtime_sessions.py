@@ -2,8 +2,7 @@ from __future__ import annotations
 
 import pytest
 
-from gridpeers.agents.realtime_agent import FOUND_AGAIN
-from gridpeers.wire.messages import Leave, State, Stop, Waiting
+from gridpeers.wire.messages import State, Waiting
 from tests.unit.agents.realtime_lab import KEYS, T_C, Lab, running
 
 
@@ -191,33 +190,3 @@ def test_a_plant_that_has_appeared_has_time_to_speak() -> None:
         lab.go(0.5)
 
     assert not lab.side.finished
-
-
-def test_an_agent_that_is_asked_to_leave_between_sessions_leaves_once_it_is_measured_again() -> None:
-    """Before that the plant does not know its new session, and would not be told."""
-    lab = running("inv2")
-    lab.side.leave_over_new_session("asked to leave: SIGTERM")
-    assert lab.side.session_broken
-    lab.side.start(lab.now)
-    lab.token("plant")
-    lab.go(0.5)
-    assert lab.side.between_sessions
-    assert not any(isinstance(message, Leave) for message in lab.published)
-
-    lab.measure(1)
-    lab.go(T_C)
-    assert isinstance(lab.published[-1], Leave)
-    lab.hear(KEYS.stop_request("inv1", "me"), Stop(sender="plant", epoch=1, seq=0, t=0.0, reason="inv1 has left"))
-    assert lab.side.stopped == "asked to leave: SIGTERM"
-
-
-def test_an_agent_that_finds_no_plant_over_its_new_session_ends_all_the_same() -> None:
-    """A path that stays cut must not keep whoever ends it waiting."""
-    lab = running("inv2")
-    lab.side.leave_over_new_session("asked to leave: SIGTERM")
-    lab.side.start(lab.now)
-    lab.go(FOUND_AGAIN - 0.1)
-    assert not lab.side.finished
-
-    lab.go(0.1)
-    assert lab.side.stopped == "asked to leave: SIGTERM"

@@ -23,8 +23,6 @@ import asyncio, functools, socket, uvicorn
 uvicorn.Config = functools.partial(uvicorn.Config, ws_ping_interval=0.1, ws_ping_timeout=0.1)
 from gridpeers.viewer.page_server import PageOptions, PageServer, send, texts
 class Pages:
-    def begin(self): pass
-    def end(self): pass
     def close(self): pass
     def talk(self, page):
         async def talk():

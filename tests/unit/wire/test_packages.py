@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.wire.packages import not_importable
+from gridpeers.wire.wording import not_importable
 
 
 def error_of(folder: Path, statement: str) -> ImportError:

@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from gridpeers.scenarios.record.journal_reader import entries_of
-from gridpeers.wire.backlog import TOKENS, Loss
 from gridpeers.wire.bounds import LONGEST_MESSAGE
 from gridpeers.wire.codec import encode
 from gridpeers.wire.journal import (
     AT_ONCE,
     COUNTED_KEYS,
     LOT,
+    NOTED_REJECTED,
     Entry,
     Exchange,
     JournalBuffer,
@@ -27,15 +27,8 @@ from gridpeers.wire.journal import (
 )
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import Leave, Measurement, State
-from gridpeers.wire.node import Node
-from gridpeers.wire.traffic import (
-    REJECTED,
-    REJECTED_INTERVAL,
-    REJECTED_OF_TICK,
-    SHOWN_PAYLOAD,
-    TickTraffic,
-    TimedTraffic,
-)
+from gridpeers.wire.node import TOKENS, Loss, Node
+from gridpeers.wire.traffic import SHOWN_PAYLOAD, TickTraffic, TimedTraffic
 
 KEYS = Keys("toy")
 STATE = encode(State(sender="inv2", epoch=3, seq=5, t=0.1, P_set=5e4, V_set=277.0, Q=0.0))
@@ -203,36 +196,17 @@ def test_in_one_process_a_tick_has_the_values_of_its_messages(count: int) -> Non
 
 
 def test_a_flood_of_rejected_messages_does_not_fill_the_journal() -> None:
-    """In real time some are noted with their bytes, then one now and then, with the number of those left out."""
-    traffic, journal = timed()
-    for i in range(10_000):
-        traffic.received(KEYS.state("inv2"), NOISE, 10.0 + 1e-4 * i, "garbled")
-        traffic.received(KEYS.state("inv2"), STATE, 10.0 + 1e-4 * i, "")
-    entries = noted(journal)
-    kept = [entry for entry in entries if isinstance(entry, ReceivedMessage)]
-
-    assert REJECTED <= len(kept) <= REJECTED + 1.0 / REJECTED_INTERVAL + 1
-    assert sum(isinstance(entry, MessageReference) for entry in entries) == 10_000
-    (count,) = [entry for entry in entries if isinstance(entry, RejectedCount)]
-    assert (count.key, count.kind, len(kept) + count.count) == ("state/inv2", "garbled", 10_000)
-    assert count.at is not None
-    assert 10.0 < count.at <= 11.0
-
-
-def test_a_flood_of_rejected_messages_in_simulated_time_is_noted_tick_by_tick() -> None:
-    """Of each tick the first ones, and the number of the others."""
+    """The first since the journal was taken are noted with their bytes, the number of the others by key and kind."""
     journal = JournalBuffer()
-    traffic = TickTraffic(KEYS, ("inv2",), journal)
-    for tick in range(2):
-        for _ in range(1_000):
-            traffic.received(KEYS.state("inv2"), NOISE, 0.0, "garbled")
-        traffic.ticked(tick)
-    entries = noted(journal)
+    for traffic, at in ((TimedTraffic(KEYS, journal), 10.0), (TickTraffic(KEYS, ("inv2",), journal), None)):
+        for _ in range(2):
+            for _ in range(1_000):
+                traffic.received(KEYS.state("inv2"), NOISE, 10.0, "garbled")
+                traffic.received(KEYS.ready("inv2"), STATE, 10.0, "")
+            entries = noted(journal)
 
-    assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 2 * REJECTED_OF_TICK
-    assert [entry for entry in entries if isinstance(entry, RejectedCount)] == [
-        RejectedCount(None, "state/inv2", "garbled", 2 * (1_000 - REJECTED_OF_TICK))
-    ]
+            assert sum(isinstance(entry, ReceivedMessage) for entry in entries) == 1_000 + NOTED_REJECTED
+            assert entries[-1] == RejectedCount(at, "state/inv2", "garbled", 1_000 - NOTED_REJECTED)
 
 
 def test_messages_that_were_dropped_unread_are_noted_by_their_number() -> None:

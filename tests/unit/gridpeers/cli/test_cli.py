@@ -148,7 +148,8 @@ def test_a_run_fills_its_folder_from_which_it_can_be_repeated(elsewhere: Path) -
     """
     (elsewhere / "short.toml").write_text(SHORT)
 
-    code, text = invoke("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--out", "here")
+    command = ("run", "short.toml", "--driver", "inprocess", "--seed", "7", "--out", "here")
+    code, text = invoke(*command, figures=True)
 
     assert code == 0, text
     assert "Results: here/" in text

@@ -5,9 +5,7 @@ from typing import Any
 import pytest
 import typer
 
-from gridpeers.cli.contributed import COMMANDS
-from gridpeers.cli.own_commands import OWN_COMMANDS
-from gridpeers.cli.root import app
+from gridpeers.cli.root import COMMANDS, OWN_COMMANDS, app
 from tests.command_line import invoke
 
 

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from gridpeers.agents.laws.law import Term
-from gridpeers.lab.explanation import trail as module
+from gridpeers.lab.explanation import explanation as module
+from gridpeers.lab.explanation.explanation import TrailStep, trail
 from gridpeers.lab.explanation.law_step import LawStep, QuantityStep
-from gridpeers.lab.explanation.trail import TrailStep, trail
 from gridpeers.scenarios.record.record_reader import RecordFileError, RunRecord
 from gridpeers.scenarios.record.recorded_decision import RecordedDecision
 from tests.toy.toy_configs import agent_config

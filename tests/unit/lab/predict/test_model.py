@@ -10,9 +10,8 @@ import pytest
 
 from gridpeers.agents.agent_config import Gains
 from gridpeers.agents.laws.consensus import P_set_step
-from gridpeers.lab.predict.delay_limits import delay_limit, first_crossing
 from gridpeers.lab.predict.inverter_group import InverterGroup
-from gridpeers.lab.predict.linear_model import Loop, Ticks
+from gridpeers.lab.predict.linear_model import Loop, Ticks, delay_limit, first_crossing
 from gridpeers.scenarios.results.history import Floats
 from tests.unit.lab.predict.predicted_graphs import GRAPHS, inverters
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import gridpeers as gp
-from gridpeers.lab.predict.delay_limits import delay_limit
+from gridpeers.lab.predict.linear_model import delay_limit
 from gridpeers.lab.predict.load_steps import load_steps
 from gridpeers.lab.predict.times import LoadStep, predicted_times
 from gridpeers.lab.predict.var_response import VarResponse, var_delay_limit, var_response

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gridpeers as gp
-from gridpeers.lab.predict.robustness_notes import robustness_notes
+from gridpeers.lab.predict.robustness import robustness_notes
 
 
 def notes(law: dict[str, object], graph: str) -> list[str]:

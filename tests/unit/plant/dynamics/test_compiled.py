@@ -74,16 +74,6 @@ def test_another_process_loads_the_step_and_compiles_nothing() -> None:
     assert done.stdout == "1 0\n"
 
 
-def test_a_damaged_file_is_compiled_anew(folder: Path) -> None:
-    """Half a file, as after a power cut, is no machine code."""
-    filled()
-    for file in folder.iterdir():
-        file.write_bytes(file.read_bytes()[:30])
-
-    assert filled() == ([3.0, 3.0], 0)
-    assert filled() == ([3.0, 3.0], 1)
-
-
 def test_code_for_other_types_is_not_taken(folder: Path) -> None:
     """Two processes that compile a function for two types at a time may give both the same file."""
     filled()
@@ -137,52 +127,17 @@ def refuse(*_: object) -> None:
     raise PermissionError
 
 
-def test_machine_code_beside_the_sources_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A packager may put it there."""
-    monkeypatch.setattr(compiled, "_HERE", tmp_path)
-    kept = compiled.kernel_folder()
-    assert kept is not None
-    beside = tmp_path / "__pycache__" / kept.name
-    beside.mkdir(parents=True)
-
-    assert compiled.kernel_folder() == beside
-
-
-@pytest.mark.parametrize(
-    ("system", "environment", "expected"),
-    [
-        ("linux", {"XDG_CACHE_HOME": "/cache", "HOME": "/home/me"}, "/cache/gridpeers"),
-        ("linux", {"XDG_CACHE_HOME": "", "HOME": "/home/me"}, "/home/me/.cache/gridpeers"),
-        ("darwin", {"HOME": "/Users/me"}, "/Users/me/Library/Caches/gridpeers"),
-        ("linux", {"HOME": "me"}, None),
-        ("linux", {"XDG_CACHE_HOME": "cache", "HOME": "/home/me"}, None),
-    ],
-)
-def test_compiled_kernels_go_into_the_users_cache(
-    system: str, environment: dict[str, str], expected: str | None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Each system has its own place for it; a relative path would be another folder in each working directory."""
-    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "HOME"):
-        monkeypatch.delenv(name, raising=False)
-    for name, value in environment.items():
-        monkeypatch.setenv(name, value)
-    monkeypatch.setattr(compiled.sys, "platform", system)
-
-    kept = compiled.kernel_folder()
-
-    assert (kept and str(kept.parent)) == expected
-
-
 def test_a_user_without_a_home_has_no_cache_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     """A user id that the system does not know, as containers have: nothing is kept."""
 
     def unknown() -> Path:
         raise RuntimeError("Could not determine home directory.")
 
-    monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(Path, "home", unknown)
 
-    assert compiled.user_cache() is None
+    assert compiled.kernel_folder() is None
 
 
 def test_only_a_plant_that_takes_steps_compiles_the_step(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,14 +1,18 @@
-"""The islands of a large network, advanced in parts on several threads."""
+"""The islands of a large network, advanced in parts on several threads; one thread for linear algebra."""
 
 from __future__ import annotations
+
+from threading import Event, Thread
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from gridpeers.plant.dynamics import Circuit, Dynamics, island_parts, reduction, threads
 from gridpeers.plant.dynamics.circuit import LoadLaw
-from gridpeers.plant.dynamics.kernel.network_arrays import Real
+from gridpeers.plant.dynamics.kernel.compiled import Real
+from gridpeers.plant.dynamics.threads import one_thread
 from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, GFM_D, S_B, V_B, Z_B, inverter
 
 ISLANDS = 5
@@ -113,3 +117,28 @@ def test_an_error_on_another_core_is_raised_here(monkeypatch: pytest.MonkeyPatch
     with pytest.raises(ZeroDivisionError):
         threads.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])
     assert threads.each_on_a_core(lambda x: 6 // x, [3, 2, 1]) == [2, 3, 6]
+
+
+def _threads() -> set[int]:
+    return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
+
+
+def test_a_thread_that_is_through_does_not_lift_the_limit_under_another() -> None:
+    """Runs in several threads of a notebook give the bytes that each gives alone; the last lifts the limit."""
+    inside, leave = Event(), Event()
+
+    def first() -> None:
+        with one_thread():
+            inside.set()
+            leave.wait(100.0)
+
+    with threadpool_limits(2, user_api="blas"):
+        before = _threads()
+        thread = Thread(target=first)
+        thread.start()
+        assert inside.wait(100.0)
+        with one_thread():
+            leave.set()
+            thread.join()
+            assert _threads() == {1}
+        assert _threads() == before

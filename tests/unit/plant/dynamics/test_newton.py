@@ -1,19 +1,27 @@
-"""The solution of one island's load branches, against closed forms and the plain power flow."""
+"""Islands near their largest load: Newton's method, current limits, and islands that do not settle."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 from msgspec.structs import replace
 
+from gridpeers.plant.dynamics import Circuit, Dynamics, PlantError, reduction
 from gridpeers.plant.dynamics.circuit import LoadLaw
 from gridpeers.plant.dynamics.island_newton import DenseIsland, solve_island
-from gridpeers.plant.dynamics.kernel.network_arrays import Complex
+from gridpeers.plant.dynamics.kernel.compiled import Complex
+from gridpeers.plant.dynamics.live_network import unsettled_island
 from gridpeers.plant.dynamics.reduction import DenseReduction, SparseIsland, SparseReduction
+from gridpeers.plant.equipment.inverter_parameters import GfmParameters
+from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.plant_config import PlantSettings, Protection, SwitchEvent
 from gridpeers.plant.tables import read_feeder
+from tests.unit.plant.dynamics.circuits import BALANCED, GFM_D, S_B, V_B, Z_B, circuit, inverter, loaded, lone
 
 X, E = 0.5, 240.0
 
@@ -81,3 +89,134 @@ def test_the_feeder_has_the_voltages_of_the_plain_power_flow(
         V_b, failed = state.solve_islands(J, circuit.source_voltage, factor * circuit.V_branch)
         assert failed == ()
         np.testing.assert_allclose(V_b, circuit.C.T @ want, rtol=1e-7)
+
+
+ISLANDS = 3
+
+
+def lone_islands(I_max: float) -> Dynamics:
+    """Three GFM, each alone with constant power of 0.3 pu, at rest."""
+    n = 3 * ISLANDS
+    circuit = Circuit(
+        Y=sp.csc_array(0.01 * np.eye(n) / Z_B),
+        sources=np.arange(0),
+        source_voltage=np.zeros(0, complex),
+        terminals=np.arange(n).reshape(ISLANDS, 3),
+        C=sp.csc_array(np.eye(n)),
+        loads=LoadLaw(S=np.full(n, 0.3 * S_B / 3.0 + 0j), I0=np.zeros(n, complex)),
+        V_branch=V_B * np.tile(BALANCED, ISLANDS),
+    )
+    dynamics = Dynamics(circuit, (inverter(replace(GFM_D, I_max=I_max)),) * ISLANDS, 0.002)
+    dynamics.start(np.full(ISLANDS, 0.3), np.zeros(ISLANDS))
+    dynamics.run(5)
+    return dynamics
+
+
+@pytest.mark.parametrize("most_dense", [0, 1000], ids=["sparse", "dense"])
+@pytest.mark.parametrize("island", range(ISLANDS))
+@pytest.mark.parametrize(("load", "I_max"), [(8.0, 1000.0), (2.0, 1.2)], ids=["collapse", "limit"])
+def test_the_island_with_more_load_than_it_can_carry_is_found(
+    monkeypatch: pytest.MonkeyPatch, most_dense: int, island: int, load: float, I_max: float
+) -> None:
+    """Among three live islands it is the one whose load has no solution, by its voltages or by its current limit."""
+    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
+    dynamics = lone_islands(I_max)
+    net, here = dynamics.network.net, dynamics.network.net.branch_island == island
+    assert here.any()
+    net.S[here] *= load / 0.3
+
+    assert unsettled_island(net, dynamics.arrays(), dynamics.network.x, 1e-11 * V_B) == island
+
+
+I_B = S_B / (3.0 * V_B)
+
+
+def test_an_overloaded_phase_carries_no_more_than_its_limit_and_the_others_what_they_need() -> None:
+    """With a load of 3 pu on phase A, |I_A| stays below I_max and V_A is what that gives; B and C stay as they are."""
+    dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
+    dynamics.connect(circuit(np.diag([3.0, 0.5, 0.5]).astype(complex) / Z_B, [[0, 1, 2]]))
+
+    out = dynamics.run(1)
+    current, V = np.abs(dynamics.inverters.I[0]) / I_B, np.abs(dynamics.inverters.V[0]) / V_B
+
+    assert 0.5 < current[0] <= 1.2 + 1e-9
+    assert V[0] == pytest.approx(current[0] / 3.0, abs=1e-9)
+    assert current[1:] == pytest.approx([0.5, 0.5], abs=0.01)
+    assert out[0, 0, 6] == 1.0
+
+
+def test_the_controller_goes_on_unlimited_once_the_overload_ends() -> None:
+    """The limit leaves no trace in the injection: without overload the next step has full voltage again."""
+    dynamics = lone(replace(GFM_D, I_max=1.2), 0.5)
+    dynamics.connect(loaded(3.0))
+    dynamics.run(1)
+    dynamics.connect(loaded(0.5))
+
+    out = dynamics.run(1)
+
+    assert out[0, 0, 6] == 0.0
+    assert out[0, 0, 3] / V_B > 0.9
+
+
+def unequal(*P: float) -> Circuit:
+    """One terminal and, behind lines, constant power (pu) on each phase, which gives way below 0.7 pu."""
+    y, one = 20.0 / Z_B, np.eye(3)
+    rows = [(part * S_B / 3.0, 0.45 * part * S_B / 3.0, V_B, 0, 0, 0.5 * V_B, 0.7 * V_B, 0, 0, 0, 0) for part in P]
+    loads = LoadLaw(S=np.zeros(3, complex), I0=np.zeros(3, complex), limited_at=np.arange(3), law=np.array(rows, float))
+    behind = sp.csc_array(np.vstack([0.0 * one, one]))
+    lines = circuit(np.kron([[y, -y], [-y, y]], one).astype(complex), [[0, 1, 2]])
+    return dataclasses.replace(lines, C=behind, loads=loads, V_branch=V_B * BALANCED)
+
+
+def test_an_island_whose_limited_currents_settle_is_not_de_energised() -> None:
+    """Two phases that fall to where loads give way hold their limit there, however far the tangent is from it."""
+    dynamics = Dynamics(unequal(0.3, 0.8, 0.9), (inverter(replace(GFM_D, I_max=1.5)),), 0.002)
+    dynamics.start(np.array([0.6]), np.zeros(1))
+    dynamics.connect(unequal(0.3, 1.2, 1.6))
+
+    dynamics.run(20)
+    current, V = np.abs(dynamics.inverters.I[0]) / I_B, np.abs(dynamics.inverters.V[0]) / V_B
+
+    assert dynamics.take_trips() == []
+    assert current[1:] == pytest.approx([1.5, 1.5], abs=0.01)
+    assert V[0] > 1.0
+    assert (V[1:] < 0.75).all()
+
+
+def test_a_limit_that_does_not_act_changes_no_number() -> None:
+    """The same bytes with 2 pu and with 1000 pu, through an islanding in which phases reach 1.9 pu."""
+
+    def rows(I_max: float) -> tuple[tuple[float, ...], ...]:
+        return islanded(I_max).take_rows()
+
+    assert rows(2.0) == rows(1000.0)
+
+
+def islanded(I_max: float) -> Plant:
+    """Microgrid123 0.1 s after islanding."""
+    settings = PlantSettings(
+        gfm=GfmParameters(I_max=I_max),
+        protection=Protection(category="off"),
+        events=(SwitchEvent(t=0.02, switch="13-152", action="open"),),
+    )
+    plant = Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.002)
+    for _ in range(6):
+        plant.advance()
+    return plant
+
+
+def test_limiting_is_an_event_once_a_spell() -> None:
+    """An inverter that limits in many steps says so once, with its limit."""
+    events = [event for event in islanded(1.7).take_events() if event.kind == "limit"]
+
+    assert events
+    assert len({event.subject for event in events}) == len(events)
+    assert events[0].text == f"{events[0].subject} limits its phase currents to 1.7 pu"
+
+
+def test_a_start_beyond_the_limit_is_refused() -> None:
+    """At rest no phase may be beyond its limit; the error says the currents and what to change."""
+    settings = PlantSettings(gfm=GfmParameters(I_max=0.6))
+
+    with pytest.raises(PlantError, match=r"inv1 would have to carry \d+(\.\d+)? A in a phase, .*I_max_pu"):
+        Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

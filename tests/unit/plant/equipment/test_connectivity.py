@@ -1,12 +1,22 @@
-"""Connected parts of a feeder, from its tables alone."""
+"""Feeders as equipment: what is connected, copies, and loads by name."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from gridpeers.feeder import Feeder
+from gridpeers.plant.equipment import Load
 from gridpeers.plant.equipment.connectivity import Connectivity
+from gridpeers.plant.equipment.derived_feeders import joined_copies
+from gridpeers.plant.equipment.imported_equipment import LoadPart
+from gridpeers.plant.equipment.named_loads import load_name, named_loads, with_powers
+from gridpeers.plant.network import Network, solve_power_flow
 from gridpeers.plant.tables import read_feeder
+from tests.unit.plant.networks import feeder, three_phase_bus
 
 
 @pytest.mark.parametrize("turned", [False, True])
@@ -36,3 +46,156 @@ def test_a_single_phase_inverter_feeds_its_own_phase_alone() -> None:
     assert {phase for part in fed for _, phase in part} == {"C"}
     assert ("160", "A") in frozenset().union(*dead)
     assert {phase for part in whole for _, phase in part} == {"A", "B", "C"}
+
+
+def test_the_tables_are_the_import_of_the_published_feeder_with_our_modifications() -> None:
+    """The tables are the engine's present reading of the script, to rounding."""
+    pytest.importorskip("dss", reason="the OpenDSS engine is not installed")
+    from tests.feeders.ieee34_microgrids import ieee34_microgrids
+
+    made, kept = ieee34_microgrids(), read_feeder("ieee34")
+
+    assert [element.nodes for element in made.elements] == [element.nodes for element in kept.elements]
+    for one, other in zip(made.elements, kept.elements, strict=True):
+        np.testing.assert_allclose(other.Y, one.Y, rtol=1e-9, atol=1e-12, err_msg=one.name)
+    assert kept.switches == made.switches
+    assert [replace(row, V_nom=0.0) for row in kept.inverters] == [replace(row, V_nom=0.0) for row in made.inverters]
+    assert [(part.name, part.bus, part.ends, part.exponents) for part in kept.load_parts] == [
+        (part.name, part.bus, part.ends, part.exponents) for part in made.load_parts
+    ]
+    assert sum(part.S for part in kept.load_parts) == pytest.approx(1769e3 + 1044e3j)
+    assert {bus.zone for bus in kept.buses} == {"rest", "MG1", "MG2", "MG3"}
+
+
+def test_copies_have_the_voltages_of_the_one(tmp_path: Path) -> None:
+    """With the ties open each copy is the feeder, but for the charging of the tie that hangs on the later ones."""
+    one = Feeder.read("microgrid123")
+    three = Feeder.read(joined_copies(one, 3, "450").save(tmp_path / "three"))
+    network, joined = Network(one), Network(three)
+    V = solve_power_flow(network, network.closed0, tolerance=1e-12).V
+    apart = joined.closed0 - {joined.switch_name(name) for name in ("tie_2", "tie_3")}
+    W = dict(zip(joined.nodes, solve_power_flow(joined, apart, tolerance=1e-12).V, strict=True))
+
+    for k, rtol in (("", 1e-12), ("_2", 3e-6), ("_3", 3e-6)):
+        np.testing.assert_allclose([W[bus + k, phase] for bus, phase in network.nodes], V, rtol=rtol)
+    assert len(three.inverters) == 27
+
+
+def test_copies_that_lose_the_substation_stay_joined() -> None:
+    """Opening the switch of every copy leaves one network with all inverters."""
+    three = joined_copies(Feeder.read("microgrid123"), 3, "450")
+    graph = Connectivity(three)
+    opened = {"13-152", "13_2-152_2", "13_3-152_3"}
+    parts = graph.parts(graph.closed_at_start() - opened)
+
+    (island,) = {part for part in parts if any(bus == "450" for bus, _ in part)}
+    assert {row.bus for row in three.inverters} <= {bus for bus, _ in island}
+    assert "150" not in {bus for bus, _ in island}
+
+
+def test_imported_feeders_can_be_copied(tmp_path: Path) -> None:
+    """Elements by their admittance are copied as lines are."""
+    pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+    one = Feeder.from_opendss(Path(__file__).parents[3] / "feeders" / "ieee13.dss")
+    two = Feeder.read(joined_copies(one, 2, "671").save(tmp_path / "two"))
+
+    assert len(two.solve()) == 2 * len(one.solve()) + 3
+
+
+def test_copies_keep_the_phases_of_their_inverters() -> None:
+    """A single-phase inverter stands on the same phase in every copy."""
+    one = Feeder.read("microgrid123").add_inverter("roof", "96", "GFL", 5e4, phases="B")
+    two = joined_copies(one, 2, "450")
+
+    assert [(row.name, row.bus, row.phases) for row in two.inverters if row.name.startswith("roof")] == [
+        ("roof", "96", "B"),
+        ("roof_2", "96_2", "B"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("copies", "joint", "text"),
+    [
+        (0, "450", "from 1 to 111, .*got 0"),
+        (112, "450", "at most 1000 inverters"),
+        (2, "nope", "needs a bus"),
+        (2, "32", "A, B"),
+    ],
+)
+def test_what_cannot_be_joined_is_told(copies: int, joint: str, text: str) -> None:
+    """Numbers below one and buses without three phases."""
+    with pytest.raises(ValueError, match=text):
+        joined_copies(Feeder.read("microgrid123"), copies, joint)
+
+
+def part(name: str, bus: str, S: complex) -> LoadPart:
+    """A part of an imported load, of constant power."""
+    return LoadPart(name=name, bus=bus, ends=("A", ""), S=S, V_nom=2400.0, exponents=(0.0, 0.0))
+
+
+def load(bus: str, *S: complex, model: str = "P") -> Load:
+    """A wye load of our own tables."""
+    return Load(bus=bus, connection="Y", model=model, S=(S[0], S[1], S[2]))  # type: ignore[arg-type]
+
+
+BUSES = (three_phase_bus("1"), three_phase_bus("2"))
+
+
+def test_rows_of_one_bus_and_parts_of_one_load_are_one_load() -> None:
+    """A bus stands for its load, unless an imported feeder has several there."""
+    tables = feeder(
+        buses=BUSES,
+        loads=(load("1", 1e3, 2e3, 0), load("1", 0, 0, 4e3 + 1e3j, model="Z")),
+        load_parts=(part("mill", "2", 5e3), part("mill", "2", 6e3), part("house", "2", 1e3)),
+    )
+    loads = named_loads(tables)
+
+    assert {name: (one.bus, one.S) for name, one in loads.items()} == {
+        "1": ("1", 7e3 + 1e3j),
+        "mill": ("2", 11e3),
+        "house": ("2", 1e3),
+    }
+    assert load_name(loads, "mill") == "mill"
+    with pytest.raises(ValueError, match='load "2": bus 2 has 2 loads: mill, house; name one of them'):
+        load_name(loads, "2")
+    with pytest.raises(ValueError, match='load "hous": no such load; did you mean "house"'):
+        load_name(loads, "hous")
+    alone = named_loads(replace(tables, load_parts=tables.load_parts[:2]))
+    assert load_name(alone, "2") == "mill"
+
+
+def test_a_load_is_named_with_or_without_the_class_that_opendss_puts_before_it() -> None:
+    """In an imported feeder as in our own tables; a name that is another load's bus too is refused with both."""
+    loads = named_loads(feeder(buses=BUSES, loads=(load("1", 1e3, 0, 0),), load_parts=(part("load.mill", "2", 5e3),)))
+    texts = ("mill", "load.mill", "Load.mill", "2", "1", "load.1")
+
+    assert [load_name(loads, text) for text in texts] == ["load.mill"] * 4 + ["1"] * 2
+    crossed = named_loads(feeder(buses=BUSES, load_parts=(part("load.1", "2", 5e3), part("load.house", "1", 1e3))))
+    assert load_name(crossed, "load.1") == "load.1"
+    with pytest.raises(ValueError, match=r'load "1": it has this name, or this bus: load\.1, load\.house; name one'):
+        load_name(crossed, "1")
+
+
+def test_branches_keep_their_shares() -> None:
+    """Real and reactive power are scaled each; what had none goes by size; all other loads stay the same objects."""
+    tables = feeder(buses=BUSES, loads=(load("1", 3e3 + 2e3j, 1e3, 0), load("1", 0, 0, 4e3), load("2", 1e3, 0, 0)))
+
+    first, second, other = with_powers(tables, {"1": 4e3 + 1e3j}).loads
+
+    assert (pytest.approx(1.5e3 + 1e3j), pytest.approx(0.5e3), 0) == first.S
+    assert (0, 0, pytest.approx(2e3)) == second.S
+    assert other is tables.loads[2]
+
+    resistive = feeder(buses=BUSES, loads=(load("2", 1e3, 3e3, 0),))
+    assert (
+        pytest.approx(0.125e3j),
+        pytest.approx(0.375e3j),
+        0,
+    ) == with_powers(resistive, {"2": 0.5e3j}).loads[0].S
+
+
+def test_branches_that_cancel_are_not_blown_up() -> None:
+    """A generator and a load of one name whose sum is nearly nothing: the difference is shared by size."""
+    tables = feeder(buses=BUSES, load_parts=(part("both", "1", 3e3), part("both", "1", -3e3)))
+
+    assert [one.S for one in with_powers(tables, {"both": 1e3 + 0j}).load_parts] == [3.5e3, -2.5e3]

@@ -1,10 +1,24 @@
-import numpy as np
+"""Islands of a feeder: their circuits, names and events, also under random switching."""
 
+from __future__ import annotations
+
+import random
+from typing import Literal
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.dynamics.reduction import DenseReduction
+from gridpeers.plant.equipment import InverterRow, Load, Regulator, Switch
+from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.circuits import Circuits
 from gridpeers.plant.feeder.islands import Islands
 from gridpeers.plant.network import Network
-from tests.unit.plant.networks import PAPER_ISLANDS, opened
+from gridpeers.plant.plant_config import Method, PlantSettings, Protection, SwitchEvent
+from gridpeers.plant.tables import read_feeder
+from tests.unit.plant.networks import PAPER_ISLANDS, feeder, opened, three_phase_bus
 
 
 def reduced(network: Network, closed: frozenset[str], *, off: tuple[str, ...] = ()) -> DenseReduction:
@@ -67,3 +81,130 @@ def test_an_island_without_gfm_is_dead_and_told_once(network: Network) -> None:
     assert event.text.startswith("de-energised: ")
     assert "without substation or GFM, 985 kW of load not served, inv4, inv5, inv6 idle" in event.text
     assert last == first
+
+
+T_C, H, END = 0.02, 0.002, 5.0
+SWITCHES = ("13-152", "60-160", "sw1_2", "sw2_3")
+BAND = {"off": (25.0, 95.0), "III": (54.0, 63.0)}
+"""Frequencies (Hz) of who delivers. Without protection a GFM can have 60 and the bound of its limiters, 200 rad/s, and
+a bit for the droop; with it, what lies 0.16 s beyond 56.5 and 62 Hz."""
+
+NO_SOLUTION = ("overload", "out of phase", "voltage collapse")
+PROTECTION = ("voltage", "frequency")
+
+
+def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
+    """Six to twelve switchings; the first islands the feeder, else nothing much happens."""
+    first = SwitchEvent(t=0.1, switch="13-152", action="open")
+    rest = [
+        SwitchEvent(
+            t=round(draw.randrange(round(0.2 / H), round(END / H)) * H, 9),
+            switch=draw.choice(SWITCHES),
+            action=draw.choice(("open", "close")),
+            synchronised=draw.random() < 0.2,
+        )
+        for _ in range(draw.randint(5, 11))
+    ]
+    return first, *sorted(rest, key=lambda event: event.t)
+
+
+@pytest.mark.parametrize(
+    ("category", "seed", "method"),
+    [
+        *(("off", i, "first-order") for i in range(20)),
+        *(("III", i, "first-order") for i in range(10)),
+        *((category, i, "second-order") for i in range(2) for category in ("off", "III")),
+    ],
+)
+def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
+    """Every row is finite; who delivers has a frequency within bounds, who does not has no power; trips are told."""
+    draw = random.Random(f"switchings {seed}")
+    factor = draw.uniform(0.8, 2.0)
+    feeder = read_feeder("microgrid123")
+    loads = tuple(replace(load, S=tuple(factor * S for S in load.S)) for load in feeder.loads)
+    settings = PlantSettings(events=schedule(draw), h=H, method=method, protection=Protection(category=category))
+    plant = Plant(Network(replace(feeder, loads=loads)), settings, T_C, T_C)
+    low, high = BAND[category]
+    causes = NO_SOLUTION if category == "off" else (*NO_SOLUTION, *PROTECTION)
+
+    events, off = [], set[str]()
+    for _ in range(round(END / T_C)):
+        plant.advance()
+        new = plant.take_events()
+        events += new
+        off.update(
+            name for event in new if event.kind in ("trip", "dead") for name in plant.inverters if name in event.text
+        )
+        for name, reading in plant.measure().items():
+            assert np.isfinite([reading.P, reading.Q, reading.V, reading.f]).all()
+            if reading.P or reading.Q:
+                assert low < reading.f < high
+            else:
+                assert name in off
+
+    assert np.isfinite(np.array(plant.take_rows())).all()
+    for trip in (event for event in events if event.kind == "trip"):
+        assert any(cause in trip.text for cause in causes)
+
+
+def inverter(name: str, bus: str) -> InverterRow:
+    """A GFM at a bus."""
+    return InverterRow(name=name, kind="GFM", bus=bus, microgrid="MG1", P_rated=600e3, V_nom=2400.0, m_p=0.01, m_q=0.05)
+
+
+def test_branches_see_the_voltages_of_their_loads() -> None:
+    """The incidence gives every load branch the voltage across its load, behind a regulator too."""
+    S = (30e3 + 10e3j, 20e3 + 5e3j, 0j)
+    network = Network(
+        feeder(
+            buses=(three_phase_bus("1"), three_phase_bus("2")),
+            regulators=(Regulator(name="r", from_bus="1", to_bus="2", phases="AB", ratio=1.05),),
+            loads=(
+                Load(bus="1", connection="Y", model="P", S=S),
+                Load(bus="2", connection="Y", model="I", S=S),
+                Load(bus="2", connection="D", model="P", S=S),
+            ),
+        )
+    )
+    circuit, merge = Circuits(network).of(frozenset()), network.merge(frozenset())
+    V = network.nominal * np.linspace(0.9, 1.1, len(network.nodes))
+
+    across = circuit.C.T @ V
+
+    at_1, at_2 = merge.expand(V)[:3], merge.expand(V)[3:]
+    np.testing.assert_allclose(across, [at_1[0], at_1[1], at_2[0], at_2[1], at_2[0] - at_2[1], at_2[1] - at_2[2]])
+    assert abs(at_2[0] / at_1[0]) == pytest.approx(1.05)
+    np.testing.assert_allclose(np.abs(circuit.V_branch), 2400.0 * np.array([1, 1, 1, 1, 3**0.5, 3**0.5]))
+
+
+def test_terminals_are_where_the_inverters_stand(network: Network) -> None:
+    """Terminals come in the inverters' order, phases A, B, C, whatever is merged with them."""
+    circuit = Circuits(network).of(network.closed0)
+
+    assert [[network.nodes[i] for i in row] for row in circuit.terminals] == [
+        [(unit.bus, phase) for phase in "ABC"] for unit in network.inverters
+    ]
+
+
+def test_a_switch_state_has_one_circuit(network: Network) -> None:
+    """Coming back to a switch state gives the very circuit it had, so its factors are found again."""
+    circuits = Circuits(network)
+    first = circuits.of(network.closed0)
+
+    assert circuits.of(opened(network, *PAPER_ISLANDS)) is not first
+    assert circuits.of(frozenset(set(network.closed0))) is first
+
+
+def test_inverters_tied_without_impedance_are_refused() -> None:
+    """A closed switch between two inverters leaves their sharing undecided, and the error names both."""
+    network = Network(
+        feeder(
+            buses=(three_phase_bus("1"), three_phase_bus("2")),
+            switches=(Switch(name="1-2", alias="", from_bus="1", to_bus="2", phases="ABC", closed=True),),
+            inverters=(inverter("inv1", "1"), inverter("inv2", "2")),
+        )
+    )
+
+    with pytest.raises(PlantError, match="inv2 at bus 2 is tied to inv1 by closed switches"):
+        Circuits(network).of(network.closed0)
+    assert len(Circuits(network).of(frozenset()).terminals) == 2

@@ -11,7 +11,7 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import live_network
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.live_network import OTHERS
+from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.equipment.named_loads import named_loads, set_power, with_powers
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.switchboard import LoadBoard
@@ -257,8 +257,8 @@ def test_all_models_of_load_are_scaled(network: Network) -> None:
         np.testing.assert_allclose(drawn[1], 0.5 * drawn[0], atol=1e-9)
 
 
-def test_loads_set_by_hand_do_not_push_out_what_an_event_to_come_needs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In wall-clock time an event must not be late, so its network is factored at the start, and stays."""
+def test_the_network_of_an_event_to_come_is_factored_at_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In real time an event must not be late: its network is factored at the start, and stays if people set loads."""
     made = []
 
     def reduce_network(*arguments: Any) -> Any:
@@ -271,13 +271,13 @@ def test_loads_set_by_hand_do_not_push_out_what_an_event_to_come_needs(monkeypat
     later = replace(ISLANDED, t=2.0)
     p = plant("microgrid123", later, loads=(LoadEvent(t=1.9, load="48", setting=LoadSetting(factor=1.3)), back))
     at_start = len(made)
-    for number in range(OTHERS + 2):
+    for number in range(3):
         p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * (number + 1)))
         p.advance()
     by_hand = len(made) - at_start
     run(p, 2.1 - p.tick * T_C)
 
-    assert (at_start, by_hand) == (3, OTHERS + 2)
+    assert (at_start, by_hand) == (3, 3)
     assert len(made) == at_start + by_hand
     assert [event.t for event in p.take_events() if event.kind == "switch"] == [2.0]
 
@@ -293,5 +293,5 @@ def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory() -> None:
         gc.collect()
         return sum(type(it) is Circuit for it in gc.get_objects())
 
-    few = circuits(range(1, OTHERS + 2))
-    assert circuits(range(OTHERS + 2, 3 * OTHERS)) == few
+    few = circuits(range(1, KEPT + 2))
+    assert circuits(range(KEPT + 2, KEPT + 10)) == few

@@ -1,10 +1,27 @@
+"""Switches, loads at the limits of their law, loads that are too much, and set-points beyond their bounds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.equipment.imported_equipment import bus_behind
+from gridpeers.bridges.opendss import read_opendss
+from gridpeers.plant.dynamics import Dynamics, PlantError
+from gridpeers.plant.dynamics.kernel import gfl
+from gridpeers.plant.equipment import Feeder, InverterRow
+from gridpeers.plant.equipment.imported_equipment import LoadPart, bus_behind
+from gridpeers.plant.feeder import Plant
+from gridpeers.plant.feeder.limit_events import PAUSE, LoadLimits
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import SwitchEvent
+from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
+from gridpeers.plant.tables import read_feeder
+from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, on_stiff_bus
+from tests.unit.plant.feeder.test_feeder import opened, plant, run
+from tests.unit.plant.networks import feeder, three_phase_bus
 
 H = 0.002
 
@@ -93,3 +110,265 @@ def test_what_was_operated_is_forgotten(network: Network) -> None:
 
     assert list(board.steps) == [500]
     assert list(board.foreseen()) == [network.closed0 - {"13-152", "60-160"}]
+
+
+V_NOM = 2400.0
+
+
+def limits(exponents: tuple[float, float], edge: float = 0.0) -> LoadLimits:
+    """Return the limits of a feeder with one load of this law, 3 kW and 4 kvar, at nominal voltage."""
+    part = LoadPart(
+        name="load.l",
+        bus="b",
+        ends=("A", ""),
+        S=3e3 + 4e3j,
+        V_nom=V_NOM,
+        exponents=exponents,
+        V_low=0.5,
+        V_min=0.95,
+        V_max=1.05,
+        edge=edge,
+    )
+    network = Network(feeder(buses=(three_phase_bus("b", V_NOM),), load_parts=(part,)))
+    return LoadLimits(network, np.array([V_NOM + 0j]))
+
+
+def texts(watch: LoadLimits, *voltages: float, period: float = 1.0) -> list[str]:
+    """Return the texts of the events at these voltages (pu), one after another at this distance (s)."""
+    V = [np.array([pu * V_NOM * 1j]) for pu in voltages]
+    return [event.text for k, now in enumerate(V) for event in watch.report(k * period, now)]
+
+
+def test_both_limits_are_reported_in_both_directions() -> None:
+    """A load of model 4 takes more below V_min than above it, and less above V_max than below it."""
+    found = texts(limits((1.0, 2.0)), 0.96, 0.94, 0.96, 1.06, 1.04)
+
+    assert found == [
+        "voltage of load.l falls below V_min, where the law of such a load jumps: 9% more apparent power at once",
+        "voltage of load.l rises above V_min, where the law of such a load jumps: 8% less apparent power at once",
+        "voltage of load.l rises above V_max, where the law of such a load jumps: 8% less apparent power at once",
+        "voltage of load.l falls below V_max, where the law of such a load jumps: 8% more apparent power at once",
+    ]
+
+
+@pytest.mark.parametrize(("exponents", "edge"), [((0.0, 0.0), 0.0), ((1.0, 1.0), 1.0)])
+def test_a_law_without_a_jump_is_not_reported(exponents: tuple[float, float], edge: float) -> None:
+    """Constant power and constant current go on without a jump at the limits."""
+    assert texts(limits(exponents, edge), 0.9, 1.0, 1.1, 1.0) == []
+
+
+def test_an_oscillation_across_a_limit_is_one_event() -> None:
+    """Crossings that follow each other within the pause are one spell; a dead load stays where it was."""
+    assert len(texts(limits((1.0, 2.0)), *(0.94, 0.96) * 20, period=0.9 * PAUSE)) == 1
+    assert texts(limits((1.0, 2.0)), 1.0, 0.0, 1.0) == []
+
+
+def test_a_run_tells_which_loads_jumped() -> None:
+    """When islanding lowers the voltages, the plant reports the loads that cross V_min, and none if none jumps."""
+
+    def crossings(exponents: tuple[float, float]) -> list[str]:
+        tables = read_feeder("ieee34")
+        parts = tuple(replace(part, exponents=exponents, edge=0.0, V_min=0.98) for part in tables.load_parts)
+        opening = SwitchEvent(t=0.02, switch="sw0", action="open")
+        plant = Plant(
+            Network(replace(tables, load_parts=parts)), PlantSettings(events=(opening,), P_set0=0.58), 0.02, 0.02
+        )
+        for _ in range(10):
+            plant.advance()
+        return [event.text for event in plant.take_events() if "V_min" in event.text]
+
+    assert crossings((0.0, 0.0)) == []
+    assert any("falls below V_min" in text for text in crossings((1.0, 2.0)))
+
+
+pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
+
+SCRIPT = """Clear
+New Circuit.test bus1=s basekv=12.47 pu=1.02
+New Line.head bus1=s bus2=b r1=0.1 x1=0.3 r0=0.3 x0=0.9 length=1 c1=0 c0=0
+New Transformer.t phases=3 windings=2 xhl=4 %loadloss=1 kvs=(12.47 0.48) kvas=(500 500) buses=(BUSES) conns=(CONNS)
+New Line.low bus1=c bus2=d r1=0.01 x1=0.03 r0=0.03 x0=0.09 length=1 c1=0 c0=0
+New Load.a bus1=d phases=3 conn=delta kv=0.48 kw=100 kvar=20
+New Load.x bus1=d.1.2 phases=1 conn=delta kv=0.48 kw=40
+UNIT
+Set VoltageBases=(12.47 0.48)
+CalcVoltageBases
+Solve
+"""
+
+DELTA, FLOATING, GROUNDED = ("b c", "delta delta"), ("b.1.2.3.4 c", "wye delta"), ("b c", "delta wye")
+
+GENERATOR = "New Generator.g bus1=d phases=3 kv=0.48 kw=20 model=1"
+PV = "New PVSystem.pv bus1=d phases=3 kv=0.48 kva=60 pmpp=50 irradiance=1"
+HARDLY_GROUNDED = f"{GENERATOR}\nNew Load.r bus1=d phases=3 kv=0.48 kw=3 model=2"
+
+
+def scaled(folder: Path, connection: tuple[str, str], unit: str, factor: float) -> Feeder:
+    """Import a feeder with a unit behind a transformer, its loads times a factor, and one inverter before it."""
+    buses, windings = connection
+    script = folder / "unit.dss"
+    script.write_text(SCRIPT.replace("BUSES", buses).replace("CONNS", windings).replace("UNIT", unit))
+    feeder = read_opendss(script)
+    parts = tuple(
+        replace(part, S=part.S * (factor if part.name.startswith("load") else 1.0)) for part in feeder.load_parts
+    )
+    row = InverterRow(name="i", kind="GFM", bus="b", microgrid="1", P_rated=1e6, V_nom=7200.0, m_p=0.01, m_q=0.05)
+    return replace(feeder, load_parts=parts, inverters=(row,))
+
+
+@pytest.mark.parametrize(
+    ("connection", "unit", "name", "factor"),
+    [
+        (DELTA, GENERATOR, "generator.g", 1.0),
+        (DELTA, GENERATOR, "generator.g", 0.05),
+        (DELTA, PV, "pvsystem.pv", 1.0),
+        (DELTA, PV, "pvsystem.pv", 0.05),
+        (FLOATING, GENERATOR, "generator.g", 0.05),  # beside all of the load there is a point, though OpenDSS has none
+        (DELTA, HARDLY_GROUNDED, "generator.g", 1.0),
+        (DELTA, HARDLY_GROUNDED, "generator.g", 0.05),
+    ],
+)
+def test_constant_power_that_nothing_grounds_is_named(
+    tmp_path: Path, connection: tuple[str, str], unit: str, name: str, factor: float
+) -> None:
+    """At any load factor the unit is the cause, with its bus; the load as a whole is not blamed."""
+    feeder = scaled(tmp_path, connection, unit, factor)
+
+    with pytest.raises(PlantError) as refused:
+        Plant(Network(feeder), PlantSettings(), 0.02, 0.02)
+
+    assert f"cannot feed the constant power of {name} at bus d (" in str(refused.value)
+    assert "the load may be more" not in str(refused.value)
+
+
+def test_the_same_unit_behind_a_grounded_winding_starts(tmp_path: Path) -> None:
+    """Its voltage to ground is that of the winding."""
+    Plant(Network(scaled(tmp_path, GROUNDED, GENERATOR, 1.0)), PlantSettings(), 0.02, 0.02)
+
+
+def test_loads_that_are_too_much_together_are_not_named(tmp_path: Path) -> None:
+    """Fifteen loads of 60 kW, each of which the transformer can feed alone, are more than it can carry."""
+    many = "\n".join(f"New Load.l{k} bus1=d phases=3 kv=0.48 kw=20 kvar=10 vminpu=0.1 vlowpu=0.05" for k in range(30))
+    feeder = scaled(tmp_path, GROUNDED, many, 1.0)
+    parts = tuple(replace(part, S=3.0 * part.S) for part in feeder.load_parts)
+
+    with pytest.raises(PlantError, match="the load may be more than the network can carry: try smaller loads"):
+        Plant(Network(replace(feeder, load_parts=parts)), PlantSettings(), 0.02, 0.02)
+
+
+OVER_HZ = 0.2
+"""Over-frequency of the stiff bus (Hz): a third of the rating at 1 % droop."""
+
+
+def islanded() -> Plant:
+    """Give the microgrid feeder, islanded for a second."""
+    p = plant(*opened(0.1, "13-152"))
+    run(p, 1.0)
+    p.take_events()
+    return p
+
+
+def frequencies(p: Plant) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+    """Give the recorded frequencies (Hz), a row per control period."""
+    return np.array(p.take_rows())[:, 1::6]
+
+
+@pytest.mark.parametrize("P_set", [1e7, 1e12, -1e12, 1e300])
+def test_a_gfm_told_nonsense_holds_its_bound_and_the_run_goes_on(P_set: float) -> None:
+    """10 MW ended the plant by no convergence, 1 TW gave 1 MHz: P_set is bounded at 3 pu, and so is the frequency."""
+    p = islanded()
+    p.take_rows()
+
+    for _ in range(100):
+        p.hold("inv1", P_set, 2401.8)
+        p.advance()
+
+    assert p.measure()["inv1"].P_set == pytest.approx(np.sign(P_set) * 3.0 * 600e3)
+    assert np.all(np.abs(frequencies(p) - 60.0) < 2.0)
+
+
+def test_a_voltage_set_point_of_nonsense_is_held_within_its_band() -> None:
+    """V_set of ten times nominal is held at 1.2 pu, V_set 0 at 0.8 pu."""
+    p = islanded()
+
+    p.hold("inv1", 300e3, 24e3)
+    p.hold("inv2", 200e3, 0.0)
+
+    readings = p.measure()
+    assert readings["inv1"].V_set == pytest.approx(1.2 * 2401.8, rel=1e-3)
+    assert readings["inv2"].V_set == pytest.approx(0.8 * 2401.8, rel=1e-3)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_set_points_that_are_no_numbers_are_left_out(value: float) -> None:
+    """Neither NaN nor an infinity gets in, alone or beside a good value."""
+    p = islanded()
+    before = p.measure()["inv1"]
+
+    p.hold("inv1", value, 2401.8)
+    p.hold("inv1", 300e3, value)
+
+    after = p.measure()["inv1"]
+    assert (after.P_set, after.V_set) == (before.P_set, before.V_set)
+    assert [event.subject for event in p.take_events()] == ["inv1"]
+
+
+def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> None:
+    """A hundred set-points beyond the bound make one event with the value and the bound, and one at their end."""
+    p = islanded()
+
+    for _ in range(100):
+        p.hold("inv1", 1e7, 2401.8)
+        p.advance()
+    begun = p.take_events()
+    for _ in range(60):
+        p.hold("inv1", 3e5, 2401.8)
+        p.advance()
+
+    begun = tuple(event for event in begun if "P_set" in event.text)  # beside that of its phase currents
+    assert [(event.kind, event.subject) for event in begun] == [("limit", "inv1")]
+    assert "10000 kW" in begun[0].text
+    assert "1800 kW" in begun[0].text
+    (ended,) = p.take_events()
+    assert "100 set-points" in ended.text
+
+
+def over_frequency(parameters: GflParameters, P_set: float) -> float:
+    """Tell a GFL on a stiff bus P_set (pu), and raise the frequency it measures; return the P reference (pu)."""
+    dynamics: Dynamics = on_stiff_bus(parameters)
+    units, h = dynamics.inverters, dynamics.h
+    units.hold(0, P_set, 1.0)
+    state, J = units.gfl_state, units.J[0].copy()
+    for k in range(1000):
+        x0, d = state.copy(), state.copy()
+        for second in (False, True):
+            V = V_B * BALANCED * np.exp(2j * np.pi * OVER_HZ * (k + second) * h)
+            J = np.array(gfl.advance_gfl(units.gfl[0], *units.set_points[0], x0[0], state[0], d[0], *V, *J, h, second))
+    return float(state["P_f"][0])
+
+
+def test_a_gfl_reference_above_the_rating_is_clipped_in_place_as_in_gridlabd() -> None:
+    """inverter-models 4.4: at P_set 1.2 pu a GFL gives 1 - 1/3 pu at 60.2 Hz; without the limit it gives 1.2 - 1/3."""
+    parameters = replace(GFL_D, frequency_watt=True, T_ff=0.05, T_pf=0.05)
+
+    assert over_frequency(parameters, 1.2) == pytest.approx(1.0 - OVER_HZ / 0.6, abs=1e-3)
+    assert over_frequency(replace(parameters, P_set_lim=3.0), 1.2) == pytest.approx(1.2 - OVER_HZ / 0.6, abs=1e-3)
+
+
+def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused() -> None:
+    """A start at which the overload limiter already acts is no equilibrium: f would dip without an event."""
+    with pytest.raises(PlantError, match=r"no equilibrium at t = 0: inv1 would have to give \d+ kW, .*P_set0_pu"):
+        Plant(Network(read_feeder("microgrid123")), PlantSettings(P_set0=1.1, gfl=GflParameters(P_max=1.1)), 0.02, 0.02)
+
+
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (PlantSettings(V_set0=1.2), r"inv1 would have to have an internal voltage of 1\.\d+ pu, .*E_max_pu"),
+        (PlantSettings(gfm=GfmParameters(Q_max=0.01)), r"inv1 would have to give \d+(\.\d+)? kvar, .*Q_max_pu"),
+    ],
+)
+def test_a_start_beyond_the_limits_of_vars_or_voltage_is_refused(settings: PlantSettings, said: str) -> None:
+    """As with power: 100 kvar would move within the first second, without an event."""
+    with pytest.raises(PlantError, match=f"no equilibrium at t = 0: {said}.*V_set0_pu"):
+        Plant(Network(read_feeder("microgrid123")), settings, 0.02, 0.02)

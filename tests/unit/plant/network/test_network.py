@@ -1,7 +1,15 @@
+"""The nodes of a feeder's network, its islands, its equipment, and the nodes that ideal devices merge."""
+
+from typing import Any
+
+import msgspec
 import numpy as np
 import pytest
 
-from gridpeers.plant.network import Network
+from gridpeers.plant.equipment import Line, LineConfig, Transformer
+from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network.merging import merge_nodes
+from tests.unit.plant.networks import PAPER_ISLANDS, diagonal, feeder, opened, three_phase_bus, zones
 
 
 def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:
@@ -49,3 +57,213 @@ def test_aliases_are_not_names(network: Network) -> None:
     """A set of closed switches holds names; an alias or a misspelled name in it is an error, not an open switch."""
     with pytest.raises(ValueError, match=r'"sw1_2" is not in Network.switches; pass it through switch_name'):
         network.admittance(frozenset({"sw1_2"}))
+
+
+def test_all_is_one_island_at_first(network: Network) -> None:
+    """Grid-connected, every bus hangs together."""
+    assert network.islands(network.closed0) == (frozenset(bus.name for bus in network.feeder.buses),)
+
+
+def test_event_1_islands_the_microgrids(network: Network) -> None:
+    """Opening 13-152 leaves 1-34 with the substation and islands everything beyond."""
+    assert network.islands(opened(network, "13-152")) == (
+        zones(network, "rest"),
+        zones(network, "passive", "MG1", "MG2", "MG3"),
+    )
+
+
+def test_event_2_drops_the_passive_zone(network: Network) -> None:
+    """Opening 60-160 as well leaves the passive zone dead and the three microgrids together."""
+    assert set(network.islands(opened(network, "13-152", "60-160"))) == {
+        zones(network, "rest"),
+        zones(network, "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
+def test_opening_60_160_alone_keeps_the_passive_zone_on_the_grid(network: Network) -> None:
+    """With 13-152 closed, opening 60-160 leaves the passive zone with the substation."""
+    assert set(network.islands(opened(network, "60-160"))) == {
+        zones(network, "rest", "passive"),
+        zones(network, "MG1", "MG2", "MG3"),
+    }
+
+
+def test_three_microgrids(network: Network) -> None:
+    """sw1_2 and sw2_3 split the island into MG1 with the passive zone, MG2 and MG3, one GFM in each."""
+    islands = network.islands(opened(network, *PAPER_ISLANDS))
+
+    assert set(islands) == {
+        zones(network, "rest"),
+        zones(network, "passive", "MG1"),
+        zones(network, "MG2"),
+        zones(network, "MG3"),
+    }
+    grid_forming = {inverter.bus for inverter in network.inverters if inverter.kind == "GFM"}
+    assert sorted(len(grid_forming & island) for island in islands) == [0, 1, 1, 1]
+
+
+def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
+    """Islands come in the order of their first bus in the table, whatever the switches."""
+    order = [bus.name for bus in network.feeder.buses]
+    islands = network.islands(opened(network, *PAPER_ISLANDS, "60-160"))
+
+    firsts = [min(order.index(bus) for bus in island) for island in islands]
+    assert firsts == sorted(firsts)
+    assert sum(len(island) for island in islands) == len(order)
+
+
+def test_lines_without_charging_carry_no_current_at_equal_voltages() -> None:
+    """A line's series admittance sees only voltage differences; with charging, half its capacitance is at each end."""
+    config = LineConfig(
+        name="c",
+        phases="ABC",
+        Z=diagonal(0.3 + 0.9j),
+        B=diagonal(4e-6),
+    )
+    line = Line(name="l", from_bus="1", to_bus="2", phases="AC", config="c", length=2.0)
+    table = feeder(buses=(three_phase_bus("1"), three_phase_bus("2")), lines=(line,), line_configs=(config,))
+    V = np.full(6, 2400.0 + 0j)
+
+    bare, charged = (Network(table, line_charging=charging).Y_branches @ V for charging in (False, True))
+
+    np.testing.assert_allclose(bare, 0.0, atol=1e-9)
+    np.testing.assert_allclose(charged, 2400.0 * 4e-6j * np.array([1, 0, 1, 1, 0, 1]), atol=1e-9)
+
+
+@pytest.mark.parametrize("connection", ["D-D", "Yg-Yg"])
+def test_transformer_impedance_and_ratio(connection: Any) -> None:
+    """Short-circuited at its secondary, a transformer draws 1/z of its rated current; open, it has its ratio."""
+    z = 0.0127 + 0.0272j
+    transformer = Transformer(name="t", from_bus="1", to_bus="2", connection=connection, S_rated=150e3, z=z)
+    network = Network(
+        feeder(buses=(three_phase_bus("1", 2400.0), three_phase_bus("2", 240.0)), transformers=(transformer,))
+    )
+    Y = network.Y_branches.toarray()
+    V = network.nominal[:3]
+
+    short_circuit = Y[:3, :3] @ V
+    open_secondary = -np.linalg.solve(Y[3:, 3:], Y[3:, :3] @ V)
+
+    np.testing.assert_allclose(short_circuit, V / 2400.0 * 150e3 / (3 * 2400.0) / z, rtol=1e-12)
+    np.testing.assert_allclose(open_secondary, V / 10.0, rtol=1e-12)
+
+
+def test_delta_transformer_passes_no_zero_sequence() -> None:
+    """A voltage common to all phases drives no current through a delta winding."""
+    transformer = Transformer(name="t", from_bus="1", to_bus="2", connection="D-D", S_rated=150e3, z=0.01 + 0.03j)
+    network = Network(feeder(buses=(three_phase_bus("1"), three_phase_bus("2")), transformers=(transformer,)))
+
+    current = network.Y_branches @ np.array([1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0])
+
+    np.testing.assert_allclose(current, 0.0, atol=1e-9)
+
+
+def test_capacitors_give_their_reactive_power_at_rated_voltage(network: Network) -> None:
+    """The banks of the feeder give 750 kvar together at their rated voltage."""
+    V = network.nominal * 2401.8 / (4160 / 3**0.5)
+
+    assert V @ np.conj(network.Y_capacitors @ V) == pytest.approx(-750e3j)
+
+
+def test_closing_again_restores_exactly(network: Network) -> None:
+    """The matrix is a function of the switches alone: opened and closed again, it is the same to the bit."""
+    before = network.admittance(network.closed0)
+    apart = network.admittance(opened(network, *PAPER_ISLANDS))
+    after = network.admittance(opened(network, *PAPER_ISLANDS) | set(map(network.switch_name, PAPER_ISLANDS)))
+
+    assert np.array_equal(before.toarray(), after.toarray())
+    assert not np.array_equal(before.toarray(), apart.toarray())
+
+
+def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
+    """The admittance matrix is symmetric and has no entry between two islands."""
+    closed = opened(network, *PAPER_ISLANDS, "60-160")
+    Y = network.admittance(closed)
+    island_of = {bus: i for i, island in enumerate(network.islands(closed)) for bus in island}
+    label = np.array([island_of[bus] for bus, _ in network.nodes])
+    entries = Y.tocoo()
+
+    assert abs(Y - Y.T).max() < 1e-9 * abs(Y).max()
+    assert np.array_equal(label[entries.row], label[entries.col])
+
+
+def test_only_representatives_have_entries(network: Network) -> None:
+    """Rows and columns of nodes that follow another one are empty; each representative is its own, at ratio 1."""
+    merge = network.merge(network.closed0)
+    followers = np.setdiff1d(np.arange(len(network.nodes)), merge.representatives)
+    Y = network.admittance(network.closed0)
+
+    assert len(followers) > 0
+    assert abs(Y[followers]).sum() == abs(Y[:, followers]).sum() == 0.0
+    assert np.all(merge.ratio[merge.representatives] == 1.0)
+    terminals = [network.index(inverter.bus, phase) for inverter in network.inverters for phase in "ABC"]
+    assert np.isin(terminals, merge.representatives).all()
+
+
+def test_merging_keeps_power(standard: Network) -> None:
+    """Power at the representatives equals power at all nodes, also across regulators: ideal devices take none."""
+    merge = standard.merge(standard.closed0)
+    random = np.random.default_rng(3)
+    V_rep = standard.nominal * random.uniform(0.9, 1.1, len(standard.nodes))
+    current = random.normal(size=len(standard.nodes)) + 1j * random.normal(size=len(standard.nodes))
+
+    at_nodes = merge.expand(V_rep) @ np.conj(current)
+    at_representatives = V_rep @ np.conj(merge.gather(current))
+
+    assert at_representatives == pytest.approx(at_nodes, rel=1e-12)
+    np.testing.assert_allclose(merge.matrix() @ V_rep, merge.expand(V_rep))
+
+
+def test_regulators_hold_their_ratio(standard: Network) -> None:
+    """Each regulator's output is 1 + 0.00625 tap times its input, with the published taps."""
+    V = solve_power_flow(standard, standard.closed0).V
+    gain = {
+        (bus, phase): abs(V[standard.index(bus + "r", phase)] / V[standard.index(bus, phase)])
+        for bus, phase in (("150", "A"), ("9", "A"), ("25", "A"), ("25", "C"), ("160", "A"), ("160", "C"))
+    }
+
+    assert list(gain.values()) == pytest.approx([1 + 0.00625 * tap for tap in (7, -1, 0, -1, 8, 5)], rel=1e-14)
+
+
+def test_ideal_switches_are_the_limit_of_small_impedances(standard: Network) -> None:
+    """Very short lines in place of the closed switches give the same voltages, only less exactly."""
+    table = standard.feeder
+    short = LineConfig(name="short", phases="ABC", Z=diagonal(1e-3j), B=diagonal(0.0))
+    lines = [
+        Line(name=s.name, from_bus=s.from_bus, to_bus=s.to_bus, phases=s.phases, config="short", length=1e-3)
+        for s in table.switches
+        if s.closed
+    ]
+    other = Network(
+        msgspec.structs.replace(
+            table, switches=(), lines=(*table.lines, *lines), line_configs=(*table.line_configs, short)
+        )
+    )
+
+    ideal = solve_power_flow(standard, standard.closed0).V
+    nearly = solve_power_flow(other, frozenset(), tolerance=1e-9).V
+
+    assert 1e-6 < np.abs(ideal - nearly).max() < 5e-3
+
+
+def test_parallel_regulator_and_switch_are_an_error() -> None:
+    """Two ties between the same nodes at different ratios are a short circuit, which is told with both nodes."""
+    with pytest.raises(ValueError, match=r"a bus and b bus are tied twice, at 1.00000 and at 1.05000"):
+        merge_nodes(["a bus", "b bus"], [(0, 1, 1.0), (0, 1, 1.05)], [])
+
+
+def test_ties_in_a_loop_are_no_error() -> None:
+    """Closed switches in a ring tie their nodes more often than needed, which is harmless."""
+    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.0), (1, 2, 1.0), (2, 0, 1.0)], [2])
+
+    assert merge.representative.tolist() == [2, 2, 2]
+    assert merge.ratio.tolist() == [1.0, 1.0, 1.0]
+
+
+def test_ratios_multiply_along_a_chain() -> None:
+    """Through two regulators in a row, and against their direction, ratios multiply."""
+    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.05), (1, 2, 1.1)], [1])
+
+    assert merge.representative.tolist() == [1, 1, 1]
+    np.testing.assert_allclose(merge.ratio, [1 / 1.05, 1.0, 1.1])

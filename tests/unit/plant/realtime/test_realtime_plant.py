@@ -1,13 +1,15 @@
-"""The course of a run in real time, on a fake clock: its start, its pace, its end, and recorders that it waits for."""
+"""The plant under real time: steps, pace and commands."""
 
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from gridpeers.plant.plant_node import MOST_RECORDERS
-from gridpeers.plant.realtime.realtime_plant import LEAD
+from gridpeers.plant.realtime.pacer import FIRST, RealTimePacer, sentence
+from gridpeers.plant.realtime.realtime_plant import COMMANDS, LEAD
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.messages import Measurement, Stop, Telemetry, Waiting
+from gridpeers.wire.messages import Answer, Command, LoadSetting, Measurement, Stop, Telemetry, Waiting
 from tests.toy.toy_configs import toy_configs
 from tests.unit.plant.realtime.realtime_lab import KEYS, T_C, Lab, running
 
@@ -217,3 +219,144 @@ def test_of_thousands_of_recorders_some_are_noted_and_the_needed_one_always() ->
 
     assert lab.side.phase == "running"
     assert lab.side.rejects.counts == {"excess": 1_000 - MOST_RECORDERS}
+
+
+def test_percentiles_are_those_of_the_delays() -> None:
+    """Delays of 0 to 99 hundredths of a period: nobody is late, and the percentiles are where they should be."""
+    pacer = RealTimePacer(1.0, now=10.0)
+    for i in range(100):
+        pacer.note(pacer.due + i / 100)
+    report = pacer.report()
+
+    assert (report.steps, report.late, report.slipped) == (100, 0, 0.0)
+    assert [report.p50, report.p95, report.p99, report.worst] == pytest.approx([0.50, 0.95, 0.99, 0.99])
+
+
+def test_pace_is_not_kept_if_more_than_one_percent_is_late() -> None:
+    """Of the steps so far in a run without an end, after the first of them; it is news only once."""
+    pacer = RealTimePacer(1.0, now=0.0)
+    pacer.note(pacer.due + 2.0)
+    assert not pacer.take_failure(of=None)
+    for _ in range(FIRST - 2):
+        pacer.note(pacer.due)
+    assert not pacer.take_failure(of=None)
+    pacer.note(pacer.due + 2.0)
+
+    assert pacer.take_failure(of=None)
+    assert not pacer.take_failure(of=None)
+
+
+def test_a_run_with_an_end_has_failed_as_soon_as_too_many_of_its_steps_are_late() -> None:
+    """Four of 350 are; nothing that comes later can make up for them."""
+    pacer = RealTimePacer(1.0, now=0.0)
+    news = []
+    for _ in range(5):
+        pacer.note(pacer.due + 2.0)
+        news.append(pacer.take_failure(of=350))
+
+    assert news == [False, False, False, True, False]
+
+
+def test_a_late_step_is_made_up_for_but_a_hopeless_delay_is_not() -> None:
+    """Up to ten periods the schedule stands; beyond, it moves by the delay."""
+    pacer = RealTimePacer(0.1, now=0.0)
+    assert pacer.note(0.9) == 0.0
+    assert pacer.due == pytest.approx(0.1)
+    assert pacer.note(2.1) == pytest.approx(2.0)
+
+    assert pacer.due == pytest.approx(2.2)
+    assert "put off by 2.00 s" in sentence(pacer.report(), 0.1)
+
+
+def test_early_is_not_late() -> None:
+    """Rounding of the clock gives no negative delays."""
+    pacer = RealTimePacer(0.1, now=5.0)
+    pacer.note(4.999999)
+
+    assert pacer.report().worst == 0.0
+
+
+def test_commands_are_done_and_answered() -> None:
+    """The plant operates switches, asks agents to leave, and answers the run's state as JSON."""
+    lab = running()
+    opened, again, stopped = lab.ask("open", "sw1"), lab.ask("open", "sw1"), lab.ask("stop", "inv2")
+    lab.step()
+    status = lab.ask("status").data
+
+    assert opened.ok
+    assert opened.text == "switch sw1: open at t = 0.00 s"
+    assert (again.ok, again.text) == (True, "switch sw1 was open already at t = 0.00 s")
+    assert stopped.ok
+    assert [(stop.reason, stop.refused) for stop in lab.take(Stop)] == [("stopped by command", False)]
+    assert (status["run"], status["phase"], status["tick"], status["pacing"]["late"]) == ("toy", "running", 1, 0)
+    assert (status["agents"], status["absent"]) == (["inv1", "inv2", "inv3"], [])
+    assert [event.text for event in lab.events("switch")] == ["sw1: open", "sw1: open"]
+
+
+def test_a_load_is_set_and_a_status_has_it() -> None:
+    """The answer says the power; the status has it until the run ends."""
+    lab = running()
+    set_ = lab.ask("load", "load1", load=LoadSetting(P=2e3, Q=-1e3))
+    wrong = lab.ask("load", "load7", load=LoadSetting(factor=0.5))
+
+    assert (set_.ok, set_.text) == (True, "load1: 2000-1000j VA, at t = 0.00 s")
+    assert (wrong.ok, wrong.text) == (False, 'no load "load7"; loads are load1')
+    assert lab.ask("status").data["loads"] == {"load1": [2e3, -1e3]}
+
+
+@pytest.mark.parametrize(("verb", "argument", "text"), [
+    ("open", "sw7", 'no switch "sw7"; switches are sw1'),
+    ("load", "load1", "load load1: nothing is to be set; give a factor, or real or reactive power"),
+    ("stop", "inv7", 'no agent "inv7" is running; running are: inv1, inv2, inv3'),
+])  # fmt: skip
+def test_what_cannot_be_done_is_answered_with_what_there_is(verb: str, argument: str, text: str) -> None:
+    """The answer is not ok, and names the choices."""
+    answer = running().ask(verb, argument)
+
+    assert (answer.ok, answer.text) == (False, text)
+
+
+def test_who_watches_hears_of_an_event_at_once() -> None:
+    """An event comes with the step in which it happens, not with the next telemetry; a flood of them waits for that."""
+    lab = running()
+    lab.step(2)
+    lab.take(Telemetry)
+
+    lab.ask("open", "sw1")
+    lab.step()
+    first = lab.take(Telemetry)
+    lab.ask("close", "sw1")
+    lab.step()
+
+    assert [event.text for message in first for event in message.events] == ["sw1: open"]
+    assert lab.take(Telemetry) == []
+    lab.step(10)
+    assert "sw1: close" in [event.text for message in lab.take(Telemetry) for event in message.events]
+    assert lab.ask("status").data["switches"] == {"sw1": True}
+
+
+def test_a_run_is_ended_once() -> None:
+    """A second order to end a run that ends already is refused, and does not end it anew."""
+    lab = running()
+    lab.step()
+    answers = [lab.ask("down"), lab.ask("down")]
+
+    assert [(answer.ok, answer.text) for answer in answers][1] == (False, "the run is ending")
+    assert answers[0].ok
+    assert [message.final for message in lab.take(Telemetry)].count(True) == 1
+
+
+def test_who_asks_without_end_is_answered_a_bounded_number_of_times() -> None:
+    """Of ten thousand questions between two steps the first are answered, the others counted; another verb is free."""
+    lab = running(3)
+    question = Command(sender="visitor", epoch=0, seq=0, t=0.0, verb="status", reply_to="z1")
+    for number in range(10_000):
+        lab.hear(KEYS.request, replace(question, seq=number))
+    lab.do()
+    answers = lab.take(Answer)
+    end = lab.ask("down")
+    lab.step(3)
+
+    assert len(answers) == COMMANDS
+    assert lab.side.rejects.counts["excess"] == 10_000 - COMMANDS
+    assert end.ok

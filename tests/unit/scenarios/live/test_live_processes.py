@@ -21,7 +21,7 @@ from gridpeers.scenarios.live.live_recorder import LiveRecorder
 from gridpeers.scenarios.live.run_address import RunAddress, UsageError
 from gridpeers.scenarios.live.run_requests import own_code
 from gridpeers.wire.driver.drive import StoppedError
-from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal, ctrl_c_or
+from gridpeers.wire.driver.ending import SAME_REQUEST_TIME, StopSignal
 from gridpeers.wire.plugins.plugin import Plugin
 from gridpeers.wire.timing import BURST, RateLimit
 from tests.toy.toy_configs import agent_config, toy_configs
@@ -127,7 +127,7 @@ class CutRecorder:
 def test_a_record_that_a_second_ctrl_c_cuts_short_says_so(later: float, why: str) -> None:
     """The plant is not blamed for what the user asked for; a second signal at once is the first one's twin."""
     times = [5.0, 5.0 + later]
-    requests = StopSignal(ctrl_c_or(StoppedError), lambda: times.pop(0))
+    requests = StopSignal(StoppedError, lambda: times.pop(0))
 
     def run(recorder: Any) -> str:
         try:
@@ -148,6 +148,6 @@ def test_a_run_of_which_nothing_was_heard_has_failed() -> None:
         def __exit__(self, *_: object) -> None:
             """End as a recorder that writes no files."""
 
-    outcome = _follow(cast("LiveRecorder", DeafRecorder()), lambda recorder: "", StopSignal(ctrl_c_or(StoppedError)))
+    outcome = _follow(cast("LiveRecorder", DeafRecorder()), lambda recorder: "", StopSignal(StoppedError))
 
     assert outcome.broke == UNHEARD

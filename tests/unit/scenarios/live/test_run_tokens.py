@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from time import monotonic
 from typing import Any
 
 import pytest
@@ -13,12 +12,11 @@ from gridpeers.scenarios.live.run_address import address_of
 from gridpeers.scenarios.live.run_client import RunClient
 from gridpeers.scenarios.live.run_monitor import RunMonitor, RunTokens
 from gridpeers.scenarios.live.watching import RunSubscriber
-from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
 from gridpeers.wire.bounds import MOST_INVERTERS
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.inbox import MOST_TOKENS, Inbox
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.membership import MOST_PROCESSES
-from gridpeers.wire.plant_follower import MOST_PLANTS
+from gridpeers.wire.node import MOST_PLANTS
 from tests.toy.toy_configs import agent_config
 
 LAB, MINE = Keys("lab"), Keys("mine")
@@ -33,7 +31,6 @@ class Line:
         self.inbox = Inbox()
         self.subscribed: list[str] = []
         self.subscribe = self.subscribed.append
-        self.now = monotonic()
 
     def appear(self, tokens: Iterable[str]) -> None:
         """Let tokens appear."""
@@ -46,7 +43,7 @@ class Line:
             self.inbox.put(("vanished", token, b""))
 
     def take(self, count: int, seconds: float) -> list[Any]:
-        """All that comes at once, and what waits and is due."""
+        """All that waits."""
         return self.inbox.take(0, 0.0)
 
     def __getattr__(self, name: str) -> Any:
@@ -55,26 +52,15 @@ class Line:
 
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> Line:
-    """The line of every client from now on; all that waits is due whenever the client looks."""
+    """The line of every client from now on."""
     made = Line()
-
-    def later() -> float:
-        made.now += 1.0
-        return made.now
-
     monkeypatch.setattr(client, "Session", lambda *_, **__: made)
-    monkeypatch.setattr("gridpeers.wire.driver.inbox.monotonic", later)
     return made
 
 
-LOOKS = MOST_WAITING // AT_ONCE + 2
-"""How often a client looks until nothing waits any more."""
-
-
 def take_all(at: RunClient) -> None:
-    """Let the client see all that has come, and what waits."""
-    for _ in range(LOOKS):
-        assert list(at.take(0.0)) == []
+    """Let the client see all that has come."""
+    assert list(at.take(0.0)) == []
 
 
 def strangers(names: int, instances: int) -> list[str]:
@@ -85,10 +71,10 @@ def strangers(names: int, instances: int) -> list[str]:
 def test_a_client_keeps_a_bounded_number_of_tokens(line: Line) -> None:
     """Of strangers' tokens as many wait as with an agent, and each kind has the room that it has there."""
     at = RunClient(address_of("lab", None))
-    line.appear([LAB.alive_plant(7), *strangers(3 * MOST_WAITING, 1)])
+    line.appear([LAB.alive_plant(7), *strangers(3 * MOST_TOKENS, 1)])
     (loss,) = line.inbox.take_losses()
 
-    assert loss.number == 2 * MOST_WAITING - AT_ONCE + 1
+    assert loss.number == 2 * MOST_TOKENS + 1
     take_all(at)
     assert (at.plant, len(at.present)) == (True, MOST_INVERTERS)
 
@@ -99,7 +85,7 @@ def test_what_a_client_has_noted_is_seen_to_go_and_to_come_back_in_a_flood(line:
     own = [LAB.alive_plant(7), LAB.alive_agent("inv1", "a"), LAB.alive_agent("inv2", "b")]
     line.appear(own)
     take_all(at)
-    line.appear(strangers(MOST_INVERTERS // 2, 3 * MOST_WAITING // MOST_INVERTERS * 2))
+    line.appear(strangers(MOST_INVERTERS // 2, 3 * MOST_TOKENS // MOST_INVERTERS * 2))
     line.vanish([own[0], own[2]])
     _ = list(at.take(0.0))
 
@@ -116,8 +102,7 @@ def test_a_watcher_subscribes_to_a_bounded_number_of_strangers_and_to_every_inve
     for turn in range(3):
         names = [LAB.alive_agent(f"who{turn}-{name}", "a") for name in range(MOST_INVERTERS)]
         line.appear(names)
-        for _ in range(LOOKS):
-            subscriber.take(0.0)
+        subscriber.take(0.0)
         line.vanish(names)
         subscriber.take(0.0)
     monitor.config(agent_config("inv1", 3))

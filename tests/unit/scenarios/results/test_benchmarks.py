@@ -75,7 +75,7 @@ def test_a_users_benchmark_stands_beside_ours_and_judges(tmp_path: Path) -> None
     ("paper", "said"),
     [
         ("my_benchmark:MINES", 'my_benchmark:MINES: module my_benchmark has no "MINES"; did you mean "MINE"?'),
-        ("my_benchmark:OTHER", "my_benchmark:OTHER is no benchmark: it is no gridpeers.benchmarks.Benchmark"),
+        ("my_benchmark:OTHER", "my_benchmark:OTHER is no benchmark: it is no gridpeers.Benchmark"),
         ("no_such_module:MINE", 'no_such_module:MINE: there is no module "no_such_module"'),
         ("island", 'paper: there is no benchmark "island"; did you mean "islanding"?'),
     ],

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gridpeers.scenarios.results.run_files import TerminatedError, broken_if_ended
-from gridpeers.wire.driver.ending import ReaderGoneError
+from gridpeers.wire.driver.ending import READER_GONE, OutputLostError
 
 
 @pytest.mark.parametrize(
@@ -19,7 +19,7 @@ from gridpeers.wire.driver.ending import ReaderGoneError
         (ValueError("two\nlines"), "two lines"),
         (ZeroDivisionError(), "ZeroDivisionError"),
         (OSError(errno.ENOSPC, "No space left on device", "out/history.csv"), "out/history.csv: cannot be written: "),
-        (ReaderGoneError(), "nobody reads its output any more"),
+        (OutputLostError(READER_GONE, "nobody reads its output any more"), "nobody reads its output any more"),
     ],
 )
 def test_the_status_says_why_a_run_ended_early(error: BaseException, told: str, tmp_path: Path) -> None:

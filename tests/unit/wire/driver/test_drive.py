@@ -10,9 +10,8 @@ import pytest
 
 import gridpeers.scenarios.drivers.telemetry_client as telemetry_client
 from gridpeers.scenarios.drivers.telemetry_client import TelemetryClient
-from gridpeers.wire.backlog import AT_ONCE, MOST_WAITING
 from gridpeers.wire.driver.drive import drive
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.driver.inbox import MOST_TOKENS, Inbox
 from gridpeers.wire.driver.session import Session
 from gridpeers.wire.node import Core
 
@@ -32,7 +31,7 @@ class Crowded:
 
     def watch(self, key: str) -> None:
         """Bring the tokens that are there already, as Zenoh does before it returns."""
-        for i in range(AT_ONCE + MOST_WAITING + EXCESS):
+        for i in range(MOST_TOKENS + EXCESS):
             self.inbox.put(("appeared", key.replace("**", f"agent/stranger{i}/x").replace("*", f"x{i}"), b""))
 
 

@@ -1,15 +1,32 @@
-from __future__ import annotations
+"""What waits for a process that somebody floods with messages or tokens, and what wakes it."""
 
-import threading
+from __future__ import annotations
 
 import pytest
 
-import gridpeers.wire.driver.inbox
-from gridpeers.wire.backlog import BYTES, MOST_OF_ONE, ROOM
 from gridpeers.wire.bounds import LONGEST_MESSAGE
-from gridpeers.wire.driver.inbox import Inbox
+from gridpeers.wire.codec import KINDS, decode, encode, is_marked
+from gridpeers.wire.driver.inbox import BYTES, MOST_OF_ONE, MOST_TOKENS, ROOM, Inbox
+from gridpeers.wire.messages import MESSAGES, Message, State
+from gridpeers.wire.node import TOKENS, Loss
+from tests.hostile.cases import packed, sound
 
 LONG = bytes(LONGEST_MESSAGE)
+
+
+def state(epoch: int, seq: int = 0) -> bytes:
+    """Bytes of a state of inv2."""
+    return encode(State(sender="inv2", epoch=epoch, seq=seq, t=0.0, P_set=0.0, V_set=0.0, Q=0.0))
+
+
+def of_inv2(key: str, payload: bytes) -> bool:
+    """Whether a message is of the process of inv2 that is believed."""
+    return is_marked(payload, "inv2", 7)
+
+
+def events(inbox: Inbox) -> list[tuple[str, str]]:
+    """Kind and key of all that waits."""
+    return [(kind, key) for kind, key, _, _ in inbox.take(1, 0.0)]
 
 
 def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:
@@ -22,82 +39,140 @@ def test_what_is_no_message_is_taken_at_once_whenever_it_came() -> None:
     assert inbox.take(9, timeout=0.0) == []
 
 
-def test_wanted_messages_are_taken_at_once_whenever_they_came() -> None:
-    """As many messages as are wanted are not waited for again."""
+@pytest.mark.parametrize(("count", "timeout"), [(9, 30.0), (1, 0.01)])
+def test_messages_are_taken_once_as_many_as_are_wanted_wait_or_the_time_is_over(count: int, timeout: float) -> None:
+    """Those that were there before count too."""
     inbox = Inbox()
-    for i in range(9):
+    for i in range(count):
         inbox.put(("message", str(i), b""))
 
-    assert len(inbox.take(9, timeout=30.0)) == 9
+    assert len(inbox.take(9, timeout)) == count
 
 
-def test_fewer_messages_than_wanted_come_after_the_time() -> None:
-    """A deadline brings what there is."""
+def test_a_flood_of_strangers_never_displaces_a_known_sender() -> None:
+    """Of forty thousand of strangers' messages as many wait as there is room; the known sender's states all do."""
     inbox = Inbox()
-    inbox.put(("message", "a", b""))
+    inbox.is_known = of_inv2
+    strange = state(epoch=666)
+    for i in range(10 * ROOM):
+        inbox.put(("message", "state/inv2", strange))
+        if i % (10 * ROOM // MOST_OF_ONE) == 0:
+            inbox.put(("message", "state/inv2", state(epoch=7, seq=i)))
+    inbox.put(("word", "SIGTERM", b""))
+    *taken, word = inbox.take(1, 0.0)
+    (loss,) = inbox.take_losses()
 
-    assert [event[:3] for event in inbox.take(9, timeout=0.01)] == [("message", "a", b"")]
-
-
-@pytest.mark.timeout(60)
-def test_many_senders_that_wait_for_room_all_go_on_once_there_is_some(monkeypatch: pytest.MonkeyPatch) -> None:
-    """None is forgotten, no more come in than there is room for, and the owner is woken though it wants more."""
-    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 3600.0)
-    inbox = Inbox(holds=True)
-    inbox.is_known = lambda key, payload: True
-    each, senders = 4 * BYTES // LONGEST_MESSAGE // 8, 8
-
-    def bring(key: str) -> None:
-        for _ in range(each):
-            inbox.put(("message", key, LONG))
-
-    bringing = [threading.Thread(target=bring, args=(f"telemetry/{i}",), daemon=True) for i in range(senders)]
-    for thread in bringing:
-        thread.start()
-    taken = []
-    while sum(taken) < each * senders:
-        wanted = min(each * senders - sum(taken), 3 * BYTES // LONGEST_MESSAGE)
-        taken.append(len(inbox.take(wanted, None)))
-    for thread in bringing:
-        thread.join()
-
-    assert max(taken) <= BYTES // LONGEST_MESSAGE
+    assert word[0] == "word"
+    assert len(taken) <= ROOM + MOST_OF_ONE
+    assert sum(of_inv2("", payload) for _, _, payload, _ in taken) == MOST_OF_ONE
+    assert loss == Loss("state/inv2", "excess", loss.text, 10 * ROOM + MOST_OF_ONE - len(taken))
+    assert loss.text.startswith(f"{ROOM} messages were waiting, 0 bytes")
     assert inbox.take_losses() == ()
 
 
-@pytest.mark.timeout(60)
-def test_senders_of_short_messages_wait_for_room_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On one key, beyond the room for all, as many wait as of one sender."""
-    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 3600.0)
-    inbox = Inbox(holds=True)
-    inbox.is_known = lambda key, payload: True
-    count = 3 * ROOM
+def test_a_known_sender_that_floods_has_its_own_room_and_no_more() -> None:
+    """Of whoever copies name and epoch as many messages wait as of one sender; another key has its own room."""
+    inbox = Inbox()
+    inbox.is_known = of_inv2
+    for i in range(2 * ROOM):
+        inbox.put(("message", "state/inv2", state(epoch=7, seq=i)))
+    inbox.put(("message", "set_points/inv2", state(epoch=7)))
+    keys = [key for _, key in events(inbox)]
 
-    def bring() -> None:
-        for _ in range(count):
-            inbox.put(("message", "state/inv2", b"x"))
-
-    bringing = threading.Thread(target=bring, daemon=True)
-    bringing.start()
-    taken = []
-    while sum(taken) < count:
-        taken.append(len(inbox.take(count - sum(taken), None)))
-    bringing.join()
-
-    assert max(taken) <= ROOM + MOST_OF_ONE
+    assert keys.count("state/inv2") == ROOM + MOST_OF_ONE
+    assert keys.count("set_points/inv2") == 1
 
 
-def test_a_message_that_has_waited_too_long_for_room_comes_in(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In simulated time none may be lost; once taken out, all of the room is there again."""
-    monkeypatch.setattr(gridpeers.wire.driver.inbox, "HELD", 0.0)
-    inbox = Inbox(holds=True)
+def test_long_messages_are_bounded_by_their_bytes() -> None:
+    """Strangers have a quarter of the room, the known ones the rest; once taken out, there is room again."""
+    inbox = Inbox()
     inbox.is_known = lambda key, payload: key == "telemetry"
-    room = BYTES // LONGEST_MESSAGE
-    for _ in range(room + 2):
-        inbox.put(("message", "telemetry", LONG))
+    for key in ("command", "telemetry"):
+        for _ in range(2 * BYTES // LONGEST_MESSAGE):
+            inbox.put(("message", key, LONG))
+    taken = inbox.take(1, 0.0)
+    inbox.put(("message", "command", LONG))
 
-    assert len(inbox.take(1, 0.0)) == room + 2
-    for _ in range(room):
+    assert BYTES - LONGEST_MESSAGE <= sum(len(payload) for _, _, payload, _ in taken) <= BYTES
+    assert sum(key == "command" for _, key, _, _ in taken) == BYTES // 4 // LONGEST_MESSAGE
+    assert len(inbox.take(1, 0.0)) == 1
+
+
+def test_in_simulated_time_no_message_of_a_known_sender_is_lost() -> None:
+    """Long ones and short ones come in beyond the room; those of strangers do not."""
+    inbox = Inbox(lossless=True)
+    inbox.is_known = lambda key, payload: key == "telemetry"
+    for payload, count in ((LONG, 2 * BYTES // LONGEST_MESSAGE), (b"x", 2 * ROOM)):
+        for _ in range(count):
+            inbox.put(("message", "telemetry", payload))
         inbox.put(("message", "command", LONG))
-    assert len(inbox.take(1, 0.0)) == room // 4
-    assert [loss.number for loss in inbox.take_losses()] == [room - room // 4]
+
+    assert len(inbox.take(1, 0.0)) == 2 * BYTES // LONGEST_MESSAGE + 2 * ROOM
+    assert [loss.number for loss in inbox.take_losses()] == [2]
+
+
+def test_what_is_longer_than_a_message_never_waits() -> None:
+    """The first is told with its length, all are counted."""
+    inbox = Inbox()
+    for length in (LONGEST_MESSAGE + 1, LONGEST_MESSAGE + 2):
+        inbox.put(("message", "state/inv2", bytes(length)))
+    text = f"{LONGEST_MESSAGE + 1} bytes, at most {LONGEST_MESSAGE} are allowed"
+
+    assert inbox.take(1, 0.0) == []
+    assert inbox.take_losses() == (Loss("state/inv2", "oversized", text, 2),)
+    assert {"oversized", "excess"} <= set(KINDS)
+
+
+@pytest.mark.parametrize("kind", MESSAGES)
+def test_every_message_of_ours_is_recognised_by_its_first_bytes(kind: type[Message]) -> None:
+    """With the longest name and the largest epoch; another epoch, or another name, is a stranger's."""
+    name, epoch = "x" * 64, 2**53 - 1
+    payload = encode(decode(packed(sound(kind, sender=name, epoch=epoch))))
+
+    assert is_marked(payload, name, epoch)
+    assert not is_marked(payload, name, epoch - 1)
+    assert not is_marked(payload, name[1:], epoch)
+
+
+def test_of_a_flood_of_strangers_tokens_a_bounded_number_waits_and_the_rest_is_counted() -> None:
+    """A noted holder is seen to go and to come back meanwhile; once they are taken there is room again."""
+    inbox = Inbox()
+    inbox.is_noted = lambda key: key == "inv2"
+    for i in range(MOST_TOKENS + 5):
+        inbox.put(("appeared", f"who{i}", b""))
+    inbox.put(("vanished", "inv2", b""))
+    inbox.put(("appeared", "inv2", b""))
+    taken = events(inbox)
+    (loss,) = inbox.take_losses()
+    inbox.put(("appeared", "later", b""))
+
+    assert len(taken) == MOST_TOKENS + 2
+    assert taken[-2:] == [("vanished", "inv2"), ("appeared", "inv2")]
+    assert loss == Loss(TOKENS, "excess", f"{MOST_TOKENS} tokens were waiting, of others", 5)
+    assert events(inbox) == [("appeared", "later")]
+
+
+def test_the_end_of_a_holder_comes_in_if_the_owner_has_noted_it_or_is_about_to() -> None:
+    """What it has taken and not yet handled it may note; an end of which it saw no beginning is of no use."""
+    inbox = Inbox()
+    inbox.is_noted = lambda key: False
+    for token in ("a", "b", "a"):  # the third says nothing new
+        inbox.put(("appeared", token, b""))
+    inbox.put(("vanished", "a", b""))
+    inbox.put(("vanished", "stranger", b""))
+
+    assert events(inbox) == [("appeared", "a"), ("appeared", "b"), ("vanished", "a")]
+    inbox.put(("vanished", "b", b""))
+    inbox.put(("vanished", "a", b""))
+    assert events(inbox) == [("vanished", "b")]
+
+
+def test_an_owner_that_has_said_nothing_of_whom_it_notes_loses_no_token() -> None:
+    """Then nobody counts as a stranger."""
+    inbox = Inbox()
+    for i in range(MOST_TOKENS + 1):
+        inbox.put(("appeared", f"a{i}", b""))
+    inbox.put(("vanished", "c", b""))
+
+    assert len(events(inbox)) == MOST_TOKENS + 2
+    assert inbox.take_losses() == ()

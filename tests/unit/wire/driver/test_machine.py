@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import subprocess
 import sys
 import threading
@@ -73,59 +72,3 @@ def test_a_large_block_leaves_no_hole() -> None:
     )
 
     assert out < 1000, f"{out} kB stay, and {heap} kB without"
-
-
-_FREED = """
-from gridpeers.wire.driver.machine import give_back_freed
-
-def resident():
-    with open("/proc/self/status") as file:
-        return next(int(line.split()[1]) for line in file if line.startswith("RssAnon"))
-
-before = resident()
-blocks = [b"1" * 60_000 for _ in range(500)]
-stays = blocks[-1]
-del blocks
-grown = resident() - before
-give_back_freed()
-print(grown, resident() - before)
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc tells the size of a process")
-def test_what_is_free_below_a_block_that_stays_is_given_back() -> None:
-    """30 MB of the heap are free below a small block, and go back to the system only when asked."""
-    done = subprocess.run([sys.executable, "-c", _FREED], capture_output=True, text=True, check=True)
-
-    grown, left = (int(number) for number in done.stdout.split())
-    assert grown > 25_000
-    assert left < 2_000, f"{left} of {grown} kB stay"
-
-
-CODE = """
-import sys
-from gridpeers.wire.driver.machine import PERIOD, FreeLists
-
-def tuples():
-    sys.stderr.flush()
-    sys._debugmallocstats()
-
-lists = FreeLists(100.0)
-many = [tuple([k] * 19) for k in range(3000)]
-del many
-tuples()
-print([lists.tend(100.0 + at) for at in (0.0, PERIOD - 1.0)])
-tuples()
-print([lists.tend(100.0 + at) for at in (PERIOD, PERIOD + 1.0, 2.0 * PERIOD)])
-tuples()
-"""
-
-
-def test_tuples_that_are_free_are_given_back_once_a_period() -> None:
-    """Not before, and again after that; Python keeps 2000 of each length until then."""
-    done = subprocess.run([sys.executable, "-c", CODE], capture_output=True, text=True, check=True)
-
-    free = [int(number) for number in re.findall(r"(\d+) free 19-sized PyTupleObjects", done.stderr)]
-    assert done.stdout.splitlines() == ["[False, False]", "[True, False, True]"]
-    assert free[0] == free[1] == 2000
-    assert free[2] < 10
