@@ -22,6 +22,7 @@ from gridpeers.agents.realtime_agent import RealtimeAgent
 from gridpeers.netem.schema.netem import Netem
 from gridpeers.plant.plant_config import PlantConfig
 from gridpeers.plant.realtime.realtime_plant import RealtimePlant
+from gridpeers.scenarios.drivers.telemetry_client import RECORDER
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.scenarios.emulation.link_data import EmulationConfig
 from gridpeers.scenarios.record.record_info import RecordInfo
@@ -32,7 +33,6 @@ from gridpeers.wire.journal import RecordLevel
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import PLANT, Command, Journal, LinkReport, LinkRequest, Telemetry
 from gridpeers.wire.node import Fetch, Listen, Log, Loss, Publish
-from tests.processes.lockstep.test_process_driver import RECORDER
 from tests.toy.toy_configs import ALL_FULL, toy_configs
 from tests.toy.toy_plant import ToyPlant
 
