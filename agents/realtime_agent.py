@@ -348,7 +348,7 @@ class RealtimeAgent(AgentNode):
 
     def _tick(self, at: float) -> None:
         """Tick at this time (s of run time on the own clock), if there is a measurement to tick with."""
-        if self.admission.epoch(PLANT) is None:
+        if self.admission.epochs.get(PLANT) is None:
             return  # what the dead plant said last would still look fresh
         measurement = self.states.measured(at, self._config.max_age)
         if measurement is None:

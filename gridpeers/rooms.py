@@ -6,10 +6,12 @@ The face and what is below it import no room, so that each may be missing.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.plugins.registry import Registry
+
+if TYPE_CHECKING:
+    from gridpeers.plant.equipment import Feeder
 
 ROOMS: Registry[Any] = Registry("part of a room", "rooms", lambda it: "")
 """Functions, classes and modules by name."""

@@ -64,9 +64,6 @@ class Admission:
     def release(self, name: str) -> None:
         self.epochs.pop(name, None)
 
-    def epoch(self, name: str) -> int | None:
-        return self.epochs.get(name)
-
     def lives(self, message: AnyMessage) -> bool:
         return self.epochs.get(message.sender) == message.epoch
 

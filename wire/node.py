@@ -358,7 +358,7 @@ class PlantFollower(Node):
         if (epoch := epoch_of(part)) not in self._plants:
             return False
         self._plants.discard(epoch)
-        followed = self.admission.epoch(PLANT)
+        followed = self.admission.epochs.get(PLANT)
         if followed == epoch:
             self.admission.release(PLANT)
         return followed == epoch or not self._plants
@@ -379,7 +379,7 @@ class PlantFollower(Node):
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
         """Check a message; first follow its plant if this node follows none."""
         epoch = message.epoch
-        if route.sender == PLANT == message.sender and epoch in self._plants and self.admission.epoch(PLANT) is None:
+        if route.sender == PLANT == message.sender and epoch in self._plants and PLANT not in self.admission.epochs:
             self._check_certificate(PLANT)
             self.admission.bind(PLANT, epoch)
             self._follow(epoch)

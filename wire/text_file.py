@@ -21,9 +21,6 @@ _MARKS = (
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 """Separators of cells, and their names."""
 
-_HINT = re.compile(r"sep=(.)\s*", re.IGNORECASE)
-"""First line by which Excel is told the separator."""
-
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}(,\d{3})+")
 
@@ -90,16 +87,13 @@ def read_table_text(data: bytes, known: Collection[str], numbers: Collection[str
     Raise TextFileError if it is no text, no table, or a number has two meanings.
     """
     text = text_of(data)
-    lines = text.splitlines() or [""]
-    hint = _HINT.fullmatch(lines[0])
-    first = next((line for line in lines[1 if hint else 0 :] if line.strip()), "")
-    separator = hint[1] if hint else _separator(first, known)
-    reader = csv.reader(io.StringIO(text), delimiter=separator, strict=True)
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    reader = csv.reader(io.StringIO(text), delimiter=_separator(first, known), strict=True)
     try:
         rows = [(reader.line_num, [cell.strip() for cell in cells]) for cells in reader if any(map(str.strip, cells))]
     except csv.Error as error:
         raise TextFileError(f"not a CSV file ({error})") from None
-    (_, header), rows = (rows or [(1, [])])[hint is not None], rows[1 + (hint is not None) :]
+    (_, header), *rows = rows or [(1, [])]
     while header and not header[-1]:
         header.pop()
     for _, cells in rows:

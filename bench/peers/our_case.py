@@ -6,7 +6,7 @@ import os
 import subprocess
 import tempfile
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from functools import cached_property
 from pathlib import Path
 from time import perf_counter, process_time, sleep
@@ -63,7 +63,7 @@ class OurCase:
         ours = build_plant(self.plant)
         with (
             patch.object(delta_mode_process, "KEPT_MEMORY", {}),
-            GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end) as plant,
+            closing(GridlabdPlant(ours, self.plant.settings, self.plant.T_c, self.end)) as plant,
         ):
             started = processor_time(plant.process.pid)
             for _ in range(self.ticks):

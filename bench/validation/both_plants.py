@@ -10,6 +10,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,7 +69,7 @@ def compare(run: ComparedRun, factor: float = 1.0) -> PlantDifferences:
         config = _reclosing_at_its_angle(network, config, run.reclosing)
     assert config.end is not None
     ours = Plant(network, config.settings, config.T_c, config.record_step)
-    with _started(ours, feeder, run, config) as theirs:
+    with closing(_started(ours, feeder, run, config)) as theirs:
         if run.closed_loop:
             first, second = (_closed_loop(plant, config, agents) for plant in (ours, theirs))
         else:

@@ -7,7 +7,7 @@ after every step and, when enough are done, holds GridLAB-D until the next reque
 
 Requests are JSON objects, one a line on standard input, answered one a line on standard output:
 
-    {"load": path, "inverters": [[name, bus, kind, phases], ...]}    {"version": ...}; the first step is done
+    {"load": path, "inverters": [[name, bus, kind, phases], ...]}    {}; the first step is done
     {"write": [[object, property, value], ...]}             {}; acts from the next step on
     {"phasors": bus}                                        {"phasors": [real, imaginary] (V) of its phases A, B, C}
     {"write": ..., "advance": n}                            {"steps": n lists of a reading per inverter}
@@ -140,7 +140,7 @@ def gridlabd_package() -> ModuleType:
     """Return the package gridlabd."""
     try:
         package = importlib.import_module("gridlabd")
-        _ = package.DirectGridLabD, package.GLDErrorCode, package.__version__
+        _ = package.DirectGridLabD, package.GLDErrorCode
         return package
     except Exception as error:  # a damaged package may raise anything
         raise NotImportableError(error) from error
@@ -154,7 +154,6 @@ class Simulation:
 
     def __init__(self, model: str, inverters: list[tuple[str, str, str, str]]) -> None:
         gridlabd = gridlabd_package()
-        self.version = str(gridlabd.__version__)
         self._gridlabd = gridlabd.DirectGridLabD()
         if self._gridlabd.load_glm([model]) != gridlabd.GLDErrorCode.SUCCESS:
             raise RuntimeError("it refuses the model")
@@ -216,7 +215,7 @@ def answers(requests: Iterator[dict[str, Any]]) -> Iterator[dict[str, Any]]:
     """Answer requests, the first of which loads the model."""
     first = next(requests)
     simulation = Simulation(first["load"], first["inverters"])
-    yield {"version": simulation.version}
+    yield {}
     for request in requests:
         if "phasors" in request:
             phases = (simulation.core.doubles(request["phasors"], f"voltage_{phase}", 2) for phase in "ABC")

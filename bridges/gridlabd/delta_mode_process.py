@@ -96,17 +96,16 @@ class DeltaModeProcess:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
-    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> str:
-        """Load the text of a model, take its first step, and return GridLAB-D's version.
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> None:
+        """Load the text of a model, and take its first step.
 
         `inverters` has the name, node, kind and phases of each inverter to read.
         """
         path = self._folder.path / "feeder.glm"
         path.write_text(model, encoding="utf-8")
-        return str(self._answer({"load": str(path), "inverters": inverters}, START_DEADLINE)["version"])
+        self._answer({"load": str(path), "inverters": inverters}, START_DEADLINE)
 
     def ask(self, **request: Any) -> dict[str, Any]:
         """Return the answer to a request (`delta_mode`); GridlabdError has GridLAB-D's own errors."""

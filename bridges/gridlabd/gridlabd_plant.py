@@ -5,8 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Mapping
 from math import isfinite
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +58,6 @@ class GridlabdSchedule:
 
     @property
     def positions(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return self._switches.positions
 
     def put(self, step: int, name: str, action: str) -> bool:
@@ -156,7 +154,7 @@ class GridlabdPlant:
         """GridLAB-D."""
         try:
             units = [(unit.name, f"n{unit.bus}", unit.kind, unit.phases) for unit in self._units.values()]
-            self.version = self.process.load(model, units)
+            self.process.load(model, units)
             # GridLAB-D chose set-points that give the powers it was started with; now the run's own take over
             for name, unit in self._units.items():
                 self.hold(name, settings.P_set0 * unit.P_rated, settings.V_set0 * unit.V_nom)
@@ -168,22 +166,10 @@ class GridlabdPlant:
             raise
         self._rows = [self._as_row(0, self._now)]
 
-    def __enter__(self) -> Self:
-        """Give the plant; leaving the context ends GridLAB-D's process."""
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End GridLAB-D's process."""
-        self.close()
-
     def close(self) -> None:
-        """End GridLAB-D's process."""
         self.process.close()
 
     def measure(self) -> dict[str, Reading]:
-        """Read every inverter's sensors at t = tick * T_c."""
         island, fed = self._schedule.islands()
         readings = {}
         for i, name in enumerate(self.inverters):
@@ -217,11 +203,9 @@ class GridlabdPlant:
 
     @property
     def switches(self) -> dict[str, bool]:
-        """Position of each switch now, by its name: whether it is closed."""
         return self._schedule.positions
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        """Operate a switch ("open" or "close") at the next step; return whether it was in that state already."""
         if synchronised:
             raise ValueError("GridLAB-D as the plant has no synchronism check; close without it")
         return self._schedule.put(self.tick * self._steps, name, action)
@@ -264,12 +248,10 @@ class GridlabdPlant:
         self.tick += 1
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Return the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
 

@@ -68,7 +68,6 @@ class HelicsPlant:
             raise
 
     def measure(self) -> dict[str, Reading]:
-        """Return the sensors' values at t = tick * T_c."""
         prefix = self._helics.prefix
         first = self.inverters[0]
         readings = {}
@@ -120,12 +119,10 @@ class HelicsPlant:
         self.tick += 1
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Return the rows since the last call, as `PlantLike.take_rows` lays them out."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Return the events that the outside plant published since the last call."""
         events, self._events = tuple(self._events), []
         return events
 
@@ -231,33 +228,26 @@ class BridgedPlant:
             raise
 
     def measure(self) -> Mapping[str, Reading]:
-        """Read all sensors now."""
         return self._plant.measure()
 
     def hold(self, name: str, P_set: float, V_set: float) -> None:
-        """Take set-points (W, V) of an agent of ours."""
         self._plant.hold(name, P_set, V_set)
 
     def connect(self, name: str, on: bool) -> None:
-        """Connect or disconnect an inverter."""
         self._plant.connect(name, on)
 
     @property
     def switches(self) -> Mapping[str, bool]:
-        """Position of each switch."""
         return self._plant.switches
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
-        """Operate a switch."""
         return self._plant.switch(name, action, synchronised=synchronised)
 
     @property
     def loads(self) -> Mapping[str, complex]:
-        """Power at nominal voltage (VA) of each load that was set."""
         return self._plant.loads
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
-        """Set a load."""
         return self._plant.set_load(name, setting)
 
     def advance(self) -> None:
@@ -276,12 +266,10 @@ class BridgedPlant:
         self._outgoing = self._measured(self._plant.measure()) | self._as_value(events)
 
     def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Take out the rows recorded since the last call."""
         rows, self._rows = tuple(self._rows), []
         return rows
 
     def take_events(self) -> tuple[PlantEvent, ...]:
-        """Take out the events since the last call."""
         events, self._events = tuple(self._events), []
         return events
 

@@ -51,11 +51,9 @@ class DssProcess:
 
     @property
     def pid(self) -> int:
-        """Process id."""
         return self._process.pid
 
     def send(self, request: ImportRequest) -> None:
-        """Ask for a circuit."""
         self._process.send(request._asdict() | {"path": str(request.path)})
 
     def circuit(self, path: Path) -> DssCircuit:
@@ -84,7 +82,6 @@ class DssProcess:
         return found
 
     def close(self) -> None:
-        """End the process, with what it reads."""
         self._process.close()
         self._folder.close()
 

@@ -18,7 +18,7 @@ class OwnCommand(NamedTuple):
     """One command, without its module."""
 
     reference: str
-    """`module:name` of a function that typer can read, or of a `typer.Typer` with commands below this one."""
+    """`module:name` of a function that typer can read, or of a `typer.Typer`; empty where a room brings it."""
     summary: str
     """Its line in the help of `gridpeers`: the first sentence of its docstring."""
 
@@ -26,15 +26,18 @@ class OwnCommand(NamedTuple):
 _HERE = "gridpeers.cli.commands"
 
 OWN_COMMANDS = {
-    name: OwnCommand(reference if reference.startswith("gridpeers.papers.") else f"{_HERE}.{reference}", summary)
+    name: OwnCommand(reference if not reference or "." in reference else f"{_HERE}.{reference}", summary)
     for name, reference, summary in (
         ("run", "run_command:run", "Run a scenario and show its results, beside published ones."),
         ("list", "show:list_", "List the scenarios that come with gridpeers."),
         ("check", "show:check", "Check a scenario file and its feeder for problems."),
         ("doc", "show:doc", "Print a reference page that is made from the code."),
         ("sweep", "sweep_command:sweep", "Run a scenario many times over values of its keys."),
+        ("chaos", "", "Disturb a scenario at random; judge and shrink what fails."),
+        ("predict", "", "Predict from theory how a scenario will go."),
         ("compare", "show:compare", "Compare two runs: scenarios, metrics, and one figure of both."),
         ("metrics", "show:metrics", "Measure a run from its record, also one that was killed."),
+        ("replay", "", "Replay a recorded run, or show what would have been."),
         ("init", "init:init", "Make a project of your own, or an islanding of your feeder."),
         (
             "reproduce",
@@ -58,15 +61,19 @@ OWN_COMMANDS = {
         ("link", "link:link", "Hurt and heal links while a run goes on."),
         ("keys", "keys_command:app", "Make, issue and revoke the certificates of a site."),
         ("feeder", "feeder_commands:app", "Import, check, solve, draw and export feeders."),
+        ("bridge", "", "Offer our plant to simulators of others."),
+        ("trace", "", "Write a run's messages as a Perfetto trace, or draw them."),
+        ("why", "", "Explain why an agent decided as it did."),
+        ("view", "", "Show a run in the browser: feeder, links, strips and agents."),
     )
 }
-"""All of them, by name."""
+"""All of them, in the order of the help, which imports none."""
 
 COMMANDS: Registry[Callable[..., None]] = Registry(
     "command",
     "commands",
     lambda it: "" if callable(it) else "it is no function",
-    own={name: command.reference for name, command in OWN_COMMANDS.items()},
+    own={name: command.reference for name, command in OWN_COMMANDS.items() if command.reference},
 )
 """Functions of all commands, or a `typer.Typer`, by name."""
 
@@ -76,7 +83,11 @@ class LazyCommands(Commands):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Return the names: gridpeers' own first."""
-        return list(COMMANDS.names)
+        there = COMMANDS.names
+        return [
+            *(name for name in OWN_COMMANDS if name in there),
+            *(name for name in there if name not in OWN_COMMANDS),
+        ]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """Import a command, one that says so when it is called if it cannot be; None if there is none of this name."""

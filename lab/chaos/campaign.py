@@ -38,8 +38,6 @@ Tell = Callable[[str, float, float], None]
 
 @dataclass(frozen=True, kw_only=True)
 class Campaign:
-    """The task of a campaign."""
-
     base: ChaosBase
     seed: int
     runs: int
@@ -77,11 +75,9 @@ class Summary:
 
     @property
     def violated(self) -> int:
-        """Number of runs that violated anything."""
         return sum(bool(row.violated) for row in self.rows.values())
 
     def lines(self) -> Iterator[str]:
-        """Yield the report."""
         base, rows = self.campaign.base, self.rows.values()
         how = "in one process each" if self.campaign.driver == "inprocess" else "with processes"
         drawn = counted_kinds(base.effective(row.schedule) for row in rows)
@@ -200,7 +196,6 @@ def _shrinking_driver(campaign: Campaign, violated: str) -> Driver:
 
 
 def _concluded(campaign: Campaign, folder: ChaosFolder, failures: dict[str, Failure]) -> Summary:
-    """Write the table in the order of the runs, and the report."""
     folder.write_table()
     summary = Summary(campaign=campaign, rows=folder.rows, failures=tuple(failures.values()))
     write_whole(folder.path / "report.txt", "\n".join(summary.lines()) + "\n")
@@ -226,7 +221,6 @@ def _shrink(
 def shrink_number(
     text: str, seed: int, number: int, violated: str, driver: Driver, within: Path | None = None
 ) -> ChaosRow:
-    """Return the run of the simplest schedule found that violates what a run violates."""
     base = base_of(text)
     rows: dict[bytes, ChaosRow] = {}
 

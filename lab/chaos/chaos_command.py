@@ -164,6 +164,7 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
     from gridpeers.cli.progress import TRYING, explained
     from gridpeers.lab.chaos.campaign import undisturbed
     from gridpeers.scenarios.checks.check_registry import ALWAYS
+    from gridpeers.wire.wording import counted
 
     name = f"{campaign.base.scenario.name}, case {campaign.base.case}"
     typer.echo(f"{name}: first a run without disturbances ...")
@@ -175,21 +176,9 @@ def _try_undisturbed(console: Console, campaign: Campaign) -> None:
         advice = f"choose another case (--case), or switch these checks off in the scenario{entry} (docs/checks.md)"
         lines = [f"{name}: violated without any disturbance: {text}" for text in row.violated.values()]
         fail([*lines, advice], BAD_INPUT)
-    typer.echo(f"{name}: it violates nothing; next {_work(campaign)} ...")
-
-
-def _work(campaign: Campaign) -> str:
-    """Return what the runs with disturbances need before the first of them ends, in words."""
-    from gridpeers.wire.wording import counted
-
-    runs = f"{counted(campaign.runs, 'run')} with disturbances"
-    if campaign.driver == "processes":
-        return f"{runs}, each with processes and again in one"
-    if campaign.dask:
-        return f"{runs}, by the workers of {campaign.dask}"
-    if campaign.jobs == 1:
-        return f"{runs}, one after another"
-    return f"{runs}, {campaign.jobs} at a time, once {counted(campaign.jobs, 'worker')} have started"
+    by = "each with processes and again in one" if campaign.driver == "processes" else f"{campaign.jobs} at a time"
+    how = f"by the workers of {campaign.dask}" if campaign.dask else by
+    typer.echo(f"{name}: it violates nothing; next {counted(campaign.runs, 'run')} with disturbances, {how} ...")
 
 
 @contextmanager

@@ -24,7 +24,6 @@ SCENARIO, ASKED = "scenario.toml", "asked.json"
 """Files from which a campaign goes on, beside its journal: its scenario; its seed and its number of runs."""
 
 RUNS = 100
-"""Number of runs of a campaign if nobody says one."""
 
 SEEDS = 1_000_000
 """Seeds of the messages' fates for each seed of a campaign: run n has one of its own."""
@@ -38,12 +37,10 @@ COLUMNS = (
 
 
 def seed_of(seed: int, number: int) -> int:
-    """Return the seed of the scenario of a campaign's run."""
     return seed * SEEDS + number
 
 
 def again(file: Path) -> str:
-    """Return the command that runs a failure once more."""
     return command_line("run", shown(file), "--driver", "inprocess", "--require-checks")
 
 
@@ -76,7 +73,6 @@ class ChaosFolder:
             file.write(self._cells(row).encode())
 
     def write_table(self) -> None:
-        """Write the table in the order of the runs."""
         rows = (self.rows[number] for number in sorted(self.rows))
         write_whole(self.path / TABLE, [_line(COLUMNS), *map(self._cells, rows)])
 

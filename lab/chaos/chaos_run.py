@@ -39,12 +39,9 @@ without a minute in service between."""
 
 
 class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of one run."""
-
     number: int
     schedule: Schedule
     passed: tuple[str, ...] = ()
-    """Checks, and what else is asked, that it passed."""
     violated: dict[str, str] = {}
     """Those that it violated, with the sentence of each."""
     collapse: str = ""
@@ -52,15 +49,11 @@ class ChaosRow(msgspec.Struct, frozen=True, kw_only=True):
     unsettled: str = ""
     """Why it may be judged too early: inverters tripped and returned in each of its ever longer runs."""
     history_sha256: str = ""
-    """Of the bytes of its history.csv; empty if it broke."""
     links_sha256: str = ""
-    """Of all verdicts of its emulated links."""
     trips: int = 0
-    """Number of events in which inverters tripped."""
     since_s: float = 0.0
     """Run time (s) from which on it was to be restored: that of the last change, or later, as inverters tripped."""
     took_s: float = 0.0
-    """Wall-clock time (s)."""
 
     @property
     def status(self) -> str:
@@ -174,7 +167,6 @@ class JudgedRun(NamedTuple):
 
     row: ChaosRow
     restored_s: float = 0.0
-    """Run time from which on it is to be restored (s)."""
     collapses: tuple[Collapse, ...] = ()
     off: frozenset[str] = frozenset()
     """Inverters that are out of service at its end."""
@@ -221,7 +213,6 @@ def _judged(
 
 
 def _with_verdicts(row: ChaosRow, recorded: Recorded, verdicts: tuple[CheckVerdict, ...]) -> ChaosRow:
-    """Return the result with the verdicts of the checks, and with what else is asked."""
     links = [*recorded.links.warnings, *sorted(recorded.links.failures)]
     unlike = "" if recorded.reproducible else "something happened that the scenario does not say"
     asked = {ENDS: "", ERROR: unlike, LINKS: "; ".join(links[:2])}

@@ -28,7 +28,6 @@ class Collapse(NamedTuple):
     label: str
     """Label of the scenario's event that is the change."""
     text: str
-    """Event and first trip, for a person."""
     inverters: frozenset[str]
     """Inverters of the islands in which inverters tripped, as the switches were then."""
 

@@ -12,7 +12,6 @@ import msgspec
 from gridpeers.wire.wording import counted
 
 Table = Literal["event", "link", "partition", "node"]
-"""Lists of entries in a scenario file."""
 
 KINDS: Mapping[str, tuple[str, str]] = {
     "cut": ("cut", "cuts"),
@@ -47,15 +46,12 @@ class Disturbance(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
     """
 
     table: Table
-    """List of the scenario that it stands in."""
     entry: Mapping[str, Any]
-    """Its entry there; an event has no label yet."""
     back: Mapping[str, Any] = {}
     """Of an event: the later event that takes it back; empty if none does."""
 
     @property
     def begins_s(self) -> float:
-        """Run time (s) at which it begins."""
         return float(self.entry["t_s" if self.table == "event" else "from_s"])
 
     @property

@@ -30,13 +30,10 @@ from gridpeers.scenarios.schema.supply import check_loads
 from gridpeers.wire.timing import rounded_up
 
 _LISTS = ("open", "close", "leave", "join")
-"""Keys of an event that are lists of names."""
 
 _TABLES = ("load", "P_max_kW")
-"""Keys of an event that are tables by name."""
 
 _LONGEST_NAME = 24
-"""Letters of the scenario's name that are kept."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +55,6 @@ class ChaosBase:
 
     @property
     def text(self) -> str:
-        """The scenario as the text of a file, for other processes."""
         return to_toml(self.scenario, {}, terse=True)
 
     @property
@@ -74,13 +70,11 @@ class ChaosBase:
         return max([*ends, *(event.t_s for event in self.scenario.events)], default=0.0)
 
     def without_faults(self) -> ChaosBase:
-        """Return the base without its own faults of links and agents; itself if it has none."""
         cases = {name: replace(case, netem=_faultless(case.netem)) for name, case in self.scenario.cases.items()}
         scenario = replace(self.scenario, netem=_faultless(self.scenario.netem), cases=cases)
         return self if scenario == self.scenario else ChaosBase(scenario, self.feeder)
 
     def changed_s(self, schedule: Schedule) -> float:
-        """Return the run time (s) of the last change with a schedule."""
         return max([self.settled_s, *(disturbance.settled_s for disturbance in schedule)])
 
     def disturbed(self, schedule: Schedule, seed: int, since_s: float = 0.0) -> ScenarioModel:

@@ -31,7 +31,6 @@ class _Part(NamedTuple):
     buses: frozenset[str]
     has_substation: bool
     alive: bool
-    """Whether anything feeds it."""
 
 
 class _State(NamedTuple):
@@ -39,11 +38,8 @@ class _State(NamedTuple):
 
     t_s: float
     closed: frozenset[str]
-    """Closed switches."""
     present: frozenset[str]
-    """Inverters on the network."""
     killed: frozenset[str]
-    """Inverters whose agents have died."""
     powers: Mapping[str, complex]
     """Loads that an event has set (VA), by name."""
 

@@ -150,7 +150,6 @@ def _search(
 
 
 def schedules(base: ChaosBase) -> st.SearchStrategy[Schedule]:
-    """Return the strategy of the schedules that are possible in a scenario."""
     return st.lists(_disturbances(base), max_size=MOST_DISTURBANCES).map(base.kept)
 
 
@@ -160,8 +159,6 @@ def _disturbances(draw: st.DrawFn, base: ChaosBase) -> Disturbance:
 
 
 class _Draw:
-    """Draws one disturbance of a scenario."""
-
     def __init__(self, base: ChaosBase, pick: Pick) -> None:
         scenario, feeder = base.scenario, base.feeder
         self._base, self._pick = base, pick
@@ -298,7 +295,6 @@ class _Draw:
         return self._event({"join": [name]}, {"leave": [name]})
 
     def _load(self) -> Disturbance:
-        """Set neighbouring loads of the table."""
         first = self._pick(len(self._loads))
         names = self._loads[first : first + 1 + self._pick(MOST_LOADS)]
         factor = self._one_of([0.0, 0.5, 1.5, 2.0])

@@ -32,7 +32,6 @@ class NeighbourAccount:
 
     @property
     def used(self) -> bool:
-        """Whether its state counts in the sums of the law."""
         return self.seen is not None and self.seen.weight > 0.0
 
 
@@ -55,7 +54,6 @@ class Explanation:
     aftermath: tuple[str, ...]
     """Sentences on the time between the decision and the one that was asked for; none if it was made then."""
     damage: tuple[str, ...]
-    """What could not be read of the record."""
 
     @property
     def agent(self) -> str:
@@ -63,11 +61,9 @@ class Explanation:
 
     @property
     def t(self) -> float:
-        """Run time of the decision (s)."""
         return self.decision.t
 
     def __str__(self) -> str:
-        """Return it in words and numbers."""
         from gridpeers.lab.explanation.explanation_text import text_of
 
         return text_of(self)
@@ -86,7 +82,6 @@ def explain(record: RunRecord, agent: str, t: float, events: tuple[PlantEvent, .
 def explained(
     record: RunRecord, decision: RecordedDecision, asked: float, events: tuple[PlantEvent, ...] | None = None
 ) -> Explanation:
-    """Explain a decision of a record."""
     events = record.events() if events is None else events
     step = law_step(record, decision)
     return Explanation(
@@ -124,7 +119,6 @@ def _accounts(
 
 
 def _matters(event: PlantEvent, decision: RecordedDecision, asked: float) -> bool:
-    """Whether an event is worth telling beside a decision."""
     if decision.t - RECENT <= event.t <= decision.t + 1e-9:
         return True
     return event.subject == decision.agent and decision.t < event.t <= asked
@@ -199,7 +193,6 @@ class TrailStep:
 
     decision: RecordedDecision
     step: LawStep | None
-    """The step of its law; None if the law was on hold."""
     largest: Term | None
     """The largest term, which is followed if it comes from a neighbour; None if there is none."""
     end: str
@@ -235,7 +228,6 @@ def trail(record: RunRecord, decision: RecordedDecision, quantity: Quantity, hop
 
 
 def _behind(record: RunRecord, decision: RecordedDecision, term: Term) -> RecordedDecision | None:
-    """Return the decision that the state behind a term came from."""
     state = next((each.state for each in decision.neighbours if each.name == term.neighbour), None)
     if state is None:
         return None

@@ -26,7 +26,6 @@ def text_of(explanation: Explanation, trails: Sequence[tuple[Quantity, tuple[Tra
 def show(
     explanation: Explanation, console: Console, trails: Sequence[tuple[Quantity, tuple[TrailStep, ...]]] = ()
 ) -> None:
-    """Print an explanation, with colours on a terminal."""
     if console.is_terminal:
         print_explanation(explanation, console, trails)
     else:
@@ -124,7 +123,6 @@ def _steps(it: Explanation) -> Iterator[list[RenderableType]]:
 
 
 def _step(title: str, step: QuantityStep, base: float, unit: str, side: int) -> list[RenderableType]:
-    """Return the lines of the step of one set-point."""
     ends = f"{step.before * base:.2f} -> {step.after * base:.2f} {unit}, {step.before:.6f} -> {step.after:.6f} pu"
     terms = sorted(step.terms, key=lambda term: -abs(term.value))
     rows = [(term.name, term.neighbour, _signed(term.value), _share(term.value, step)) for term in terms[:SHOWN]]

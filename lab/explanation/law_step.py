@@ -22,21 +22,16 @@ class QuantityStep:
     """The step of one set-point (pu of the own rating)."""
 
     before: float
-    """The set-point before it."""
     after: float
-    """The set-point after it."""
     terms: tuple[Term, ...]
     """Terms of the law, before its limits."""
     limits: float
     """Part that the limits of the law add, so that the set-point stays within them; 0 where they do not act."""
     low: float
-    """Lower limit."""
     high: float
-    """Upper limit."""
 
     @property
     def step(self) -> float:
-        """The step taken."""
         return self.after - self.before
 
     @property
@@ -47,12 +42,8 @@ class QuantityStep:
 
 @dataclass(frozen=True, kw_only=True)
 class LawStep:
-    """The step that a law made at a decision."""
-
     P_set: QuantityStep
-    """Step of P_set."""
     V_set: QuantityStep
-    """Step of V_set."""
     problem: str = ""
     """Why the parts are not those of the law computed again; empty if they are."""
 
@@ -87,7 +78,6 @@ def law_step(record: RunRecord, decision: RecordedDecision) -> LawStep | None:
 
 
 def _has_no_memory(law: Law) -> bool:
-    """Whether a law has nothing to forget when it starts."""
     return type(law).start is Law.start
 
 
@@ -108,7 +98,6 @@ def _since_start(record: RunRecord, decision: RecordedDecision) -> tuple[Recorde
 
 
 def _computed_again(law: Law, decisions: Sequence[RecordedDecision]) -> tuple[Terms | None, SetPoints]:
-    """Return the terms and the result of a law at the last of some decisions."""
     law.start(decisions[0].own)
     for each in decisions[:-1]:
         law.step(each.own, each.neighbours_used, each.T)

@@ -32,7 +32,6 @@ from gridpeers.lab.predict.response import PlantModel, response
 from gridpeers.scenarios.results.history import Floats
 
 LinkEnds = tuple[str, str]
-"""(src, dst)."""
 
 AT_REST = 1e-9
 """Singular values of 1 - M below this belong to set-points that the law never moves."""
@@ -147,7 +146,6 @@ class Loop:
         one = np.eye(load + 1)
 
         def y(back: int, i: int) -> Floats:
-            """Return y_i(k - back)."""
             row: Floats = one[(back - 1) * n + i]
             return row
 

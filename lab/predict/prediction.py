@@ -42,7 +42,6 @@ LIMITS: dict[DelayKind, str] = {
     "disagreement": "agent to agent, own value as late",
     "local loop": "plant to agent or back",
 }
-"""Names of the delays whose limit is known."""
 
 WIDTH = 100
 """Columns of the text."""
@@ -104,7 +103,6 @@ class CasePrediction:
 
     title: str
     inverters: InverterGroup
-    """The inverters at the start."""
     islands: tuple[tuple[IslandStep, InverterGroup], ...]
     """Islands after each event, and their inverters."""
     plant: VarResponse | None
@@ -200,7 +198,6 @@ class Prediction:
 
 
 def case_text(case: CasePrediction) -> str:
-    """Return all predictions of one case."""
     if not case.has_law:
         words = "No secondary control: no modes, no limits of delay. Droop alone decides, at once: `gridpeers run`."
         return "\n".join([case.title, *_wrapped(words, "  ")])

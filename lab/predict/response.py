@@ -35,26 +35,18 @@ PlantModel = Literal["lagged", "quasi-steady"]
 class Response:
     """Plant between two ticks: x(k+1) = A x(k) + B u(k) + E l, and at tick k e = C x + D u + F l with u of before.
 
-    Powers: pi = C_p x + D_p u + F_p l in the same way. N inverters, n states.
+    Powers: pi = C_p x + D_p u + F_p l in the same way. With N inverters and n states, A is n x n, B n x N, C_p N x n.
     """
 
     A: Floats
-    """n x n."""
     B: Floats
-    """n x N."""
     E: Floats
-    """n."""
     C: Floats
-    """n."""
     D: Floats
-    """N."""
     F: float
     C_p: Floats
-    """N x n."""
     D_p: Floats
-    """N x N."""
     F_p: Floats
-    """N."""
 
     def rest(self, u: Floats, load: float) -> Floats:
         """Return the state in which the plant stands still under set-points u and a load (both pu frequency)."""

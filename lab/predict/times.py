@@ -51,7 +51,6 @@ class Times:
     share_s: float | None
     """Until MPSI < 0.01 for good."""
     stable: bool
-    """Whether every mode that the law moves decays."""
     note: str = ""
     """In words, why a time is None; empty if none is."""
 

@@ -45,7 +45,6 @@ class Changes:
     without: tuple[str, ...] = ()
     """Links that are cut, as patterns: "inv4 -> inv7"."""
     without_loss: bool = False
-    """No message is lost by chance."""
     without_link_commands: bool = False
     """The commands that people gave to emulated links are left out."""
     law: str = ""
@@ -77,8 +76,6 @@ class Changes:
 
 @dataclass(frozen=True, kw_only=True)
 class ChangedRule:
-    """A record's run under changes: what its agents and links are from then on."""
-
     recorded: ScenarioModel
     """The scenario of the record, with its case alone."""
     scenario: ScenarioModel
@@ -193,7 +190,6 @@ def _written(record: RunRecord, scenario: ScenarioModel) -> ScenarioModel | None
 
 
 def _wrong(record: RunRecord, changes: Changes, feeder: Feeder) -> list[str]:
-    """Return what is wrong with links and time."""
     microgrids = {row.name: row.microgrid for row in (*feeder.inverters, *feeder.spares)}
     wrong = [text for pattern in changes.without for text in objections(pattern, tuple(microgrids), microgrids)]
     if not isfinite(changes.since) or not 0.0 <= changes.since < record.t_end:
@@ -252,7 +248,6 @@ def spliced(before: Netem, after: Netem, since: float) -> Netem:
 
 
 def _spliced(before: tuple[Entry, ...], after: tuple[Entry, ...], since: float) -> tuple[Entry, ...]:
-    """Return entries of both, those that both have once and whole."""
     found = [entry for entry in before if entry in after]
     for entry in before:
         if entry not in after and entry.from_s < since:

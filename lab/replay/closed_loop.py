@@ -85,7 +85,6 @@ class ClosedLoop:
         """Sentences on what the replay leaves out."""
 
     def run(self) -> None:
-        """Run until the record ends."""
         found = [LoopProcess(process) for process in processes_of(self._record)]
         first = found[0]
         if first.name != PLANT:
@@ -296,7 +295,6 @@ class LinkDelays:
         self._drawn: dict[tuple[str, str], int] = {}
 
     def note(self, src: str, dst: str, delay: float) -> None:
-        """Note the delay of a message of the record."""
         self._delays.setdefault((src, dst), deque(maxlen=KEPT_DELAYS)).append(delay)
 
     def draw(self, src: str, dst: str) -> float:
@@ -306,7 +304,6 @@ class LinkDelays:
         return known[number % len(known)]
 
     def typical(self, src: str, dst: str) -> float:
-        """Return the median delay of a link."""
         return median(self._known(src, dst))
 
     def _known(self, src: str, dst: str) -> list[float]:

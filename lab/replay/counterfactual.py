@@ -133,7 +133,6 @@ class Counterfactual:
 
     @property
     def folder(self) -> Path:
-        """Run folder of what would have been."""
         return self._folders[1].path
 
     @cached_property
@@ -174,12 +173,9 @@ def _result(folder: Path) -> Result:
 
 @dataclass(frozen=True, kw_only=True)
 class CounterfactualRun:
-    """What became of a counterfactual."""
-
     difference: Difference | None
     """First row of the plant before the change that is not as in the record; None if all are. It should be None."""
     compared: int
-    """Number of rows that were compared."""
     t_end: float
     """Run time of its last row (s)."""
     notes: tuple[str, ...]
@@ -268,7 +264,6 @@ def _as_recorded(record: RunRecord, folder: Path, until: float) -> Recorded:
 def _write(
     record: RunRecord, rule: ChangedRule, scenario: ScenarioModel, folder: Path, recorded: Recorded, *, would_be: bool
 ) -> None:
-    """Write what a run folder has beside the files of its case."""
     info = record.info
     made = {"replayed": str(record.path.resolve()), "changes": str(rule.changes) if would_be else ""}
     as_run = {"driver": info.driver, "clock": info.clock, **made}

@@ -51,7 +51,6 @@ class LoopProcess:
 
     @property
     def name(self) -> str:
-        """Its agent, or "plant"."""
         return self.recorded.name
 
     @property
@@ -65,7 +64,6 @@ class LoopProcess:
         return self.again.node if self.again is not None and isinstance(self.again.node, RealtimePlant) else None
 
     def next(self) -> None:
-        """Go on to the next call."""
         assert self.head is not None
         for sent in self.head.sent:
             if (message := tick_message(Message(sent.key, sent.payload))) is not None:
@@ -78,7 +76,6 @@ class LoopProcess:
 
 
 def is_arrival(step: RecordedStep) -> bool:
-    """Return whether a message arrives in a step."""
     return isinstance(step.entry, MessageReference | ReceivedMessage)
 
 
@@ -97,13 +94,11 @@ class ChangedProcesses:
         return None if self._rule is None or self.changed else self._rule.changes.since
 
     def close(self) -> None:
-        """Release what laws have opened."""
         close_laws(self._laws)
 
     # ---------------------------------------------------------------- making
 
     def make_plant(self, process: LoopProcess, plant: LivePlant) -> None:
-        """Make the plant's process, around a plant at t = 0."""
         links = self._links(PLANT, self._info.plant.links)
         process.again = plant_again(process.recorded, self._info, plant, links)
 
@@ -128,7 +123,6 @@ class ChangedProcesses:
     # ---------------------------------------------------------------- the change
 
     def change(self, processes: list[LoopProcess]) -> None:
-        """Make the change."""
         rule, self.changed = self._rule, True
         assert rule is not None
         for process in processes:

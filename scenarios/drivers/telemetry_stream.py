@@ -136,7 +136,7 @@ class TelemetryEndpoint(PlantFollower):
         A link that breaks takes the token away from a plant that goes on. All others make room for new ones.
         """
         match self.keys.parts(key):
-            case ("alive", "plant", part) if epoch_of(part) != self.admission.epoch(PLANT):
+            case ("alive", "plant", part) if epoch_of(part) != self.admission.epochs.get(PLANT):
                 self._plant_vanished(part)
 
     def is_known(self, key: str, payload: bytes) -> bool:

@@ -27,17 +27,13 @@ import socket
 import sys
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
 
 LONGEST = 65_536
 """Longest request (bytes)."""
 
 
-class _Job(NamedTuple):
-    words: list[str]
-    """Module, and its arguments."""
-    files: tuple[int, ...]
-    """Standard input, output, error."""
+_Job = tuple[list[str], list[int]]
+"""Module and its arguments; standard input, output and error."""
 
 
 def main() -> None:
@@ -54,10 +50,11 @@ def main() -> None:
     if job is None:
         return
     control.close()
-    _become(job)
-    if not hasattr(sys.modules.get(job.words[0]), "__path__"):
-        sys.modules.pop(job.words[0], None)  # runpy warns of a module that it runs and that is there already
-    runpy.run_module(job.words[0], run_name="__main__", alter_sys=True)
+    _become(*job)
+    module = job[0][0]
+    if not hasattr(sys.modules.get(module), "__path__"):
+        sys.modules.pop(module, None)  # runpy warns of a module that it runs and that is there already
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
 
 
 def _serve(control: socket.socket) -> _Job | None:
@@ -66,7 +63,6 @@ def _serve(control: socket.socket) -> _Job | None:
         data, files, _, _ = socket.recv_fds(control, LONGEST, 3)
         if not data:
             return None
-        job = _Job(json.loads(data), tuple(files))
         threads = sum(1 for _ in Path("/proc/self/task").iterdir())
         if threads > 1:
             answer: dict[str, object] = {
@@ -75,7 +71,7 @@ def _serve(control: socket.socket) -> _Job | None:
         else:
             forked = _fork_twice()
             if forked is None:
-                return job
+                return json.loads(data), files
             answer = {"pid": forked}
         for file in files:
             os.close(file)
@@ -101,13 +97,14 @@ def _fork_twice() -> int | None:
     return pid
 
 
-def _become(job: _Job) -> None:
+def _become(words: list[str], files: list[int]) -> None:
+    """Take over the standard files, and the look of a process that was started for this job."""
     os.setsid()
-    for number, file in enumerate(job.files):
+    for number, file in enumerate(files):
         os.dup2(file, number)
         os.close(file)
-    sys.argv = [sys.argv[0], *job.words[1:]]  # runpy sets the first
-    _show(f"{sys.executable} -P -m {' '.join(job.words)}")
+    sys.argv = [sys.argv[0], *words[1:]]  # runpy sets the first
+    _show(f"{sys.executable} -P -m {' '.join(words)}")
 
 
 def _show(line: str) -> None:

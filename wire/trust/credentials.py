@@ -67,16 +67,6 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         return f"{self.role}:{self.name}" if number == 1 else f"{self.role}:{self.name}:{number}"
 
 
-def with_inverters(members: Iterable[Member], inverters: Iterable[str]) -> tuple[Member, ...]:
-    """Return the members, and an agent for each inverter that is not among them.
-
-    The site may issue its certificate during the run: until then nobody can be it.
-    """
-    known = tuple(members)
-    names = {member.name for member in known}
-    return (*known, *(Member(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names))
-
-
 Flow = Literal["ingress", "egress"]
 
 _FORWARD = {"publication": ("put",), "queryable": ("declare_queryable", "reply"), "token": ("liveliness_token",)}
@@ -131,6 +121,7 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
 
 
 def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
+    """Return what a process allows on a link whose other end has the certificate of a member."""
     return tuple(_rules(own, other, star=star))
 
 
@@ -185,7 +176,9 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
 
     def knowing(self, inverters: tuple[str, ...]) -> Credentials:
         """Return the same with an agent for each of these inverters: their certificates may come during the run."""
-        return msgspec.structs.replace(self, members=with_inverters(self.members, inverters))
+        names = {member.name for member in self.members}
+        later = tuple(Member(name=name, role="agent") for name in dict.fromkeys(inverters) if name not in names)
+        return msgspec.structs.replace(self, members=self.members + later)
 
     def common_names(self, sender: str) -> frozenset[str]:
         """Return the common names that a sender of messages may have, the plant or an agent."""

@@ -13,9 +13,8 @@ from gridpeers.papers.singhal2022.experiments.degraded_communication_experiment 
 from gridpeers.papers.singhal2022.experiments.experiment_data import CaseData, SweepData
 from gridpeers.papers.singhal2022.experiments.experiment_output import ExperimentResult
 from gridpeers.papers.singhal2022.experiments.hostile_experiment import hostile
-from gridpeers.papers.singhal2022.experiments.link_experiments import communication, delay, loss, topology
+from gridpeers.papers.singhal2022.experiments.link_experiments import communication, delay, loss, places, topology
 from gridpeers.papers.singhal2022.experiments.outage_experiments import flapping, partition
-from gridpeers.papers.singhal2022.experiments.places_experiment import places
 
 
 @dataclass(frozen=True)

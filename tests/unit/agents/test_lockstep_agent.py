@@ -114,10 +114,10 @@ def test_of_two_processes_of_a_name_the_one_on_the_roster_speaks() -> None:
     lab.answer("inv2", "late", epoch=9, P_rated=1.0)
 
     assert lab.take()[-2:] == [("ready", "0"), ("ask", "late")]
-    assert lab.node.admission.epoch("inv2") == 5
+    assert lab.node.admission.epochs.get("inv2") == 5
     lab.token("inv2", "late", gone=True)
     lab.token("inv2", "early", gone=True)
-    assert lab.node.admission.epoch("inv2") == 5
+    assert lab.node.admission.epochs.get("inv2") == 5
 
 
 def test_a_prepare_that_comes_again_is_answered_again() -> None:

@@ -17,7 +17,7 @@ from gridpeers.plant.plant_config import GflParameters, GfmParameters, Protectio
 from gridpeers.scenarios.reference import TOPICS, field_docs, page
 from gridpeers.scenarios.schema.scenario_model import Case, Event, PlantTable, Processes, ScenarioModel, Time
 from gridpeers.wire import keys, messages
-from gridpeers.wire.schema.table_schema import fields_of
+from gridpeers.wire.schema.table_schema import NamedTables, fields_of
 
 DOCS = Path(__file__).parents[3] / "docs"
 TABLES: tuple[type[msgspec.Struct], ...] = (
@@ -64,6 +64,9 @@ def test_every_key_of_a_scenario_is_on_its_page() -> None:
             if key == "own":
                 key = '"mine:Name"'
             if field.type is Netem:  # written as the entries, which have sections of their own
+                continue
+            if named := field.mark(NamedTables):
+                assert all(f"## [plant.{name}]" in text for name in named.known())
                 continue
             assert any(form in text for form in (f"`{key}`", f"[{key}", f".{key}]", f".{key}.")), (cls, key)
 

@@ -111,7 +111,7 @@ def test_the_command_keeps_every_run_with_its_seed_and_schedule(elsewhere: Path)
 
     assert {code for code, _ in ended.values()} <= {0, 1}
     assert ended["one"][1].startswith("small, case IV: first a run without disturbances ...\n")
-    assert "violates nothing; next 2 runs with disturbances, one after another ...\nsmall, 0 of 2" in ended["one"][1]
+    assert "violates nothing; next 2 runs with disturbances, 1 at a time ...\nsmall, 0 of 2" in ended["one"][1]
     assert ended["one"][1].endswith("\n\nResults: one/\n")
     assert [row["seed"] for row in one] == [str(3_000_000 + i) for i in range(2)]
     assert [len(json.loads(row["schedule"])) for row in one] == [int(row["disturbances"]) for row in one]

@@ -8,7 +8,8 @@ from math import ceil
 import numpy as np
 import pytest
 
-from gridpeers.lab.predict.robustness import robustness
+import gridpeers as gp
+from gridpeers.lab.predict.robustness import robustness, robustness_notes
 from tests.unit.lab.predict.predicted_graphs import inverters
 
 
@@ -62,3 +63,22 @@ def test_known_graphs() -> None:
     }
     assert robustness(np.zeros((3, 3))).least == 0
     assert robustness(np.ones((9, 9))).F == 2
+
+
+def notes(law: dict[str, object], graph: str) -> list[str]:
+    """Return what is said of islanding IV with another law and graph."""
+    scenario = gp.load("islanding").replace({"case.IV.law": law, "case.IV.graph": graph, "paper": ""})
+    return list(robustness_notes(scenario.spec, scenario.feeder))
+
+
+def test_a_graph_that_does_not_bear_F_is_named() -> None:
+    """Nine agents: a full graph (r 5) bears F = 2, a ring (r 1 or 2) none; without F nothing is said."""
+    (said,) = notes({"use": "resilient", "F": 3}, "full")
+    assert said.startswith(
+        "case IV: W-MSR with F = 3 asks for a graph with r 7, and this one has r 5: even without liars"
+    )
+    assert said.endswith("take more links, or F = 2 (docs/hostile.md)")
+    assert notes({"use": "resilient", "F": 2}, "full") == []
+    assert len(notes({"use": "resilient"}, "ring")) == 1  # F is 1 unless said
+    assert notes({"use": "resilient", "F": 0, "tolerance": 0.1}, "ring") == []
+    assert notes({"use": "consensus"}, "ring") == []

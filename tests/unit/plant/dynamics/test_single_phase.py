@@ -33,14 +33,13 @@ def pair_of(phases: int, load: float) -> Circuit:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("phase", ["B", "C"])
 @pytest.mark.parametrize(
-    ("gfm", "gfl"),
+    ("gfm", "gfl", "phase"),
     [
-        (GFM_D, GFL_ON),
-        (REGFM_A1, changed(GFL_ON, model="current_source")),
-        (changed(REGFM_A1, voltage_control=False), changed(GFL_ON, mode="balanced_power")),
-        (changed(GFM_D, I_max=0.9), GFL_D),
+        (GFM_D, GFL_ON, "B"),
+        (REGFM_A1, changed(GFL_ON, model="current_source"), "C"),
+        (changed(REGFM_A1, voltage_control=False), changed(GFL_ON, mode="balanced_power"), "B"),
+        (changed(GFM_D, I_max=0.9), GFL_D, "C"),
     ],
     ids=["GFM, GFL", "REGFM_A1, current source", "VFlag 0, balanced power", "current limit"],
 )

@@ -11,7 +11,6 @@ from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import live_network
 from gridpeers.plant.dynamics.circuit import Circuit
-from gridpeers.plant.dynamics.live_network import KEPT
 from gridpeers.plant.equipment.named_loads import named_loads, set_power, with_powers
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.switchboard import LoadBoard
@@ -282,8 +281,9 @@ def test_the_network_of_an_event_to_come_is_factored_at_the_start(monkeypatch: p
     assert [event.t for event in p.take_events() if event.kind == "switch"] == [2.0]
 
 
-def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory() -> None:
+def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     """In a run of hours people may set thousands: the plant keeps the circuits of the last few."""
+    monkeypatch.setattr(live_network, "KEPT", 4)
     p = plant()
 
     def circuits(numbers: range) -> int:
@@ -293,5 +293,5 @@ def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory() -> None:
         gc.collect()
         return sum(type(it) is Circuit for it in gc.get_objects())
 
-    few = circuits(range(1, KEPT + 2))
-    assert circuits(range(KEPT + 2, KEPT + 10)) == few
+    few = circuits(range(1, 6))
+    assert circuits(range(6, 10)) == few
