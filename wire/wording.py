@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from importlib.util import find_spec
 from traceback import walk_tb
@@ -145,7 +146,7 @@ def not_importable(error: ImportError) -> str:
 
 
 def requirement(module: str) -> str:
-    """Return what pip is to install for a package: its version of ours, or the first extra of gridpeers that has it.
+    """Return what pip is to install for a package: its version of ours, or the smallest extra that has it.
 
     Examples
     --------
@@ -159,9 +160,15 @@ def requirement(module: str) -> str:
         required = metadata.requires("gridpeers") or []
     except metadata.PackageNotFoundError:  # run from its sources
         required = []
+    extras: list[str] = []
     for text in required:
         spec, _, marker = text.partition(";")
         if re.split(r"[\[<>=~! ]", spec)[0].lower() == package.partition(" ")[0].lower():
             extra = re.search(r"extra == [\"']([\w-]+)", marker)
-            return f"'gridpeers[{extra[1]}]'" if extra else f"'{spec.strip()}'"
+            if extra is None:
+                return f"'{spec.strip()}'"
+            extras.append(extra[1])
+    if extras:
+        sizes = Counter(re.findall(r"extra == [\"']([\w-]+)", " ".join(required)))
+        return f"'gridpeers[{min(extras, key=sizes.__getitem__)}]'"
     return package
