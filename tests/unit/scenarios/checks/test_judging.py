@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 from collections.abc import Callable, Iterator
 from itertools import count
 from pathlib import Path
@@ -116,19 +115,6 @@ def test_what_a_check_has_yielded_counts_whatever_it_raises_then(
     assert (found.status, found.count, [it.agent for it in found.violations]) == ("failed", 2, ["inv2", "inv3"])
     assert found.reason == said
     assert found.sentence == f"mine failed: late: inv2, and 1 more; {said}"
-
-
-def test_what_a_check_puts_in_place_of_the_output_is_gone_when_it_returns(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """The verdict and all that is printed after a check comes where the user reads it."""
-
-    def check(case: CheckedCase) -> Iterator[Violation]:
-        sys.stdout = sys.stderr = 3  # type: ignore[assignment]
-        yield Violation(text="late")
-
-    print(judged(check, monkeypatch).violations[0].text)
-    assert capsys.readouterr().out == "late\n"
 
 
 def test_a_verdict_counts_all_violations_and_keeps_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
