@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
@@ -77,7 +78,9 @@ def test_a_law_that_fails_violates_its_check(elsewhere: Path) -> None:
         assert "ends" not in violated
 
 
-def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(elsewhere: Path) -> None:
+def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(
+    elsewhere: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """No path of this machine is in its file: in another place it loads what stands beside it there."""
     study = elsewhere / "here" / "study"
     shutil.copytree(DATA / "microgrid123", study / "feeder")
@@ -94,6 +97,8 @@ def test_a_failure_can_be_moved_with_the_law_check_and_feeder_that_it_names(else
     kept = [line for line in file.read_text().splitlines() if not line.startswith("#")]
     assert str(elsewhere) not in "\n".join(kept)
     shutil.copytree(elsewhere / "here", elsewhere / "there")
+    monkeypatch.delitem(sys.modules, "breaks")  # as in another process
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if str(elsewhere) not in path])
     moved, _ = load_scenario(elsewhere / "there" / file.relative_to(elsewhere / "here"))
     there = str(elsewhere / "there" / "study")
     assert moved.law == {"use": "breaks:Breaks", "folder": there}
