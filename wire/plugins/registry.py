@@ -190,7 +190,8 @@ class Registry(Generic[T]):
     def _module(self, name: str, reference: str, folder: str) -> Any:
         top = name.partition(".")[0]
         meant = PathFinder.find_spec(top, [folder]) if folder else None
-        if meant is not None and folder not in sys.path:
+        there = PathFinder.find_spec(top)  # also where a session runs, which its path has as ""
+        if meant is not None and (there is None or there.origin != meant.origin):
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
             _folders.add(folder)
         try:
