@@ -14,6 +14,7 @@ def test_a_saved_record_says_the_same_as_ever(command: tuple[str, ...]) -> None:
     name, *words = command
 
     code, text = invoke(name, str(RECORD), *words)
+    text = "".join(line for line in text.splitlines(keepends=True) if not line.startswith("still at work"))  # if slow
 
     assert text == SAID[command].read_text(encoding="utf-8")
     assert code == 0

@@ -96,7 +96,7 @@ def test_a_late_answer_of_a_busy_plant_is_neither_used_nor_told() -> None:
     assert None not in asked
     assert it.taken == [telemetry(0), telemetry(1)]
     assert not it.core.rejects.counts
-    assert not it.core.rejects.has_lines
+    assert it.core.rejects.take_lines() == ()
 
 
 def test_plants_that_have_gone_keep_no_place() -> None:
