@@ -263,7 +263,7 @@ from pathlib import Path
 import msgspec
 from gridpeers.scenarios.drivers.process_driver import run_processes
 from tests.toy.toy_configs import toy_configs
-plant, agents = toy_configs(12, end=30.0)
+plant, agents = toy_configs(12, end=60.0)
 rows = []
 def take(telemetry):
     rows.extend(telemetry.rows)
@@ -292,7 +292,7 @@ def test_the_plant_waits_for_a_command_that_stands_still(tmp_path: Path) -> None
         last = recorder.stdout.read().splitlines()[-1]
     rows: Rows = []
     run_inprocess(
-        *toy_configs(12, end=30.0), lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(toy_configs(12)[0])
+        *toy_configs(12, end=60.0), lambda telemetry: rows.extend(telemetry.rows), plant=ToyPlant(toy_configs(12)[0])
     )
 
     waiting = decode(events[0][2])
