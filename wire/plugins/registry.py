@@ -190,8 +190,7 @@ class Registry(Generic[T]):
     def _module(self, name: str, reference: str, folder: str) -> Any:
         top = name.partition(".")[0]
         meant = PathFinder.find_spec(top, [folder]) if folder else None
-        there = PathFinder.find_spec(top)  # also where a session runs, which its path has as ""
-        if meant is not None and (there is None or there.origin != meant.origin):
+        if meant is not None and folder not in sys.path and not _finds(meant):
             sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
             _folders.add(folder)
         try:
@@ -217,6 +216,12 @@ class Registry(Generic[T]):
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
+
+
+def _finds(meant: ModuleSpec) -> bool:
+    """Return whether Python's path leads to this module: a session has the folder where it runs there, as ""."""
+    there = PathFinder.find_spec(meant.name)
+    return there is not None and there.origin == meant.origin
 
 
 def _is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
