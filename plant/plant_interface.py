@@ -86,3 +86,18 @@ class LivePlant(PlantLike, Protocol):
         Raise ValueError if there is no such load, if a number makes no sense, or if loads cannot be set here.
         """
         ...
+
+
+class RecordedPlant:
+    """The rows and events of a plant, kept until they are taken: `take_rows` and `take_events` of `PlantLike`."""
+
+    _rows: list[tuple[float, ...]]
+    _events: list[PlantEvent]
+
+    def take_rows(self) -> tuple[tuple[float, ...], ...]:
+        rows, self._rows = tuple(self._rows), []
+        return rows
+
+    def take_events(self) -> tuple[PlantEvent, ...]:
+        events, self._events = tuple(self._events), []
+        return events

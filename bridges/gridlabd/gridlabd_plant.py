@@ -22,7 +22,7 @@ from gridpeers.plant.feeder.protection import Relays
 from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
-from gridpeers.plant.plant_interface import Reading
+from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.plant.tables.read import DATA
 from gridpeers.wire.messages import LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
@@ -104,7 +104,7 @@ REST = 0.5
 """Time (s) that GridLAB-D rests before t = 0, holding the set-points of the start: its own equilibrium, not ours."""
 
 
-class GridlabdPlant:
+class GridlabdPlant(RecordedPlant):
     """A plant with GridLAB-D's numbers, controlled by the same agents (`gridpeers.plant.plant_interface.PlantLike`).
 
     GridLAB-D's initialisation takes the powers of the inverters and chooses set-points that give them; a scenario gives
@@ -246,14 +246,6 @@ class GridlabdPlant:
             self._watch(stop, steps)
             step = stop
         self.tick += 1
-
-    def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        rows, self._rows = tuple(self._rows), []
-        return rows
-
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        events, self._events = tuple(self._events), []
-        return events
 
     def _time(self, step: int) -> float:
         """Return the time of a step (s)."""

@@ -15,7 +15,7 @@ from gridpeers.bridges.helics.helics_simulator import settings_of
 from gridpeers.bridges.helics.topics import ACT, SENSORS, Value, number
 from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import LivePlant, Reading
+from gridpeers.plant.plant_interface import LivePlant, Reading, RecordedPlant
 from gridpeers.wire.bounds import NAME
 from gridpeers.wire.codec import decode_foreign
 from gridpeers.wire.messages import LoadSetting, PlantEvent
@@ -26,7 +26,7 @@ SHOWN = 4
 """Topics that an error names."""
 
 
-class HelicsPlant:
+class HelicsPlant(RecordedPlant):
     """The plant's side of our agents, and a controller in the federation.
 
     At record time t it asks for t + `ACT` and reads what was published until t; at a tick it publishes there the
@@ -118,14 +118,6 @@ class HelicsPlant:
             raise
         self.tick += 1
 
-    def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        rows, self._rows = tuple(self._rows), []
-        return rows
-
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        events, self._events = tuple(self._events), []
-        return events
-
     def close(self) -> None:
         """Leave the federation, or end it if the run has not reached its end."""
         if self.tick == self._end_tick:
@@ -182,7 +174,7 @@ class HelicsPlant:
 _COLUMNS = len(SENSORS) + len(topics.HELD)
 
 
-class BridgedPlant:
+class BridgedPlant(RecordedPlant):
     """A plant whose inverters without an agent of ours follow set-points of outside federates.
 
     At each record time t it publishes what it has at t. It asks for the first record time after a tick before it
@@ -264,14 +256,6 @@ class BridgedPlant:
         for row, following in pairwise(rows):
             self._take(self._federate.step(self._row(row), following[0], needed=False))
         self._outgoing = self._measured(self._plant.measure()) | self._as_value(events)
-
-    def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        rows, self._rows = tuple(self._rows), []
-        return rows
-
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        events, self._events = tuple(self._events), []
-        return events
 
     def close(self) -> None:
         """Publish the last values and leave; end the federation if the run has not reached its end."""

@@ -21,7 +21,7 @@ from gridpeers.plant.feeder.switchboard import LoadBoard, Switchboard
 from gridpeers.plant.feeder.synchronism import Closings, Difference, Synchronism
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings, PowerLimit
-from gridpeers.plant.plant_interface import Reading
+from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.wire.messages import OFF, LoadSetting, PlantEvent
 from gridpeers.wire.timing import time_of
 
@@ -53,7 +53,7 @@ def installed_inverters(network: Network, settings: PlantSettings) -> tuple[Inve
     )
 
 
-class Plant:
+class Plant(RecordedPlant):
     """The feeder with its inverters, advanced by control periods.
 
     `T_c`: control period (s), a multiple of `settings.h`; `record_step`: distance of the recorded rows (s), a multiple
@@ -228,16 +228,6 @@ class Plant:
             self._events += self._load_limits.report(self._time(last), self._dynamics.network.V_branch)
         self.tick += 1
         self._t = time_of(self.tick, self._T_c)
-
-    # ---------------------------------------------------------------- for the recorder
-
-    def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        rows, self._rows = tuple(self._rows), []
-        return rows
-
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        events, self._events = tuple(self._events), []
-        return events
 
     def close(self) -> None:
         """Do nothing: all of this plant is in this process."""

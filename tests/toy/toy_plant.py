@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 
 from gridpeers.plant.plant_config import PlantConfig
-from gridpeers.plant.plant_interface import Reading
+from gridpeers.plant.plant_interface import Reading, RecordedPlant
 from gridpeers.plant.plant_process import run_plant
 from gridpeers.scenarios.emulation.emulated_links import links_of
 from gridpeers.wire.driver.process import main
@@ -22,7 +22,7 @@ ISLANDING = 0.1
 """Time (s) at which the grid is lost."""
 
 
-class ToyPlant:
+class ToyPlant(RecordedPlant):
     """Equal inverters on one bus: e = m_p (mean P_set - load), p = P_set - e/m_p, q = 20 (V_set - mean V_set), pu."""
 
     def __init__(self, config: PlantConfig) -> None:
@@ -104,16 +104,6 @@ class ToyPlant:
             (self._off.discard if on else self._off.add)(name)
             text = f"{name} {'connected' if on else 'disconnected'}"
             self._events.append(PlantEvent(t=self._t, kind="inverter", subject=name, text=text))
-
-    def take_rows(self) -> tuple[tuple[float, ...], ...]:
-        """Rows since last taken."""
-        rows, self._rows = tuple(self._rows), []
-        return rows
-
-    def take_events(self) -> tuple[PlantEvent, ...]:
-        """Events since last taken."""
-        events, self._events = tuple(self._events), []
-        return events
 
     def close(self) -> None:
         """Nothing of it is elsewhere."""
