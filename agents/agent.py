@@ -129,10 +129,10 @@ class Agent:
         self.weighs_alike = self._weights.all_count
         """Whether every state has the weight 1, whatever its age."""
         self.notes_arrivals = self._weights.ages_count
-        """Whether it matters when a state arrives: else a state on the board is as good as one that was heard."""
+        """True if the arrival times of states are needed; otherwise the agent reads them from the shared board."""
         self._silent_at_most = SIGN_OF_LIFE * (options.max_age or (config.max_age if config.clock == "wall" else inf))
         self.watches_saturation = options.anti_windup == "conditional"
-        """Whether the sides on which its inverter is saturated count."""
+        """True if the law is told at which limits the own inverter is saturated."""
         self._islands_from_switches = options.islands == "switches"
         self._detector = IslandDetector(config.f_nom, options.slip_max) if options.islands == "frequency" else None
         self._saturation_P, self._saturation_V = SaturationDetector(options.T_sat), SaturationDetector(options.T_sat)

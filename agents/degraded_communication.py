@@ -46,7 +46,7 @@ class StalenessWeights:
         self.ages_count = self._stale != "hold"
         """Whether a weight depends on when states arrived."""
         self.all_count = not self.ages_count and self._max_age == inf
-        """Whether every state has the weight 1, whatever its age."""
+        """True if each state weighs 1 at any age."""
         self._fresh: set[str] = set()
         """Neighbours with a new state since the last tick."""
         self._usual: dict[str, deque[float]] = {}
@@ -227,7 +227,7 @@ class IslandDetector:
             pair.compare((self._since, angle.since), t, own - angle.cycles)
 
     def apart(self, name: str, t: float) -> bool:
-        """Whether a neighbour counts as in another island at t (s of run time)."""
+        """Return whether the agent takes a neighbour to be in another island at t (s of run time)."""
         pair = self._pairs.get(name)
         if pair is None:
             return False

@@ -226,7 +226,7 @@ def rule_of(control: Control) -> Graph:
 
 
 def is_pairwise(control: Control) -> bool:
-    """Whether a pair's link depends on the two alone, so that it can be made before the roster is known."""
+    """Return whether two agents can tell if they are linked before they know the others."""
     return control.own_graph is None and control.graph != "ring"
 
 

@@ -67,7 +67,7 @@ class Role(msgspec.Struct, frozen=True):
     credentials: Credentials | None = None
     """Certificate of the process; None: links are open."""
     rules: bool = True
-    """Whether the session has access rules beside its certificate."""
+    """True if the session has access rules beside its certificate."""
 
 
 class TlsAlone(Credentials, frozen=True):

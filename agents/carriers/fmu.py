@@ -86,7 +86,7 @@ def fmu_problems(path: Path, parameters: Mapping[str, Any]) -> list[tuple[str, s
 
 
 def is_fmi3(description: Any) -> bool:
-    """Whether an FMU is one of FMI 3, which has other names for types and functions than FMI 2."""
+    """Return whether an FMU follows FMI 3, which names types and functions differently from FMI 2."""
     return str(description.fmiVersion).startswith("3")
 
 

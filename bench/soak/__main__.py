@@ -57,7 +57,7 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.disturbing = False
-        """Whether a disturbance is under way; the first signal then waits for its end."""
+        """True while a disturbance lasts; the first signal then waits for its end."""
         self.asked: signal.Signals | None = None
         """The signal that asked for it."""
 

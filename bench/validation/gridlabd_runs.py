@@ -57,11 +57,11 @@ class ComparedRun(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     reclosing: Reclosing | None = None
     """Instead of events."""
     single_phase: bool = False
-    """Whether the inverters of `ON_ONE_PHASE` are added."""
+    """True if the inverters of `ON_ONE_PHASE` are added."""
     tolerance: float = 1e-8
     """Largest difference (Hz, pu) that passes."""
     in_tests: bool = True
-    """Whether the tests have it too: their time has to do for all parts."""
+    """True if the tests make this run too; they have time for some of them only."""
 
     @property
     def closed_loop(self) -> bool:

@@ -120,7 +120,7 @@ class ModelCore(GridlabdCore):
         return head
 
     def has(self, name: str, key: str) -> bool:
-        """Whether an object has a property."""
+        """Return whether an object has a property."""
         return bool(self._library.object_get_addr(self.find(name.encode()), key.encode()))
 
     def object_of(self, name: str, key: str) -> str:
