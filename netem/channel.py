@@ -20,15 +20,12 @@ from gridpeers.netem.schema.pattern import Link
 from gridpeers.wire.plugins.plugin import Plugin
 
 NEVER = -math.inf
-"""A time that no message has."""
 
 FOREVER = math.inf
 """The delay of a message that nothing will ever let go."""
 
 
 class Fate(NamedTuple):
-    """The fate of a message."""
-
     deliveries: tuple[tuple[float, int | None], ...] = ()
     """Of each copy the delay (s since it was sent; infinite while a cut without an end keeps it) and the bit that is
     flipped, None if none is."""
@@ -40,7 +37,6 @@ class Fate(NamedTuple):
 
 
 DROPPED = {reason: Fate((), reason) for reason in (*GATES, "loss", DROPPED_BY_OWN, "queue")}
-"""Fates of dropped messages, made once."""
 
 
 class Channel:
@@ -65,7 +61,6 @@ class Channel:
         self._busy_until = self._last = NEVER
         """Until when the line of finite rate sends, and the latest arrival so far (s of run time)."""
         self._before_hold: tuple[float, float] | None = None
-        """The two as they were before the messages that a cut keeps."""
         self._samplers: dict[Span, Callable[..., Any]] = {}
         self._from, self._to = math.inf, -math.inf
         self.failures: list[str] = []
@@ -139,7 +134,6 @@ class Channel:
         return (first, (delay + self._extra_delay, None if bit is None else bit(seq, 1, size)))
 
     def _enter(self, t: float) -> None:
-        """Prepare the faults that act at time t, until the next change."""
         self._from, self._to, active = self.schedule.at(t)
         self._gated = any(kind in active for kind in GATES)
         if not self._gated:

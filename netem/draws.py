@@ -87,7 +87,6 @@ class Chain(Generic[S]):
         self._state = first(0)
 
     def at(self, seq: int) -> S:
-        """Return the state at message `seq`."""
         start = seq - seq % RESTART
         if not start <= self._seq <= seq:
             self._seq, self._state = start, self._first(start)

@@ -26,14 +26,9 @@ GATES = (*CUTS, "flap")
 
 
 class Segment(NamedTuple):
-    """A stretch of time in which the same entries hold."""
-
     from_s: float
-    """Its beginning (s of run time), early by an instant."""
     to_s: float
-    """Its end (s), early by an instant."""
     active: dict[str, Span]
-    """The entry that holds, by kind."""
 
 
 class FaultSchedule:
@@ -47,7 +42,6 @@ class FaultSchedule:
         self.spans = tuple(span for span in spans if span.to_s > span.from_s)
 
     def at(self, t: float) -> Segment:
-        """Return the entries that hold at time t (s)."""
         now = t + INSTANT
         bounds = [bound for span in self.spans for bound in (span.from_s, span.to_s)]
         return Segment(
@@ -121,9 +115,7 @@ class Heal(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """Faults end on some links: those that hold at `from_s`; what a scenario has for later still comes."""
 
     on: str
-    """Which links; see `gridpeers.netem.schema.pattern`."""
     from_s: float
-    """From when on (s of run time)."""
     kinds: tuple[str, ...] = ()
     """Kinds that end, e.g. ("cut",); empty is all."""
 
@@ -168,7 +160,6 @@ class Horizon:
 
     def __init__(self) -> None:
         self._latest = -math.inf
-        """Latest time of a change so far (s)."""
 
     def after(self, change: Change) -> float:
         """Return it (s of run time) after one more change."""
@@ -202,11 +193,9 @@ class LinkSchedules:
 
     @cached_property
     def _schedules(self) -> dict[Link, FaultSchedule]:
-        """Schedule of each link, once one is asked for: most runs have no live changes."""
         return {link: schedule_of(link, self._netem, (), self._microgrids) for link in links_among(self._microgrids)}
 
     def apply(self, change: Change) -> None:
-        """Take up a change."""
         over = self._horizon.after(change)
         for link, before in self._schedules.items():
             self._schedules[link] = without_old(changed(before, change, link, self._microgrids), over)
@@ -243,7 +232,6 @@ def _about(link: Link, changes: Sequence[Change], microgrids: Mapping[str, str])
 
 
 def _entry(span: Span) -> dict[str, Any]:
-    """Return the key and value of an entry for one fault."""
     if isinstance(span.model, Plugin):
         return {"own": (span.model,)}
     return {"cut" if span.kind == "partition" else span.kind: span.model}

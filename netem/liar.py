@@ -15,19 +15,12 @@ from gridpeers.wire.messages import PLANT, State
 
 
 class LieTime(NamedTuple):
-    """A lie, and when it is told."""
-
     since: float
-    """From when (s of run time)."""
     until: float
-    """Until when (s); that instant is not included."""
     liar: str
-    """Name of the agent that lies."""
     lie: Lie
-    """How."""
 
     def holds(self, t: float) -> bool:
-        """Return whether it is told at t (s)."""
         return self.since - INSTANT <= t < self.until - INSTANT
 
 
@@ -61,7 +54,6 @@ class HeardFrom:
     def __init__(self, seed: int, sender: str, receiver: str, lies: Iterable[LieTime]) -> None:
         self._seed, self._sender, self._receiver = seed, sender, receiver
         self.lies = tuple(lies)
-        """All lies that are ever told."""
         self._streams: dict[tuple[str, bool, str], Stream] = {}
 
     def told(self, state: State, before: Before) -> State:
@@ -110,7 +102,6 @@ class LiveHearing:
 
     @property
     def remembered(self) -> int:
-        """Number of true states that are kept."""
         return len(self._states)
 
     def told(self, state: State) -> State:

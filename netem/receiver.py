@@ -30,8 +30,6 @@ NANO = 1e9
 
 
 class _Special(NamedTuple):
-    """Data that few messages on their way have."""
-
     copy: int
     bit: int | None
     checksum: bool
@@ -41,7 +39,6 @@ class _Special(NamedTuple):
 
 
 _Content = tuple[bytes, AnyMessage | None]
-"""A message as it came, and decoded."""
 
 _Waiting = tuple[float, int, str, int, _Content, float, _Special | None]
 """A copy of a message on its way: when it arrives (ns of run time), its number and sender, a number of its own so that
@@ -49,8 +46,6 @@ no two are compared further, the message, its delay (s). A plain tuple, as it is
 
 
 class _Inbound:
-    """One link into this receiver."""
-
     __slots__ = ("channel", "due", "forgotten_from", "is_clear", "ledger", "story")
 
     def __init__(self, channel: Channel, *, keep: bool) -> None:
@@ -82,12 +77,10 @@ class Receiver:
         self.name = name
         self._netem, self._microgrids, self._keep = netem, dict(microgrids), keep_trace
         self.changes: list[Change] = []
-        """Live changes so far."""
         self._horizon = Horizon()
         self._links: dict[str, _Inbound] = {}
         self._heap: list[_Waiting] = []
         self._kept: list[_Waiting] = []
-        """Messages behind a cut without an end."""
         self._number = 0
 
     def meet(self, src: str, microgrid: str) -> None:
@@ -197,11 +190,9 @@ class Receiver:
 
     @property
     def dropped(self) -> int:
-        """Number of messages of all senders that are lost."""
         return sum(sum(inbound.ledger.dropped.values()) for inbound in self._links.values())
 
     def counts(self) -> dict[str, LinkCounts]:
-        """Return the counts of each sender's messages."""
         flying = [entry[2] for entry in (*self._heap, *self._kept)]
         return {src: inbound.ledger.counts(flying.count(src)) for src, inbound in sorted(self._links.items())}
 

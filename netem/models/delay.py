@@ -30,21 +30,16 @@ LONGEST_DELAY = 10.0
 """Delays above this (s) are taken for milliseconds by problem: control over such a link is not what netem is for."""
 
 DELAY = Plausible("a delay", 0.0, LONGEST_DELAY)
-"""Delay of one message (s)."""
 
 STANDARD = NormalDist()
-"""The standard normal law."""
 
 MOST_SHOWN = 5
 """Wrong delays of a trace that are named; a file in milliseconds has thousands."""
 
 Sampler = Callable[[int], float]
-"""From a message number to its delay (s)."""
 
 
 class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
-    """Base of all delays."""
-
     fifo: bool = False
     """Whether messages keep their order: one that would overtake arrives together with the one before it."""
 
@@ -54,8 +49,6 @@ class DelayModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 
 
 class RandomDelay(DelayModel, frozen=True, kw_only=True):
-    """Base of all random delays."""
-
     correlation: Annotated[float, Plausible("a correlation", 0.0, 0.999999, hint=in_percent)] = 0.0
     """phi of the AR(1) process behind the draws, from 0 (independent) to below 1."""
 
@@ -64,7 +57,6 @@ class RandomDelay(DelayModel, frozen=True, kw_only=True):
         raise NotImplementedError
 
     def sampler(self, stream: Stream) -> Sampler:
-        """Draw one delay from one number of the stream."""
         quantile = self.quantile
         if not self.correlation:
             uniform = stream.uniform
@@ -83,7 +75,6 @@ class Constant(DelayModel, frozen=True, kw_only=True, tag="constant"):
     """d (s)."""
 
     def sampler(self, stream: Stream) -> Sampler:
-        """Draw nothing."""
         delay_s = self.delay_s
         return lambda seq: delay_s
 
@@ -97,11 +88,9 @@ class Uniform(RandomDelay, frozen=True, kw_only=True, tag="uniform"):
     """Longest delay (s)."""
 
     def quantile(self, u: float) -> float:
-        """Return the delay (s) at share u."""
         return self.low_s + u * (self.high_s - self.low_s)
 
     def relations(self) -> list[Problem]:
-        """Return contradictions between its values."""
         problems = []
         if self.low_s >= self.high_s:
             text = f"{self.low_s:g} s must be below high_s = {self.high_s:g} s; swap them, or write one constant delay"
@@ -123,7 +112,6 @@ class Normal(RandomDelay, frozen=True, kw_only=True, tag="normal"):
     """sigma (s), standard deviation before the truncation: the jitter."""
 
     def quantile(self, u: float) -> float:
-        """Return the delay (s) at share u."""
         below = STANDARD.cdf(-self.mean_s / self.std_s)
         # from the upper side, where 1 - c is exact: c + u (1 - c) would round to 1 for u next to 1
         return max(self.mean_s - self.std_s * STANDARD.inv_cdf((1.0 - u) * (1.0 - below)), 0.0)
@@ -143,7 +131,6 @@ class Lognormal(RandomDelay, frozen=True, kw_only=True, tag="lognormal"):
     """d_0 (s): delay that every message has, e.g. propagation."""
 
     def quantile(self, u: float) -> float:
-        """Return the delay (s) at share u."""
         return self.offset_s + self.median_s * math.exp(self.sigma * STANDARD.inv_cdf(u))
 
 
@@ -163,7 +150,6 @@ class Pareto(RandomDelay, frozen=True, kw_only=True, tag="pareto"):
     """a: the smaller, the heavier the tail; 3 is a usual choice."""
 
     def quantile(self, u: float) -> float:
-        """Return the delay (s) at share u."""
         return self.minimum_s * float((1.0 - u) ** (-1.0 / self.shape))
 
 
@@ -182,7 +168,6 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
     """Whether each link starts at a place of its own, drawn once; else all links have the same delay at once."""
 
     def sampler(self, stream: Stream) -> Sampler:
-        """Draw where the link starts, once."""
         delays, start = self.delays_s, self.start(stream)
         return lambda seq: delays[(seq + start) % len(delays)]
 
@@ -191,7 +176,6 @@ class Trace(DelayModel, frozen=True, kw_only=True, tag="trace"):
         return stream.below(len(self.delays_s), 0) if self.spread else 0
 
     def relations(self) -> list[Problem]:
-        """Return the delays that cannot be meant, and whether there are none."""
         if not self.delays_s:
             return [] if self.file else [Problem("", 'a trace needs delays: write file = "delays.csv"')]
         wrong = [

@@ -42,8 +42,6 @@ Before = Callable[[float], State]
 
 
 class Lie(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
-    """Base of all lies."""
-
     in_name_of: Annotated[str, Example('"inv5"')] = ""
     """Another inverter, in whose name it lies: that one's states arrive falsified, its own are true. Empty: in its own.
     Certificates keep such a lie out (docs/security.md)."""
@@ -74,12 +72,10 @@ class Offset(Lie, frozen=True, kw_only=True, tag="offset"):
     """Added to the reactive power (var)."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with the offsets."""
         values = state.P_set + self.P_set_W, state.V_set + self.V_set_V, state.Q + self.Q_var
         return _with(state, dict(zip(QUANTITIES, values, strict=True)))
 
     def relations(self) -> list[Problem]:
-        """Return whether it is no lie."""
         return _no_lie(not (self.P_set_W or self.V_set_V or self.Q_var), "P_set_W, V_set_V or Q_var")
 
 
@@ -94,23 +90,18 @@ class Scale(Lie, frozen=True, kw_only=True, tag="scale"):
     """Factor of the reactive power."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with the factors."""
         values = state.P_set * self.P_set, state.V_set * self.V_set, state.Q * self.Q
         return _with(state, dict(zip(QUANTITIES, values, strict=True)))
 
     def relations(self) -> list[Problem]:
-        """Return whether it is no lie."""
         return _no_lie(self.P_set == self.V_set == self.Q == 1.0, "P_set, V_set or Q a factor other than 1")
 
 
 class _OfQuantities(Lie, frozen=True, kw_only=True):
-    """Base of lies that take the whole value."""
-
     of: tuple[Quantity, ...] = QUANTITIES
     """What the lie is about."""
 
     def relations(self) -> list[Problem]:
-        """Return whether it is no lie."""
         return [] if self.of else [Problem("of", 'names nothing; write of = ["P_set"], or leave it out for all')]
 
 
@@ -118,12 +109,10 @@ class Freeze(_OfQuantities, frozen=True, kw_only=True, tag="freeze"):
     """The values stay as they were before the lie began."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with the values of then."""
         return _from(state, before(since - 2.0 * INSTANT), self.of)
 
     @property
     def reach(self) -> float | None:
-        """It needs the last state before the lie."""
         return None
 
 
@@ -134,12 +123,10 @@ class Replay(_OfQuantities, frozen=True, kw_only=True, tag="replay"):
     """How long ago (s)."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with the values of then."""
         return _from(state, before(state.t - self.delay_s), self.of)
 
     @property
     def reach(self) -> float | None:
-        """It needs the states of that time."""
         return self.delay_s
 
 
@@ -156,7 +143,6 @@ class Random(Lie, frozen=True, kw_only=True, tag="random"):
     """Whether every neighbour hears another number; else all hear the same."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with noise."""
         widths = zip(QUANTITIES, (self.P_set_W, self.V_set_V, self.Q_var), strict=True)
         moved = {
             name: getattr(state, name) + (2.0 * draw(name).uniform(state.seq) - 1.0) * width
@@ -166,7 +152,6 @@ class Random(Lie, frozen=True, kw_only=True, tag="random"):
         return _with(state, moved)
 
     def relations(self) -> list[Problem]:
-        """Return whether it is no lie."""
         return _no_lie(not (self.P_set_W or self.V_set_V or self.Q_var), "P_set_W, V_set_V or Q_var")
 
 
@@ -177,7 +162,6 @@ class Extreme(_OfQuantities, frozen=True, kw_only=True, tag="extreme"):
     """Which of them; "alternate": one message high, the next low."""
 
     def told(self, state: State, since: float, before: Before, draw: Callable[[str], Stream]) -> State:
-        """Return the state with the bounds of its fields as values."""
         high = state.seq % 2 == 0 if self.side == "alternate" else self.side == "high"
         return replace(state, **{name: _BOUNDS[name][high] for name in self.of})
 

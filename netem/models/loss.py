@@ -17,15 +17,12 @@ from gridpeers.wire.schema.plausible import Probability
 from gridpeers.wire.schema.table_schema import Problem
 
 Lost = Callable[[int], bool]
-"""From a message number to whether that message is lost."""
 
 _STATE, _LOSS = 0, 1
 """Index of the draw that moves the chain, and of the one that decides in a state where not all or none is lost."""
 
 
 class LossModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="model"):
-    """Base of all losses."""
-
     @property
     def transitions(self) -> tuple[tuple[float, ...], ...]:
         """P: probability of state j at message n + 1 (column) given state i at message n (row)."""
@@ -79,21 +76,17 @@ class Bernoulli(LossModel, frozen=True, kw_only=True, tag="bernoulli"):
 
     @property
     def transitions(self) -> tuple[tuple[float, ...], ...]:
-        """The one state stays."""
         return ((1.0,),)
 
     @property
     def stationary(self) -> tuple[float, ...]:
-        """There is one state."""
         return (1.0,)
 
     @property
     def loss_in_state(self) -> tuple[float, ...]:
-        """Its probability of loss."""
         return (self.p,)
 
     def sampler(self, stream: Stream) -> Lost:
-        """Draw one number a message, without a chain."""
         uniform, p = stream.uniform, self.p
         return lambda seq: uniform(seq) < p
 
@@ -123,22 +116,18 @@ class GilbertElliott(LossModel, frozen=True, kw_only=True, tag="gilbert-elliott"
 
     @property
     def transitions(self) -> tuple[tuple[float, ...], ...]:
-        """Good, bad."""
         return ((1.0 - self.p, self.p), (self.r, 1.0 - self.r))
 
     @property
     def stationary(self) -> tuple[float, ...]:
-        """Good, bad."""
         bad = self.p / (self.p + self.r)
         return (1.0 - bad, bad)
 
     @property
     def loss_in_state(self) -> tuple[float, ...]:
-        """Good, bad."""
         return (self.loss_good, self.loss_bad)
 
     def relations(self) -> list[Problem]:
-        """Return contradictions between its values."""
         problems = []
         if self.loss_good > self.loss_bad:
             text = f"{self.loss_good:g} is above loss_bad = {self.loss_bad:g}; swap them: the bad state loses more"
@@ -175,7 +164,6 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
 
     @property
     def transitions(self) -> tuple[tuple[float, ...], ...]:
-        """States 1 to 4."""
         return (
             (1.0 - self.p13 - self.p14, 0.0, self.p13, self.p14),
             (0.0, 1.0 - self.p23, self.p23, 0.0),
@@ -185,18 +173,15 @@ class Markov(LossModel, frozen=True, kw_only=True, tag="markov"):
 
     @property
     def stationary(self) -> tuple[float, ...]:
-        """States 1 to 4."""
         burst = self.p13 / self.p31
         weights = (1.0, burst * self.p32 / self.p23, burst, self.p14)
         return tuple(weight / sum(weights) for weight in weights)
 
     @property
     def loss_in_state(self) -> tuple[float, ...]:
-        """States 1 to 4."""
         return (0.0, 0.0, 1.0, 1.0)
 
     def relations(self) -> list[Problem]:
-        """Return contradictions between its values."""
         problems = []
         for first, second in (("p13", "p14"), ("p31", "p32")):
             both = getattr(self, first) + getattr(self, second)

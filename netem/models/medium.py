@@ -40,7 +40,6 @@ class Flap(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
     """False: messages are lost while it is down, reason "flap". True: they are kept, and go on when it is up."""
 
     def down_until(self, t: float, from_s: float, to_s: float) -> float | None:
-        """Return until when the link is down at t (s of run time), None if it is up."""
         if not from_s <= t < to_s:
             return None
         period = self.up_s + self.down_s
@@ -112,7 +111,6 @@ class Slots(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return max(self.offset_s + (number + 1) * self.period_s, ready)
 
     def relations(self) -> list[Problem]:
-        """Return contradictions between its values."""
         problems = []
         for key in ("offset_s", "length_s"):
             value = getattr(self, key)
@@ -135,7 +133,6 @@ class Duplicate(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     """How much later the copy arrives (s)."""
 
     def sampler(self, stream: Stream) -> Callable[[int], bool]:
-        """Return, by message number, whether there is a copy."""
         uniform, p = stream.uniform, self.p
         return lambda seq: uniform(seq) < p
 
@@ -150,7 +147,6 @@ class Corrupt(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     False: the copy is handed on, and the receiver finds it by the message's own CRC-32: a reject, of kind "corrupt"."""
 
     def sampler(self, stream: Stream) -> Callable[[int, int, int], int | None]:
-        """Return the bit that is flipped by message number, copy and size (bytes), None if none is."""
         uniform, below, p = stream.uniform, stream.below, self.p
 
         def bit(seq: int, copy: int, size: int) -> int | None:

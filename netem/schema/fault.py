@@ -38,7 +38,6 @@ class Profile(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     """Faults of a kind of link."""
 
     title: str
-    """A few words."""
     source: str
     """Where each number comes from."""
     delay: AnyDelay | None = None
@@ -103,7 +102,6 @@ PROFILES: dict[str, Profile] = {
         loss=Bernoulli(p=0.01),
     ),
 }
-"""The profiles by name."""
 
 
 LONGEST_RUN = 86_400.0
@@ -130,12 +128,10 @@ class Span(NamedTuple):
 
 
 def _is_own(key: str) -> bool:
-    """Return whether a key names a fault of the user's own."""
     return ":" in key or key in FAULTS.names
 
 
 def _read_own(name: str, raw: Any, found: list[Problem]) -> tuple[Plugin, ...]:
-    """Convert the value under the name of a fault of the user's own: a table of its parameters, or true."""
     if raw is False:
         return ()
     table = {} if raw is True else raw
@@ -151,7 +147,6 @@ def _read_own(name: str, raw: Any, found: list[Problem]) -> tuple[Plugin, ...]:
 
 
 def _written_own(plugin: Plugin) -> tuple[str, dict[str, Any]]:
-    """Return the key and the table of a fault of the user's own."""
     return plugin.use, dict(plugin.parameters) | ({"folder": plugin.folder} if plugin.folder else {})
 
 
@@ -213,7 +208,6 @@ class Fault(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
         return found | {plugin.name: plugin for plugin in self.own}
 
     def spans(self, src: str, dst: str, microgrids: Mapping[str, str]) -> list[Span]:
-        """Return the faults of one link."""
         if not parse(self.on).matches(src, dst, microgrids):
             return []
         return [Span(kind, self.from_s, self.end, model) for kind, model in self.models().items()]

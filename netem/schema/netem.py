@@ -154,7 +154,6 @@ class Netem(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 def _in_one_name(one: NodeFault, other: NodeFault) -> bool:
-    """Return whether two agents lie in the name of the same third one."""
     return one.lies is not None and other.lies is not None and one.lies.in_name_of == other.lies.in_name_of != ""
 
 
@@ -174,7 +173,6 @@ def _overlap(from_s: float, to_s: float | None, other_from_s: float, other_to_s:
 
 
 def _contradict(one: Span, other: Span) -> bool:
-    """Return whether two faults contradict each other: two of one kind, or a cut with `hold` and one without."""
     if not _overlap(one.from_s, one.to_s, other.from_s, other.to_s):
         return False
     if "partition" in (one.kind, other.kind):

@@ -20,22 +20,17 @@ class Link(NamedTuple):
     """A directed link; the plant is an end as the agents are."""
 
     src: str
-    """The sender."""
     dst: str
-    """The receiver, which judges the message."""
 
     def __str__(self) -> str:
         return f"{self.src} -> {self.dst}"
 
 
 class EndSet(NamedTuple):
-    """One end of a pattern."""
-
     names: tuple[str, ...]
     """Inverters, microgrids, "plant" or "*"."""
 
     def holds(self, name: str, microgrids: Mapping[str, str]) -> bool:
-        """Return whether an agent, or the plant, is on this side."""
         if name in self.names or (ANY in self.names and name != PLANT):
             return True
         microgrid = microgrids.get(name)
@@ -51,7 +46,6 @@ class Pattern(NamedTuple):
     """Whether it also means the links back."""
 
     def matches(self, src: str, dst: str, microgrids: Mapping[str, str]) -> bool:
-        """Return whether it means the link from `src` to `dst`, given the microgrid of every inverter."""
         if src == dst:
             return False
         if self.left.holds(src, microgrids) and self.right.holds(dst, microgrids):
@@ -143,6 +137,5 @@ def _one_end(text: str, name: str, others: str) -> str:
 
 
 def links_among(names: Iterable[str]) -> list[Link]:
-    """Return every directed link among inverters, and between each and the plant."""
     ends = [*names, PLANT]
     return [Link(src, dst) for src in ends for dst in ends if src != dst]
