@@ -19,8 +19,7 @@ from gridpeers.plant.tables import read_feeder
 def start_plant(config: PlantConfig) -> LivePlant:
     """Start the plant of the configuration's simulator; its `close` ends it.
 
-    FeederError if the feeder's tables have problems. RuntimeError if it cannot start; the message says why, and what to
-    do.
+    FeederError for bad tables; RuntimeError if it cannot start: it says why, and what to do.
     """
     if config.bridged:
         alone = replace(config, bridged=False)
@@ -31,10 +30,7 @@ def start_plant(config: PlantConfig) -> LivePlant:
 
 
 def build_plant(config: PlantConfig) -> Plant:
-    """Read the feeder, find the initial operating point of our own plant, and load its step.
-
-    FeederError if the feeder's tables have problems. PlantError if there is no operating point.
-    """
+    """Find the initial operating point of our own plant, and load its step; FeederError or PlantError if it cannot."""
     plant = plant_at_rest(config)
     plant.load_step()
     return plant
@@ -52,10 +48,7 @@ def _feeder(config: PlantConfig) -> Feeder:
 
 
 def load_kernels() -> None:
-    """Build and step a plant of the feeder that comes with gridpeers, unless its step would have to be compiled.
-
-    The first compilation takes up to a minute; it is for the plant's own process, which says that it compiles.
-    """
+    """Build and step a plant of our feeder, unless its step would have to be compiled, which takes up to a minute."""
     # a check compiles the operating point alone
     if not is_compiled(run_steps.__name__):
         return

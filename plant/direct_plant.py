@@ -12,10 +12,7 @@ from gridpeers.wire.messages import Journal, Measurement, State, Telemetry
 
 
 class DirectPlant(LockstepPlant):
-    """A plant whose agents all take part from t = 0 to the end, and which gets their states as they are.
-
-    `config`: names the agents, the control period and the end; without schedule and emulated links.
-    """
+    """A plant without schedule and emulated links, whose agents all take part to the end."""
 
     def __init__(
         self,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 LISTENING = "listening"  # its session is open
 
-COMPILING = "compiling"
-"""It is being built; its step is compiled first if there is no machine code of it, which takes up to a minute."""
+COMPILING = "compiling"  # it is being built; its step may be compiled first, which takes up to a minute
 
 READY = "ready"  # it waits for agents
 SUBSTATION = "substation"  # name of a substation that trips, in the text of the event, beside those of inverters

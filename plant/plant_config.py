@@ -50,13 +50,10 @@ class Protection(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 class SwitchEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A switch operated at a time of the scenario."""
 
-    t: float
-    """Time (s), a multiple of h."""
-    switch: str
-    """Name, e.g. "13-152" or "sw1_2"."""
+    t: float  # time (s), a multiple of h
+    switch: str  # name, e.g. "13-152" or "sw1_2"
     action: Literal["open", "close"]
-    synchronised: bool = False
-    """Whether a switch that would join two live islands waits until they are in step."""
+    synchronised: bool = False  # whether a switch that would join two live islands waits until they are in step
 
 
 class LoadEvent(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -104,16 +101,13 @@ class FeederChanges(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 Method = Literal["first-order", "second-order"]
-"""Method of time stepping: `gridpeers.plant.dynamics.kernel.step`, GridLAB-D's, or
-`gridpeers.plant.dynamics.kernel.second_order_step`."""
 
 
 class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
     """All settings that determine the plant's numbers; of older records, others are passed over."""
 
     simulator: str = "gridpeers"  # what simulates the plant: a name in `gridpeers.plant.simulators.SIMULATORS`
-    simulators: dict[str, dict[str, Any]] = {}
-    """Own table of each simulator that the scenario has, as a tree, by the simulator's name."""
+    simulators: dict[str, dict[str, Any]] = {}  # own table of each simulator that the scenario has, as a tree
     feeder: str = "microgrid123"  # name of a feeder in `plant/data`, or a path to a folder of the same layout
     load_set: str = "main"  # which load table of the feeder: "main" or "event2"
     h: float = 0.002  # integration step (s)
@@ -132,7 +126,6 @@ class PlantSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 OnLawFailure = Literal["droop", "stop"]
-"""What follows when a law fails: its inverter goes on on primary droop, or the run ends."""
 
 
 class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -143,20 +136,17 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     agents: tuple[str, ...]  # agents the plant waits for before tick 0
     agent_processes: int | msgspec.UnsetType = msgspec.UNSET
     """Processes that carry these agents, each with one link to the plant; unset, as in a record: one each."""
-    schedule: tuple[ScheduledAction, ...] = ()
-    """Scheduled joins, leaves and deaths; an agent that joins need not be among `agents`."""
+    schedule: tuple[ScheduledAction, ...] = ()  # an agent that joins need not be among `agents`
     bridged: str | bool = False
     """Simulator, e.g. "helics", by which inverters without an agent follow set-points of programs outside; False: none.
     Older records have True."""
     T_c: float  # control period (s), a multiple of h
-    end: float | None
-    """Duration of the run (s), a multiple of T_c; None, in wall-clock time only: until a person ends it."""
+    end: float | None  # duration of the run (s), a multiple of T_c; None, in wall-clock time: until a person ends it
     record_step: float  # distance of the recorded rows (s): a multiple of h that divides T_c
     deadline: float  # longest wait for any agent (s)
     listen: tuple[str, ...]  # endpoints the plant listens on; the rendezvous of the run
     links: dict[str, Any] = {}
-    """Emulated links to the plant: `gridpeers.scenarios.emulation.link_data`, a tree: the plant knows no netem.
-    Empty: none."""
+    """Emulated links to the plant (`gridpeers.scenarios.emulation.link_data`), a tree: the plant knows no netem."""
     connect: tuple[str, ...] = ()  # endpoints the plant connects to, beside listening
     star: bool = False  # whether the plant relays all messages, in simulated time: the agents have one link each
     recorders: tuple[str, ...] = ()  # recorders of the telemetry that the plant waits for before tick 0
@@ -164,14 +154,10 @@ class PlantConfig(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     clock: Literal["simulated", "wall"] = "simulated"  # lock-step with the agents, or real time
     speed: float = 1.0  # wall-clock: run time per wall time (s/s), > 0
     max_age: float = 0.25  # wall-clock: age (s of run time) beyond which agents do not use a neighbour's state
-    wait_for_agents: float = 10.0
-    """Wall-clock: longest wait (s) for the agents; then the plant starts without the missing ones."""
+    wait_for_agents: float = 10.0  # wall-clock: longest wait (s) for the agents before the plant starts
     strict: bool = False  # wall-clock: whether the run breaks when it cannot keep pace
-    agent_configs: dict[str, dict[str, Any]] = {}
-    """Wall-clock: configuration of each inverter's agent, as a tree, for agents that join a live run."""
+    agent_configs: dict[str, dict[str, Any]] = {}  # wall-clock: configurations of agents that join, by inverter
     record: RecordLevel = "physics"  # how much this process notes in its journal, which a recorder gets
-    credentials: Credentials | None = None
-    """Certificate of this process and members of its site; None: links are open."""
+    credentials: Credentials | None = None  # certificate of this process and members of its site; None: links are open
     on_law_failure: OnLawFailure = "droop"  # what follows when the law of an agent fails
-    feeder_map: dict[str, Any] = {}
-    """Wall-clock: the one-line diagram (`gridpeers.scenarios.live.feeder_map`) as a tree, for clients."""
+    feeder_map: dict[str, Any] = {}  # wall-clock: the one-line diagram, `scenarios.live.feeder_map`

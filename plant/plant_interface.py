@@ -64,14 +64,13 @@ class LivePlant(PlantLike, Protocol):
 
     @property
     def switches(self) -> Mapping[str, bool]:
-        """Position of each switch, by its name: whether it is closed. Empty where another program has the switches."""
+        """Whether each switch is closed, by its name. Empty where another program has the switches."""
         ...
 
     def switch(self, name: str, action: str, *, synchronised: bool = False) -> bool:
         """Operate a switch ("open" or "close") at the next step; return whether it was in that state already.
 
-        Raise ValueError if there is no such switch, with the names of all switches, or if it should close synchronised
-        and its sides are not in step, with their differences.
+        ValueError if there is no such switch, or it should close synchronised and its sides are not in step.
         """
         ...
 
@@ -81,10 +80,7 @@ class LivePlant(PlantLike, Protocol):
         ...
 
     def set_load(self, name: str, setting: LoadSetting) -> str:
-        """Have a load take another power at the next step; return it in words.
-
-        Raise ValueError if there is no such load, if a number makes no sense, or if loads cannot be set here.
-        """
+        """Have a load take another power at the next step; return it in words. ValueError if it cannot."""
         ...
 
 

@@ -41,15 +41,11 @@ def run_plant(
     make_links: MakeLinks = no_links,
     on_word: Callable[[str], None] = print_word,
 ) -> str:
-    """Run the plant until the end of the scenario.
+    """Run the plant until the end of the scenario; return why the run broke, empty after a good end.
 
     The session opens first, because it is the rendezvous: the agents find each other while the plant is built.
-
-    `on_word`: receives `LISTENING`, `COMPILING` and `READY` as the plant starts.
-
-    Return why the run broke; empty after a good end.
-
-    ConfigurationError, SessionError if the configuration cannot work.
+    `on_word` receives `LISTENING`, `COMPILING` and `READY` as the plant starts. ConfigurationError, SessionError if the
+    configuration cannot work.
     """
     log = logging.getLogger("plant")
     wall = config.clock == "wall"

@@ -23,7 +23,7 @@ REMOVER = 'read _; rm -rf -- "$0"'  # program of the shell that waits for the en
 class TransientFolder:
     """A temporary folder that is removed when it is closed, or when all its users have ended, also by kill -9.
 
-    A process that is killed can remove nothing. So a shell waits at a pipe until nobody holds its other end any more.
+    A shell waits at a pipe until nobody holds its other end any more.
     """
 
     def __init__(self, prefix: str) -> None:
@@ -34,7 +34,7 @@ class TransientFolder:
         os.close(end)
 
     def close(self) -> None:
-        """Remove the folder; all other users must have ended. A folder that is closed stays closed."""
+        """Remove the folder; all other users must have ended."""
         if self._remover.returncode is None:
             self._remover.kill()
             self._remover.wait()
@@ -43,7 +43,7 @@ class TransientFolder:
 
 
 def no_room(what: str, reason: str, folder: Path | None = None) -> str:
-    """Return words for something that a process cannot write into a temporary folder; the system's when left out."""
+    """Return words for something that a process cannot write into a temporary folder, the system's by default."""
     remedy = "make room there, raise the limit of file sizes (ulimit -f), or set TMPDIR to another folder"
     return f"{what} cannot be written in {folder or tempfile.gettempdir()} ({reason}); {remedy}"
 
@@ -62,14 +62,14 @@ def program(module: str, *arguments: str) -> list[str]:
 
 
 class ProcessEndedError(RuntimeError):
-    """The process has ended; the text says how."""
+    pass
 
 
 class RequestProcess:
     """A program that is asked on standard input and answers on standard output; its standard error is kept.
 
     `folder`: where it stands, and which stays as long as it does; None: where this process stands; `environment`:
-    variables that it has beside those of this process.
+    variables beside those of this process.
     """
 
     def __init__(
@@ -115,10 +115,7 @@ class RequestProcess:
             self._requests.flush()
 
     def answer(self, until: float) -> dict[str, Any] | None:
-        """Return the next answer; None if it has not come by a time of `monotonic` (s).
-
-        ProcessEndedError if the process has ended.
-        """
+        """Return the next answer, None without one by a time of `monotonic` (s); ProcessEndedError says how it ends."""
         while b"\n" not in self._unread:
             if not self._selector.select(max(0.0, until - monotonic())):
                 return None
@@ -136,7 +133,7 @@ class RequestProcess:
         return os.pread(self._log.fileno(), os.fstat(self._log.fileno()).st_size, 0).decode(errors="replace")
 
     def close(self, patience: float = 0.0) -> None:
-        """End the process, at any time and as often as you like; before that, wait so long (s) for its own end."""
+        """End the process, after waiting so long (s) for its own end; it may be called again."""
         if self.closed:
             return
         try:

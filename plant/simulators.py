@@ -15,16 +15,13 @@ if TYPE_CHECKING:
     from gridpeers.plant.plant_interface import LivePlant
 
 OURS = "gridpeers"
-"""Name of our own plant."""
 
 
 class Simulator:
     """What `plant.simulator` of a scenario names: an object of a class derived from this one, by an entry point."""
 
-    package: ClassVar[str] = ""
-    """Package that it needs; the extra of gridpeers has the same name. "" for none."""
-    words: ClassVar[str] = ""
-    """What needs the package, and what simulates the plant, e.g. "a HELICS federate"."""
+    package: ClassVar[str] = ""  # package that it needs; the extra of gridpeers has the same name
+    words: ClassVar[str] = ""  # what needs the package and simulates the plant, e.g. "a HELICS federate"
     elsewhere: ClassVar[bool] = False
     """Whether the plant runs elsewhere: we do not know its network and its operating point, and it runs once."""
     table: ClassVar[type[msgspec.Struct] | None] = None
@@ -55,12 +52,10 @@ SIMULATORS: Registry[Simulator] = Registry(
     lambda it: "" if isinstance(it, Simulator) else "it is no object of a class derived from Simulator",
     own={OURS: f"{__name__}:_ours"},
 )
-"""Simulators by name."""
 
 _ours = Simulator()
 
 
 def tables() -> dict[str, type[msgspec.Struct]]:
-    """Return the structs of the simulators' own tables, by name."""
     found = {name: SIMULATORS.resolve(name).table for name in SIMULATORS.names}
     return {name: table for name, table in found.items() if table is not None}

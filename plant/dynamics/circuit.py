@@ -1,7 +1,4 @@
-"""The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals; and its errors.
-
-`gridpeers.plant.feeder.circuits` makes one for every set of closed switches; tests make their own small ones.
-"""
+"""The electrical circuit of the dynamics: one admittance matrix, loads, sources, terminals; and its errors."""
 
 from __future__ import annotations
 
@@ -21,10 +18,7 @@ class PlantError(RuntimeError):
 
 
 class NoSolutionError(PlantError):
-    """Islands of a network have no solution with the present injections.
-
-    `islands`: their numbers in the network's reduction.
-    """
+    """Islands, by their numbers in the network's reduction, have no solution with the present injections."""
 
     def __init__(self, islands: tuple[int, ...]) -> None:
         super().__init__(f"{len(islands)} islands have no solution")
@@ -32,10 +26,7 @@ class NoSolutionError(PlantError):
 
 
 class NoPowerFlowError(PlantError):
-    """No operating point at the start.
-
-    `weak`: load branches that the network cannot feed even alone, and their short-circuit powers (VA).
-    """
+    """No operating point at the start; `weak`: load branches too large even alone, and short-circuit powers (VA)."""
 
     def __init__(self, weak: dict[int, float]) -> None:
         super().__init__("no initial operating point: the power flow did not converge")
@@ -47,11 +38,7 @@ _ONTO_A = np.array([1.0, A120, A120**2])  # factors that turn the phases of a ba
 
 
 def aligned_sum(V: Complex) -> Complex:
-    """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence.
-
-    >>> float(abs(aligned_sum(240.0 * PHASES)).round(9)), float(abs(aligned_sum(240.0 * PHASES[::-1])).round(9))
-    (720.0, 0.0)
-    """
+    """Return the sum of the phasors in the last axis (A, B, C), each turned onto phase A: 3 x positive sequence."""
     return np.asarray(V @ _ONTO_A)
 
 
@@ -63,8 +50,7 @@ class LoadLaw:
     I0: Complex  # constant current of each (A) at branch voltage angle 0: I = I0 V / abs(V)
     limited_at: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
     """Branches with a `LoadPart`'s law; their S and I0 are 0."""
-    law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))
-    """Their rows of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
+    law: Real = field(default_factory=lambda: np.zeros((0, len(COLUMNS))))  # their rows of `kernel.solve.COLUMNS`
 
     def __add__(self, others: LoadLaw) -> LoadLaw:
         return LoadLaw(
@@ -104,29 +90,23 @@ class LoadLaw:
 class Circuit:
     """A linear network with non-linear load branches, ideal sources and inverter terminals.
 
-    All phasors in the frame that rotates at nominal speed; volts are line-to-neutral RMS.
-
-    The voltage of a node counts from its reference: earth, or the neutral to which an inverter there returns. So the
-    voltage of a terminal is that between its phase and its neutral, and a current into it is one that comes out of the
-    neutral: with V = M V' of the voltages V to earth, Y and C are M^T Y M and M^T C of those to earth.
+    Phasors rotate at nominal speed; volts are line-to-neutral RMS. The voltage of a node counts from its reference:
+    earth, or the neutral to which an inverter there returns. With V = M V' of the voltages V to earth, Y and C are M^T
+    Y M and M^T C of those to earth: a current into a terminal comes out of its neutral.
     """
 
-    Y: sp.csc_array
-    """Node admittance matrix (S), n x n, without the inverters' filters. Rows of nodes that are merged
-    into another are empty."""
+    Y: sp.csc_array  # node admittances (S), n x n, without the inverters' filters; rows of merged nodes are empty
     sources: Integers  # nodes held by an ideal source; may be empty
     source_voltage: Complex
-    terminals: Integers
-    """Inverter terminals: n_inv x 3 nodes, phases A, B, C; of a single-phase inverter its one node three times."""
+    terminals: Integers  # n_inv x 3 nodes, phases A, B, C; of a single-phase inverter its one node three times
     C: sp.csc_array
-    """Incidence of the load branches, n x m, real: branch voltages are C^T V, and a branch current
-    I draws C I out of the nodes. Entries are +-1, times a regulator's ratio where one was eliminated."""
+    """Incidence of the load branches, n x m, real: branch voltages are C^T V; a current I draws C I out of the
+    nodes."""
     loads: LoadLaw  # law of the currents that the branches draw
     V_branch: Complex  # nominal phasor of each branch (V): where the first solution starts
-    reference: Integers | None = None
-    """Node from which each node's voltage counts, -1: earth; None: all from earth. It counts from earth itself."""
+    reference: Integers | None = None  # node from which each voltage counts, -1: earth; None: all earth
     neutrals: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
-    """Nodes of neutral conductors; their voltages count from earth."""
+    """Nodes of neutral conductors, which count from earth."""
 
     def __deepcopy__(self, memo: object) -> Circuit:
         """Return itself: it is never written, so copies of a plant share it, and its factorisation."""
@@ -136,9 +116,8 @@ class Circuit:
     def copies(self) -> Flags:
         """Which terminals are copies, n_inv x 3: the second and the third of a single-phase inverter.
 
-        The models have three phases. To them a single-phase inverter is one with three equal phases: its copies have
-        the voltage and the current of its own terminal, turned by -120 and 120 degrees. They inject nothing into the
-        network.
+        To the models it is one with three equal phases: its copies have the voltage and the current of its own
+        terminal, turned by -120 and 120 degrees, and inject nothing into the network.
         """
         copies = np.zeros(self.terminals.shape, bool)
         copies[:, 1:] = (self.terminals[:, 0] == self.terminals[:, 1])[:, None]
@@ -157,7 +136,6 @@ class Circuit:
 
     @cached_property
     def two_ended(self) -> bool:
-        """Whether each branch is between two nodes at most, or a node and earth."""
         return bool(np.max(np.diff(self.C.tocsc().indptr), initial=0) <= 2)
 
     def to_earth(self, V: Complex) -> Complex:
@@ -168,11 +146,7 @@ class Circuit:
         return replace(self, sources=self.sources[:0], source_voltage=self.source_voltage[:0])
 
     def components(self) -> tuple[int, Integers]:
-        """Return the number of electrical islands and the label of each node.
-
-        The three terminals of an inverter belong together even where the phases of the network are
-        not coupled, because one controller moves all three.
-        """
+        """Return the number of islands, and each node's; a controller joins its inverter's three terminals."""
         incidence = abs(self.C)
         link = abs(self.Y) + incidence @ incidence.T
         n = self.Y.shape[0]

@@ -1,8 +1,7 @@
 """The initial operating point of a run: an exact equilibrium of network and inverters (section 7).
 
-The real power of each inverter is given; its reactive power is either given too, or follows from a given V_set through
-the droop (4), (8) and its dead band. In an island without a source one GFM (its swing) first holds its terminal, and is
-then released; where all its GFM are single-phase, one on each phase.
+In an island without a source one GFM (its swing) first holds its terminal, and is then released; where all its GFM are
+single-phase, one on each phase.
 """
 
 from __future__ import annotations
@@ -24,25 +23,19 @@ class OperatingPoint:
     J: Complex  # Norton injections (A)
     V: Complex  # terminal voltages (V)
     I: Complex  # noqa: E741  # the paper's symbol for current
-    """Currents out of the inverters (A)."""
     V_branch: Complex  # voltages of the live load branches (V)
-    on_droop: Flags
-    """Inverters whose voltage is V_set - m_q q; the others are within a dead band, or at the limit of their Q."""
-    on_edge: Flags
-    """Inverters on the edge of a dead band: there is no rest, and Q will hunt around that of this point."""
+    on_droop: Flags  # inverters whose voltage is V_set - m_q q, not in a dead band or at the limit of Q
+    on_edge: Flags  # inverters on the edge of a dead band, around whose Q of this point Q will hunt
 
 
 def equilibrium(
     circuit: Circuit, units: Inverters, P: Real, Q: Real, V_set: Real | None, *, swing_voltage: Complex = PHASES
 ) -> OperatingPoint:
-    """Return the operating point of section 7.
+    """Return the operating point of section 7; PlantError if there is none.
 
-    `units`: the inverters; disconnected ones take no part; `P`: real power of each (pu); ignored for a swing; `Q`:
-    reactive power of each (pu), or the first guess where `V_set` is given; `V_set`: voltage set-point of each (pu),
-    from which Q follows by droop and dead band; None to keep Q; `swing_voltage`: phasors that a swing holds on its
-    three phases (pu of nominal).
-
-    PlantError if there is no such point.
+    `P`: real power of each inverter (pu), ignored for a swing; `Q`: reactive power (pu), or the first guess where
+    `V_set` (pu) is given, from which Q follows by droop (4), (8) and dead band; `swing_voltage`: phasors that a swing
+    holds (pu).
     """
     n, online = len(units), units.connected
     _, label = circuit.components()
@@ -94,12 +87,10 @@ def _swings(units: Inverters, forming: Integers) -> Integers:
 
 
 def set_equilibrium(units: Inverters, point: OperatingPoint, online: Flags, P: Real, V_set: Real | None) -> None:
-    """Set the inverters' set-points and controller states so that they rest at an operating point.
+    """Set set-points and controller states so that inverters rest at an operating point.
 
-    `units`: the inverters; written; `online`: inverters that deliver; the others keep their states, with `P` and
-    `V_set` as set-points; `P`, `V_set`: real powers and set-points of the point (pu). Without `V_set` a GFL rests at
-    its voltage and its reactive power, V_set := v, Q_set := q; else all the reactive power comes from the droop, within
-    dead band and limit.
+    Without `V_set` (pu) a GFL rests at its voltage and reactive power, V_set := v, Q_set := q; else all the reactive
+    power comes from the droop, within dead band and limit.
     """
     S, v = units.measured(point.V, point.I)
     held = units.regulated(point.V, point.I)

@@ -37,36 +37,22 @@ class Inverter:
 
     @property
     def S_3(self) -> float:
-        """Base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter."""
+        """Base of the powers of three such phases together (VA)."""
         return 3.0 * self.S_b if self.single else self.S_b
 
 
 class Inverters:
     """All inverters of a circuit, in the order of its terminals.
 
-    `forming`: whether each is a GFM;
-    `gfm`, `gfm_at`, `gfm_state`: records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`, the inverter each belongs
-    to, and their states;
-    `gfl`, `gfl_at`, `gfl_state`: the same for `gridpeers.plant.dynamics.kernel.gfl`;
-    `S_b`, `V_b`, `m_p`, `m_q`: ratings (VA), nominal voltages (V) and droops (pu per pu);
-    `single`: single-phase inverters. To the models they have three equal phases
-    (`gridpeers.plant.dynamics.circuit.Circuit.copies`);
-    `S_3`: base of the powers of three such phases together (VA): S_b, and 3 S_b of a single-phase inverter;
-    `phase`: phase of the first terminal: 0, 1, 2 for A, B, C;
-    `positive_sequence`, `direct`: whether each is a GFM that measures the positive sequence, and one without voltage
-    controller (section 3.8);
-    `balanced`: whether each is a GFL of balanced power;
-    `S_max`, `Q_min`, `Q_max`: limits of apparent and of reactive power (pu); infinite for a GFM, whose limiters act in
-    time;
-    `db_UV`, `db_OV`: dead bands of volt-var below and above V_set (pu); 0 for a GFM, infinite for a GFL without
-    volt-var;
-    `from_edge`: whether volt-var begins at the edge of its dead band;
-    `y_f`: filter admittances in the network (S per phase); 0 for a current source, and for every GFL in the method
-    "second-order", which solves its filter together with its current controller;
-    `feed_forward`: what that solution needs;
-    `P_set_lim`, `V_set_min`, `V_set_max`: bounds of the set-points that `hold` takes (pu);
-    `set_points`: P_set, V_set, Q_set (pu); may be written between steps (n, 3);
-    `J`, `V`, `I`: Norton injections (A), terminal voltages (V) and currents out of the inverters (A) (n, 3);
+    `gfm`, `gfm_at`, `gfm_state`: records of `kernel.gfm`, the inverter each belongs to, and their states; `gfl...`
+    likewise; `single`: single-phase inverters: to the models they have three equal phases (`Circuit.copies`), of base
+    `S_3`; `phase`: phase of the first terminal: 0, 1, 2 for A, B, C; `positive_sequence`, `direct`: GFM that measure
+    the positive sequence, and those without voltage controller (3.8); `S_max`, `Q_min`, `Q_max`: limits (pu), infinite
+    for a GFM, whose limiters act in time; `db_UV`, `db_OV`: dead bands of volt-var (pu); 0 for a GFM, infinite for a
+    GFL without volt-var; `from_edge`: volt-var begins at their edge; `y_f`: filter admittances in the network (S per
+    phase); 0 for a current source, and for every GFL in the method "second-order", which solves its filter together
+    with its current controller by `feed_forward`; `set_points`: P_set, V_set, Q_set (pu), n x 3, may be written between
+    steps; `J`, `V`, `I`: Norton injections (A), terminal voltages (V), currents out of the inverters (A), n x 3;
     `limiting`: inverters whose phase currents were limited in the last network solution.
     """
 
@@ -126,10 +112,7 @@ class Inverters:
         return theta
 
     def measured(self, V: Complex, I: Complex) -> tuple[Complex, Real]:  # noqa: E741  # the paper's symbol
-        """Return the powers and voltages (pu) that the controllers measure (sections 3.2, 3.8).
-
-        `V`, `I`: terminal voltages (V) and currents out of the inverters (A), n x 3.
-        """
+        """Return the powers and voltages (pu) that controllers measure (sections 3.2, 3.8), from V (V) and I (A)."""
         V_1, I_1 = aligned_sum(V) / 3.0, aligned_sum(I) / 3.0
         S = np.where(self.positive_sequence, 3.0 * V_1 * np.conj(I_1), np.sum(V * np.conj(I), axis=1)) / self.S_3
         v = np.where(self.positive_sequence, np.abs(V_1), np.mean(np.abs(V), axis=1)) / self.V_b
@@ -143,10 +126,7 @@ class Inverters:
         return v
 
     def rest(self, i: int, S: complex, v: float) -> None:
-        """Set an inverter's controller to rest at its present J, V and I.
-
-        `S`: the power that it measures (pu); `v`: the voltage that it measures (pu).
-        """
+        """Set a controller to rest at its present J, V and I, and the power and voltage (pu) that it measures."""
         if self.forming[i]:
             k = int(np.searchsorted(self.gfm_at, i))
             gfm_model.settle(self.gfm[k], self.gfm_state[k], self.J[i, 0], S, v)
@@ -157,8 +137,8 @@ class Inverters:
     def hold(self, i: int, P_set: float, V_set: float) -> tuple[float, float]:
         """Take set-points (pu) from the next step on, within the inverter's bounds; return the held ones.
 
-        A GFL's P_set is clipped in place, as in GridLAB-D (section 4.4): the part beyond its rating is removed before
-        the droop (7) is added, and cannot hide a later over-frequency.
+        A GFL's P_set is clipped before the droop (7) is added, as in GridLAB-D (4.4): it cannot hide a later
+        over-frequency.
         """
         limit = self.P_set_lim.item(i)
         P_set = float(min(max(P_set, -limit), limit))
@@ -167,10 +147,7 @@ class Inverters:
         return P_set, V_set
 
     def limit_power(self, i: int, P_max: float) -> None:
-        """Bound a grid-following inverter's P reference (W) from the next step on.
-
-        ValueError if the inverter is grid-forming: the network determines its power, not a reference.
-        """
+        """Bound a GFL's P reference (W) from the next step on; ValueError for a GFM, which has none."""
         if self.forming[i]:
             raise ValueError(f"{self.units[i].name} is grid-forming; only a GFL has a P reference to bound")
         self.gfl["P_max"][self.gfl_at == i] = P_max / self.S_b[i]
@@ -178,7 +155,7 @@ class Inverters:
     def readings(self, online: Flags) -> Real:
         """Return f (Hz), P (W), Q (var), V (V) of the last solution, n x 4, before the first step.
 
-        `online`: inverters that deliver; for the others f is nominal, or 0 without voltage, and P and Q are 0.
+        An inverter that is not `online` has nominal f, or 0 without voltage, and no power.
         """
         S = np.sum(self.V * np.conj(self.J - self.y_f[:, None] * self.V), axis=1)
         S[self.single] /= 3.0
@@ -192,7 +169,6 @@ class Inverters:
 
 
 def _pack(unit: Inverter, method: Method) -> NDArray[np.void]:
-    """Return the record of one unit for the compiled pass of its kind."""
     own = unit.S_3, unit.V_b, unit.m_p, unit.m_q, unit.f_nom
     if isinstance(unit.parameters, GfmParameters):
         return gfm_model.pack(unit.parameters, *own)

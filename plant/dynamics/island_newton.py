@@ -1,11 +1,8 @@
 """Voltages of one island by Newton's method, for where the frozen tangent of the inner loop does not lead.
 
 A fresh tangent is taken each iteration, and steps are shortened until the residual shrinks. Where that fails the load
-is raised from nothing to all of it (continuation): this follows the solution of high voltage up to the largest load
-that has one. So None means that the island has no solution that it could have come to, not that an iteration gave up.
-
-The Jacobian's determinant has one sign on that branch from no load on; the solutions of low voltage, at which no
-network can stand, have the other one.
+is raised from nothing to all of it, which follows the solution of high voltage: its Jacobian's determinant has one sign
+from no load on, and the solutions of low voltage the other. So None means that the island has no solution.
 """
 
 from __future__ import annotations
@@ -24,8 +21,7 @@ ITERATIONS = 40  # of Newton's method; it takes 4 to 10
 SHORTEST_STEP = 2.0**-10  # smallest part of a Newton step, and of the load in the continuation
 TOLERANCE = 2e-12  # largest last step (pu of nominal voltage): under that of the inner loop, which goes on from here
 ROUNDING, STALL = 1e-8, 4
-"""Largest step (pu) that may be rounding, and how many such steps in a row that do not halve end the search. Next to a
-very small impedance steps stay above 1e-11 pu."""
+"""Largest step (pu) that may be rounding, and how many such steps in a row that do not halve end the search."""
 NOISE = 1e-12  # residual (pu) below which it need not shrink: it is rounding
 
 
@@ -43,10 +39,9 @@ class IslandEquations(Protocol):
 
 
 class DenseIsland:
-    r"""An island by the impedances between its load branches, :math:`F(V) = V - E + Z I_b(V)`.
+    """An island by the impedances Z between its load branches (ohm), F(V) = V - E + Z I_b(V).
 
-    `Z`: impedance between its branches (ohm), with the inverters' filters; `nominal`: nominal phasor of each (V); `E`:
-    their voltages without load (V).
+    `nominal`: nominal phasor of each branch (V); `E`: their voltages without load (V).
     """
 
     def __init__(self, Z: Complex, loads: LoadLaw, nominal: Complex, E: Complex) -> None:
@@ -72,10 +67,7 @@ class DenseIsland:
 
 @one_thread()
 def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
-    """Return the voltages (V) of an island, or None if there are none.
-
-    `guess`: where to begin (V), e.g. the last voltages.
-    """
+    """Return the voltages (V) of an island, from a guess (V); None if there are none."""
     if not np.isfinite(island.without_load).all():
         return None
     with np.errstate(all="ignore"):  # a trial beyond all bounds is not finite, and is not taken
@@ -84,7 +76,6 @@ def solve_island(island: IslandEquations, guess: Complex) -> Complex | None:
 
 
 def _raise_load(island: IslandEquations) -> Complex | None:
-    """Continuation in the load, by steps that are halved where they fail."""
     V, part, step = island.without_load, 0.0, 0.25
     while part < 1.0:
         solution = _newton(island, V, min(1.0, part + step))
@@ -99,7 +90,7 @@ def _raise_load(island: IslandEquations) -> Complex | None:
 
 
 def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | None:
-    """Solution with this part of the load, on the branch of high voltage; None if none is found."""
+    """Return the solution with this part of the load, on the branch of high voltage; None if none is found."""
     V, former, stalled = guess, np.inf, 0
     F, size = island.residual(V, part)
     for _ in range(ITERATIONS):
@@ -126,12 +117,10 @@ def _newton(island: IslandEquations, guess: Complex, part: float) -> Complex | N
 
 
 def weak_branches(Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, V_nom: Real) -> dict[int, float]:
-    r"""Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
+    """Return branches of constant power that are too much even alone, and the short-circuit powers there (VA).
 
-    A power S behind an impedance Z has a solution where :math:`V^2 \geq 2 (|Z S| + Re(Z S^*))`. It is the one to which
-    a network comes from no load where also the impedance of the load, V^2 / S, is the greater one.
-
-    `Y`: admittances between the nodes of unknown voltage (S), regular; `C`: incidence of the branches at these nodes.
+    A power S behind an impedance Z has a solution where V^2 >= 2 (|Z S| + Re(Z S^*)). It is the one that no load leads
+    to where V^2 / S is greater than Z, too. `Y`, `C`: at the nodes of unknown voltage.
     """
     S, rows = loads.S.astype(complex), loads.law
     S[loads.limited_at] = np.where((rows[:, 3] == 0.0) & (rows[:, 4] == 0.0), rows[:, 0] + 1j * rows[:, 1], 0.0)

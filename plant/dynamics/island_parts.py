@@ -1,9 +1,7 @@
 """Islands of a large network in parts that the inner loop advances one by one: in the cache, and on all cores.
 
-No island acts on another between two switchings. So a part of them takes all steps of a control period before the next
-part begins, with factors and inverters that fit the cache, and iterates no longer than its own islands need. An island
-without inverters is in no part: its voltages stay those of the last switching. Which islands make a part depends on the
-network alone, so the bytes do not depend on the number of cores.
+No island acts on another between two switchings, so a part takes all steps of a control period by itself. Islands
+without inverters keep their voltages. The parts depend on the network alone, so bytes do not depend on the cores.
 """
 
 from __future__ import annotations
@@ -27,15 +25,13 @@ _OF_GFM = ("gfm", "gfm_state", "gfm_0", "gfm_d")
 _OF_GFL = ("gfl", "gfl_state", "gfl_0", "gfl_d")
 _OF_INVERTERS = ("online", "set_points", "J", "J_0", "V", "I", "limiting")
 _ADVANCED = ("gfm_state", "gfl_state", "J", "V", "I", "limiting")
-"""Arrays of the inverters that the steps advance; of the others they only read, or need the room."""
+"""Arrays of the inverters that the steps advance."""
 
 Which = Integers | slice  # some of the inverters: a slice where they are neighbours, which needs no copy
 
 
 @dataclass(frozen=True)
 class Part:
-    """Some islands of a network: their arrays, and where these stand in the network's."""
-
     net: Reduced
     branches: Integers  # its live branches
     nodes: int
@@ -59,11 +55,7 @@ class Part:
 
 
 class IslandParts:
-    """The parts of a network at one tangent of its loads.
-
-    `net`: the network, by sparse factors; `node_island`: island of each of its nodes, in the order of the factors;
-    `units`: the inverters; only which of them are of which kind is read.
-    """
+    """The parts of a network at one tangent of its loads; `node_island`: of each node, in the factors' order."""
 
     def __init__(self, net: Reduced, node_island: Integers, units: Units) -> None:
         self.parts = tuple(_parts(net, node_island, units))
@@ -75,7 +67,7 @@ class IslandParts:
     def advance(self, steps: int, h: float, tolerance: float, units: Units, x: Real, out: Real) -> int:
         """Take steps as `run_steps` does; return the iterations, each part's by its share of the nodes.
 
-        Where a part fails, -1 is returned, and `units`, `x` and `out` are as before.
+        Where a part fails, -1 is returned, and all is as before.
         """
         m = x.size // 2
 
@@ -100,10 +92,7 @@ def is_large(net: Reduced) -> bool:
 
 
 def _parts(net: Reduced, node_island: Integers, units: Units) -> Iterator[Part]:
-    """Yield the parts: islands with inverters in order of their numbers, each part of `PART` nodes or more.
-
-    There are none if one part would have all islands, or all but little ones.
-    """
+    """Yield parts of `PART` nodes or more; none if one part would have all islands but little ones."""
     size = np.bincount(node_island, minlength=net.leader.size)
     islands = np.unique(net.inverter_island)
     part_of = np.full(net.leader.size, -1, np.int64)
@@ -120,7 +109,6 @@ def _parts(net: Reduced, node_island: Integers, units: Units) -> Iterator[Part]:
 
 
 def _part(net: Reduced, islands: Integers, of_part: Flags, node_island: Integers, units: Units) -> Part:
-    """Return one part. Inverters of dead islands belong to it as those of live ones: they are off."""
     maps, f = net.sparse, net.sparse.factored
     nodes = np.flatnonzero(of_part[node_island])
     branches, inverters = np.flatnonzero(of_part[net.branch_island]), np.flatnonzero(of_part[net.inverter_island])
@@ -198,5 +186,4 @@ def _places(which: Integers, size: int) -> Integers:
 
 
 def _moved(places: Integers, at: Integers) -> Integers:
-    """Return the places of things; what is negative stands for something else, and stays."""
     return np.where(at >= 0, places[at], at)

@@ -1,7 +1,4 @@
-"""The nodes of a network that matter in a switch state, and what couples them, in the order of elimination.
-
-Nodes at which nothing happens are taken out exactly (Kron reduction).
-"""
+"""The nodes of a network that matter in a switch state; the others are taken out exactly (Kron reduction)."""
 
 from __future__ import annotations
 
@@ -16,19 +13,16 @@ from gridpeers.plant.dynamics.circuit import Circuit
 from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, Real
 from gridpeers.plant.dynamics.kernel.network_arrays import BlockFactors, add_tangent
 
-MOST_NEIGHBOURS = 8
-"""Neighbours up to which taking a node out makes the matrix smaller: it couples all of them with each other."""
+MOST_NEIGHBOURS = 8  # neighbours up to which taking a node out makes the matrix smaller
 
 WEAK = 1e-6
 """Part of a node's largest coupling below which its own admittance is no pivot: what is in series there cancels."""
 
 
 def eliminated(Y: sp.csr_array, keep: Flags) -> tuple[Integers, sp.csc_array]:
-    """Take out nodes that need not be kept, those of fewest neighbours first.
+    """Take out nodes that need not be kept, those of fewest neighbours first; return the others and their matrix.
 
-    `keep`: nodes to keep: those with a load, a terminal or a link to a source. Weak ones are kept, too.
-
-    Return what they see of the network, to rounding; terms that cancel leave no entry.
+    Weak nodes are kept, too. Terms that cancel leave no entry.
     """
     n = Y.shape[0]
     rows = [
@@ -87,13 +81,9 @@ def elimination_order(Y: sp.csc_array, C: sp.csc_array) -> Integers:
 
 
 class BlockPattern:
-    """The matrix of a network as blocks [Re; Im] of its nodes, with room for its factors.
+    """The matrix of a network as blocks [Re; Im] of its nodes in the order of elimination, with room for its factors.
 
-    `Y`: admittances between the nodes (S), in the order of elimination; neither symmetric nor without stored zeros;
-    `C`: incidence of the load branches, real: at most two nodes each.
-
-    `first`, `second`: nodes of each branch, or -1; `a_first`, `a_second`: ratios with which their voltages count in
-    the branch's.
+    `first`, `second`: nodes of each branch, or -1; `a_first`, `a_second`: ratios with which their voltages count in it.
     """
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array) -> None:
@@ -105,10 +95,7 @@ class BlockPattern:
         self._across[both] = self._entry(self.first[both], self.second[both])
 
     def matrix(self, A: Complex, B: Complex, y: Complex | None = None) -> BlockFactors:
-        """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place.
-
-        `A`, `B`: of each branch (S); `y`: of each node (S).
-        """
+        """Return V -> (Y + diag(y)) V + C (A C' V + B C' V^*), to be factored in place."""
         f = self._Y._replace(D=self._Y.D.copy(), L=self._Y.L.copy(), U=self._Y.U.copy())
         if y is not None:
             f.D[:] += np.column_stack([y.real, -y.imag, y.imag, y.real])
@@ -116,7 +103,6 @@ class BlockPattern:
         return f
 
     def _entry(self, i: Integers, j: Integers) -> Integers:
-        """Return the entries of `later` that couple these nodes."""
         n = self.start.size - 1
         owner = np.repeat(np.arange(n), np.diff(self.start))
         held, wanted = owner * n + self.later, np.minimum(i, j) * n + np.maximum(i, j)
@@ -166,7 +152,6 @@ def _filled(link: sp.csc_array) -> tuple[Integers, Integers]:
 
 
 def _ends(C: sp.csc_array) -> tuple[Integers, Integers, Real, Real]:
-    """Nodes of each branch and the ratios with which they count; -1 for none."""
     m = C.shape[1]
     nodes, ratios = np.full((2, m), -1, np.int64), np.zeros((2, m))
     branch = np.repeat(np.arange(m), np.diff(C.indptr))
@@ -176,15 +161,10 @@ def _ends(C: sp.csc_array) -> tuple[Integers, Integers, Real, Real]:
 
 
 class KeptNetwork:
-    """The unknown nodes with a load, a terminal or a link to a source; the others are eliminated, exactly.
+    """The unknown nodes with a load, a terminal or a link to a source, without the inverters' filters.
 
-    The filters of inverters are not in it, so it serves whatever of the inverters is connected.
-
-    `to_ground`: admittance added at each node (S).
-
-    `place`: position of each node among them, or -1; `Y`: admittances between them (S); `Y_S`, `Y_S_whole`:
-    admittances between them, or all unknown nodes, and the sources (S); `C`, `C_whole`, `C_S`: incidence of the
-    branches at them, at all unknown nodes, and at the sources.
+    `place`: position of each node among them, or -1; `Y`, `Y_S`: admittances between them, and to the sources (S); `C`,
+    `C_S`: incidence of the branches at them, and at the sources; `..._whole`: of all unknown nodes.
     """
 
     def __init__(self, circuit: Circuit, unknown: Integers, C: sp.csc_array, to_ground: Real) -> None:

@@ -17,9 +17,7 @@ from gridpeers.plant.dynamics.kernel.solve import solve_network
 from gridpeers.plant.dynamics.kernel.step import MAX_LIMITING, limit_currents
 from gridpeers.plant.dynamics.reduction import Reduction, SparseReduction, reduce_network
 
-KEPT = 32
-"""Circuits, and their factors, that are kept: each event of a schedule has one, and a person who switches to and fro a
-few. A factored network of 123 nodes has 1 MB."""
+KEPT = 32  # circuits, and their factors, that are kept: a factored network of 123 nodes has 1 MB
 
 K = TypeVar("K", bound=Hashable)
 V = TypeVar("V")
@@ -34,8 +32,7 @@ def recent(kept: dict[K, V], key: K, make: Callable[[], V]) -> V:
     return value
 
 
-TOLERANCE = 1e-11
-"""Largest change of a voltage in the last iteration of a network solution (pu of the highest nominal voltage)."""
+TOLERANCE = 1e-11  # of a network solution: last change of a voltage (pu of the highest nominal one)
 
 WORTH = 40  # iterations of a network solution that cost as much time as new sparse factors
 
@@ -43,11 +40,9 @@ WORTH = 40  # iterations of a network solution that cost as much time as new spa
 class LiveNetwork:
     """The network between the inverters, from one switching to the next.
 
-    `inverters`: one per row of its terminals. `solve` reads their injections and writes their voltages.
-
     `reduction`: reduction of the present circuit and its connected inverters; `net`: its arrays for the inner loop,
-    linearised; set by the first `solve`; `x`: [Re; Im] of the live branches' voltages (V), each in its island's frame:
-    the next solution's first guess (2 m).
+    linearised; `x`: [Re; Im] of the live branches' voltages (V) in their islands' frames, the next solution's first
+    guess.
     """
 
     net: Reduced
@@ -57,8 +52,7 @@ class LiveNetwork:
         self._inverters = inverters
         self._reductions: dict[tuple[Circuit, bytes], Reduction] = {}
         self._unsourced: dict[Circuit, Circuit] = {}
-        self.substation_on = True
-        """Whether the ideal sources are connected; `gridpeers.plant.dynamics.switching` disconnects them."""
+        self.substation_on = True  # whether the ideal sources are connected
         self.circuit = circuit
         self.reduction = self.reduced(circuit)
         self._noted: Complex = circuit.V_branch.astype(complex)
@@ -71,7 +65,7 @@ class LiveNetwork:
         return self.reduction.circuit.source_voltage
 
     def reduced(self, circuit: Circuit) -> Reduction:
-        """Factor a circuit, once; call it ahead of a scheduled event to save this work in its step."""
+        """Factor a circuit, once; called ahead of a scheduled event it saves this work in its step."""
         units = self._inverters
         if not self.substation_on:
             circuit = recent(self._unsourced, circuit, circuit.without_source)
@@ -92,10 +86,7 @@ class LiveNetwork:
         self.V_branch = np.where(np.abs(self.V_branch) > 0.1 * np.abs(nominal), self.V_branch, nominal)
 
     def solve(self) -> None:
-        """Linearise at the solution of the present injections, by Newton's method with a fresh tangent each time.
-
-        NoSolutionError if islands have no solution; the terminal voltages are then as before.
-        """
+        """Linearise at the solution of the present injections; NoSolutionError leaves the voltages as before."""
         units, branches = self._inverters, self.reduction.branches
         V_b, theta, V = self.V_branch[branches], units.theta(), units.V.copy()
         still = np.ones(self.reduction.count, complex)
@@ -118,18 +109,11 @@ class LiveNetwork:
         self.V_branch[branches] = V_b
 
     def renew(self) -> None:
-        """Linearise again at the solution of the present injections, starting from the present voltages.
-
-        NoSolutionError if islands have no solution.
-        """
+        """Linearise again at the solution of the present injections; NoSolutionError if there is none."""
         self._linearise(self._solve_islands(self._branch_voltages()))
 
     def refresh(self, iterations: int, solutions: int) -> None:
-        """Linearise sparse factors again once their tangent has cost more iterations than a new one costs time.
-
-        A tangent at the present voltages needs one iteration a solution. Dense matrices are never renewed for their
-        speed: a new inverse costs more than it saves.
-        """
+        """Linearise sparse factors again once their tangent has cost more iterations than a new one costs time."""
         if self.net.sparse.constant.size:
             self._excess += max(iterations - 2 * solutions, 0)
             if self._excess > WORTH:
@@ -142,17 +126,16 @@ class LiveNetwork:
         return self._parts
 
     def join_parts(self) -> None:
-        """Go on with all islands at once: a part has failed, and what to do next is decided for all."""
+        """Go on with all islands at once, because a part has failed."""
         self._parts = None
         self.net.sparse.increments[:] = 0.0
 
     def note(self) -> None:
-        """Note that the branches have other voltages: `V_branch` has those of the first time it is read."""
         self._steps_since = True
 
     @property
     def V_branch(self) -> Complex:
-        """Voltages of all branches (V) when last noted, in the common frame; may be written."""
+        """Voltages of all branches (V) in the common frame; may be written."""
         if self._steps_since:
             self._steps_since = False
             if self.x.size:
@@ -164,7 +147,6 @@ class LiveNetwork:
         self._noted, self._steps_since = V, False
 
     def _solve_islands(self, guess: Complex) -> Complex:
-        """Voltages of the live branches (V) from a guess, or NoSolutionError."""
         V_b, failed = self.reduction.solve_islands(self._inverters.J, self.source_voltage, guess)
         if failed:
             raise NoSolutionError(failed)
@@ -177,7 +159,6 @@ class LiveNetwork:
         self._parts = None
 
     def _branch_voltages(self) -> Complex:
-        """Return the present voltages of the live branches (V) in the common frame."""
         m = self.x.size // 2
         leader = self.reduction.leader
         angle = np.where(leader >= 0, self._inverters.theta()[leader] - self.net.theta_lin, 0.0)
@@ -196,10 +177,8 @@ class LiveNetwork:
 def unsettled_island(net: Reduced, units: Units, x: Real, tolerance: float) -> int:
     """Return the island whose voltages still change most after as many iterations as the inner loop takes.
 
-    Nothing but the work arrays of `net` is changed.
-
-    `net`: linearised at the present angles: all frames stand at 0; `units`: of which a network solution within the
-    current limits has failed; `x`: where that solution began (V), [Re; Im] of all branches.
+    `net`: linearised at the present angles; `units`: of which a solution within the current limits failed, begun at
+    `x`.
     """
     x, J, V, limiting = x.copy(), units.J.copy(), units.V.copy(), units.limiting.copy()
     I_b, work = np.empty(x.size // 2, complex), np.empty(12 * len(J) + 3 * x.size)

@@ -1,9 +1,8 @@
 """The network between inverters of constant power, and the reactive powers that their characteristics give at rest.
 
-Unless the droop begins at the edge of its dead band, a volt-var characteristic jumps there, from 0 to db / m_q (section
-4.4). An inverter whose droop would bring its voltage back into the band, and whose voltage would leave the band without
-it, rests at neither: its Q hunts around the one that holds the voltage on the edge. With that Q the characteristic has
-no gap and never rises with the voltage; so where vars raise voltages, there is one operating point, and only one.
+A volt-var characteristic may jump at the edge of its dead band, from 0 to db / m_q (section 4.4). An inverter that
+rests on neither side holds its voltage on the edge by a Q in between. With that Q the characteristic has no gap and
+never rises with the voltage; so where vars raise voltages, there is one operating point, and only one.
 """
 
 from __future__ import annotations
@@ -22,16 +21,12 @@ from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK, settle_powers
 from gridpeers.plant.dynamics.reduction import reduce_network
 from gridpeers.plant.dynamics.threads import one_thread
 
-MOST_ROUNDS = 500
-"""Rounds between the network and inverters of constant power, within which the changes of injections must end or halve:
-near the largest power that a network carries a round leaves most of an error."""
+MOST_ROUNDS = 500  # rounds between network and inverters, within which the changes of injections must end or halve
 
 NEAR = 4  # rounds after which the voltages are near enough to the solution for a tangent that serves to the end
 
 
 class PowerFlow:
-    """Fixed point between the network and inverters of constant power."""
-
     def __init__(self, circuit: Circuit, units: Inverters, held: Flags) -> None:
         # GFM filters stay in the network, because their EMF is balanced, not their current; a GFL is a pure current
         y = np.where(units.forming & ~held, units.y_f, 0.0)
@@ -107,26 +102,20 @@ class PowerFlow:
 
 
 DROOP, INSIDE, UNDER, OVER = range(4)
-"""Where an inverter rests: on the droop, inside its band, or on the edge below or above V_set."""
 
-AT_ONCE = 8
-"""Rounds in which all inverters may change their place, then the first of them alone (Murty's least-index rule)."""
+AT_ONCE = 8  # rounds in which all inverters may change place; then the first alone (Murty's least-index rule)
 
 
 class VoltVarAtRest(NamedTuple):
-    """Droops and bands of inverters, and the set-points and limits at rest; arrays over the inverters."""
-
     V_set: Real  # pu
     m_q: Real  # pu per pu
     db_UV: Real  # dead bands below V_set (pu); 0 for a GFM, infinite without volt-var
     db_OV: Real  # the same above V_set
-    from_edge: Flags
-    """Whether the droop begins at the edge of the band: there is no jump, and the place is always `DROOP`."""
+    from_edge: Flags  # whether the droop begins at the band's edge: no jump; the place is always `DROOP`
     Q_min: Real  # limits of reactive power (pu)
     Q_max: Real
 
     def first_places(self) -> Integers:
-        """Return where the search begins: inside of every band at whose edges the characteristic jumps."""
         return np.where(((self.db_UV > 0.0) | (self.db_OV > 0.0)) & ~self.from_edge, INSIDE, DROOP)
 
     def beyond(self, v: Real) -> Real:
@@ -135,11 +124,10 @@ class VoltVarAtRest(NamedTuple):
         return np.where(self.from_edge, low - np.clip(low, -self.db_OV, self.db_UV), low)
 
     def within(self) -> Real:
-        """Return the vars within the band (pu): none, unless the limits exclude that."""
         return np.clip(np.zeros(self.m_q.size), self.Q_min, self.Q_max)
 
     def mismatch(self, place: Integers, v: Real, Q: Real) -> Real:
-        """Return how far (pu of voltage) Q at voltages v is from rest; 0 for all is rest at these places."""
+        """Return how far (pu of voltage) Q at voltages v is from rest at these places."""
         low = self.V_set - v
         wanted = np.clip(self.beyond(v) / self.m_q, self.Q_min, self.Q_max)
         off = (np.where(place == INSIDE, self.within(), wanted) - Q) * self.m_q
@@ -147,11 +135,7 @@ class VoltVarAtRest(NamedTuple):
         return np.where(place == OVER, low + self.db_OV, off)
 
     def next_places(self, place: Integers, v: Real, Q: Real, rounds: int) -> Integers:
-        """Return where inverters belong that rest with Q at v; the same places once they are right.
-
-        `place`: where they were taken to be; `v`, `Q`: voltages and reactive powers with which they rest there (pu);
-        `rounds`: how often places have changed before.
-        """
+        """Return where inverters belong that rest with Q at v (pu); the same places once they are right."""
         low = self.V_set - v
         within = (-self.db_OV < low) & (low < self.db_UV) & ~self.from_edge
         band, limit = (
@@ -174,14 +158,11 @@ class VoltVarAtRest(NamedTuple):
         return changed
 
 
-MOST_BY_DIFFERENCES = 100
-"""Inverters up to which a Jacobian by differences is worth its power flows, one an inverter; else Newton-Krylov."""
+MOST_BY_DIFFERENCES = 100  # inverters up to which a Jacobian by differences pays; else Newton-Krylov
 
 KRYLOV = {"fatol": 1e-12, "maxiter": 20, "jac_options": {"rdiff": 1e-6}}
-"""Largest deviation (pu), most iterations of Newton's method (it takes 3 to 5), and its relative difference."""
 
-MOST_PLACE_ROUNDS = 100
-"""Most rounds in which inverters may change their place at their dead bands; it takes 2 to 4 on our feeder."""
+MOST_PLACE_ROUNDS = 100  # rounds in which inverters may change their place at dead bands; 2 to 4 on our feeder
 
 
 class DroopPowers(NamedTuple):
@@ -193,12 +174,9 @@ class DroopPowers(NamedTuple):
 
 
 def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, swing: Flags) -> DroopPowers:
-    """Find the Q that each characteristic gives at its terminal's voltage.
+    """Find the Q (pu) that each characteristic gives at its terminal's voltage; J and Q are first guesses.
 
-    `J`, `Q`: first guesses of the injections (A) and reactive powers (pu); `P`, `V_set`: real powers and voltage
-    set-points (pu); `swing`: inverters that hold their voltage, whatever their droop.
-
-    PlantError if there are none.
+    `swing`: inverters that hold their voltage, whatever their droop. PlantError if there are none such Q.
     """
     units = flow.units
     free = ~swing & flow.reduction.online
@@ -225,7 +203,6 @@ def solve_by_droop(flow: PowerFlow, J: Complex, P: Real, Q: Real, V_set: Real, s
 def _at_places(
     flow: PowerFlow, J: Complex, P: Real, Q: Real, at_rest: VoltVarAtRest, place: Integers, free: Integers, swing: Flags
 ) -> tuple[Complex, Complex, Real]:
-    """Find the Q at which the free inverters rest at these places of their characteristics."""
     if not free.size:  # swings alone: they hold their voltage, and nothing is left to find
         return *flow.solve(J, P, Q, swing), Q
     units = flow.units

@@ -31,7 +31,7 @@ from gridpeers.plant.dynamics.threads import one_thread
 
 
 class DenseReduction(SwitchState):
-    """A switch state as small dense matrices between load branches and inverter terminals, before any linearisation."""
+    """A switch state as small dense matrices between load branches and inverter terminals."""
 
     @one_thread()
     def __init__(self, circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> None:
@@ -94,15 +94,11 @@ class DenseReduction(SwitchState):
         return V_G.reshape(3, -1).T
 
     def source_parts(self, source_voltage: Complex) -> tuple[Complex, Complex]:
-        """Return the voltages (V) that the ideal sources alone give at the branches and at the terminals."""
         return self._b_S @ source_voltage, self._G_S @ source_voltage
 
     @one_thread()
     def linearise(self, V_b: Complex, source_voltage: Complex, theta: Real) -> Reduced:
-        """Return the inner-loop arrays with the load law's tangent at branch voltages `V_b` (V, live branches).
-
-        `V_b`: point of linearisation; `theta`: angle of every inverter at that point (rad).
-        """
+        """Return the inner-loop arrays with the loads' tangent at branch voltages (V) and inverters' angles (rad)."""
         net = self.at_tangent(V_b, theta)
         s_b, s_G = self.source_parts(source_voltage)
         m = V_b.size
@@ -242,25 +238,19 @@ class SparseReduction(SwitchState):
         return V
 
     def _injected(self, J: Complex, at: Integers, size: int) -> Complex:
-        """Currents (A) that the inverters inject at these positions into so many nodes."""
         right = np.zeros(size, complex)
         feeding = (at >= 0) & self._feeds[:, None]
         np.add.at(right, at[feeding], J[feeding])
         return right
 
     def _held_voltages(self, source_voltage: Complex) -> Complex:
-        """Voltages (V) of the terminals that a source holds; 0 elsewhere."""
         V = np.zeros(self.circuit.Y.shape[0], complex)
         V[self.circuit.sources] = source_voltage
         return np.asarray(V[self.circuit.terminals].reshape(-1, 3))
 
 
 class SparseIsland:
-    r"""An island by its node voltages, :math:`F(V) = Y V + C I_b(C^T V + c) - J`.
-
-    `from_sources`: what sources contribute to the branches' voltages, c (V); `right`: currents (A) into the nodes, J:
-    of inverters, and from sources.
-    """
+    """An island by its node voltages, F(V) = Y V + C I_b(C^T V + c) - J; `from_sources`: c (V); `right`: J (A)."""
 
     def __init__(self, Y: sp.csc_array, C: sp.csc_array, loads: LoadLaw, from_sources: Complex, right: Complex) -> None:
         self._Y, self._C, self._loads, self._c, self._right = Y, C, loads, from_sources, right
@@ -271,7 +261,6 @@ class SparseIsland:
         self._pattern = BlockPattern(Y, C)
 
     def residual(self, V: Complex, part: float) -> tuple[Complex, float]:
-        """Return F (A) and its size (pu of what the nodes' admittances draw) with this part of the load."""
         drawn = self._loads.currents(self._C.T @ V + self._c)
         F = self._Y @ V + part * (self._C @ drawn) - self._right
         return F, float(np.max(np.abs(F) / self._scale, initial=0.0))
@@ -300,11 +289,7 @@ MOST_DENSE = 30  # load branches up to which dense matrices are faster: their co
 
 
 def reduce_network(circuit: Circuit, y_f: Complex, forming: Flags, online: Flags) -> Reduction:
-    """Return a switch state as it is solved; arguments as for `gridpeers.plant.dynamics.switch_state.SwitchState`.
-
-    Never dense with a neutral: where nothing earths it, the impedance of its insulation is in each entry, and what
-    matters is in differences too small for their rounding.
-    """
+    """Return a switch state as it is solved: sparse with many loads, and with a neutral, for small differences."""
     if circuit.two_ended and (circuit.loads.S.size > MOST_DENSE or circuit.neutrals.size):
         return SparseReduction(circuit, y_f, forming, online)
     return DenseReduction(circuit, y_f, forming, online)

@@ -19,19 +19,11 @@ from gridpeers.plant.dynamics.kernel.step import FAILURES, run_steps, run_steps_
 from gridpeers.plant.dynamics.live_network import TOLERANCE, LiveNetwork, unsettled_island
 from gridpeers.plant.plant_config import Method
 
-MOST_RENEWALS = 20
-"""Most tangents of one network solution, while its limited currents shrink; two or three are enough."""
+MOST_RENEWALS = 20  # tangents of one network solution, while its limited currents shrink; two or three are enough
 
 
 class Dynamics:
-    """Inverters and network, stepped with fixed h.
-
-    `inverters`: one per row of `circuit.terminals`.
-
-    `inverters`: their state; set-points may be written between runs; `network`: network between them.
-
-    Call `start` once; then `run` and, at switching, `connect` or `switch_inverter`.
-    """
+    """Inverters and network, stepped with fixed h: `start` once; then `run`, `connect`, `switch_inverters`."""
 
     def __init__(
         self,
@@ -61,10 +53,9 @@ class Dynamics:
     ) -> OperatingPoint:
         """Start from the equilibrium at real powers `P` (pu), and at reactive powers `Q` or set-points `V_set` (pu).
 
-        With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a
-        GFM; V_set := v, Q_set := q for a GFL. With `V_set`, Q_set is 0 and q follows from the droop and its dead band.
-
-        PlantError if there is no such equilibrium.
+        With `Q` the droops are shifted to give it, as in GridLAB-D: V_set := v + m_q q for a GFM; V_set := v, Q_set :=
+        q for a GFL. With `V_set` q follows from the droop and its dead band. PlantError if there is no such
+        equilibrium.
         """
         units, network = self.inverters, self.network
         first = np.zeros(P.size) if Q is None else Q
@@ -84,20 +75,17 @@ class Dynamics:
         self._trips += switching.switch_inverters(self.inverters, self.network, which, on)
 
     def deenergise(self, islands: Iterable[int], step: int = 0) -> None:
-        """Disconnect all sources of these islands; see `gridpeers.plant.dynamics.switching.deenergise`."""
         self._trips += switching.deenergise(self.inverters, self.network, islands, step)
 
     def take_trips(self) -> list[switching.Trip]:
-        """Take out the trips since the last call of islands without solution."""
         trips, self._trips = self._trips, []
         return trips
 
     def run(self, steps: int) -> Real:
         """Advance by `steps` steps; return steps x n_inv x `kernel.controller_pass.READING`, all finite.
 
-        Where the frozen tangent leads to no solution it is renewed, as often as necessary; within one solution, while
-        its limited currents shrink. An island without solution is de-energised before the step, and the others take the
-        step. With 0 steps the inner loop is only compiled or loaded.
+        Where the frozen tangent leads to no solution it is renewed. An island without solution is de-energised before
+        the step, and the others take it. With 0 steps the inner loop is only compiled or loaded.
         """
         network = self.network
         out = np.zeros((steps, len(self.inverters), READING))
@@ -133,7 +121,6 @@ class Dynamics:
         return out
 
     def arrays(self) -> Units:
-        """Return the state of all inverters as the compiled passes take it; they write into it."""
         units = self.inverters
         return Units(
             units.f_nom,
@@ -201,7 +188,6 @@ class Dynamics:
         return units.f_nom + float(speed) / (2.0 * np.pi)
 
     def readings(self) -> Real:
-        """Return f (Hz), P (W), Q (var), V (V) of the last solution, n_inv x 4, before the first step."""
         return self.inverters.readings(self.network.reduction.online)
 
 

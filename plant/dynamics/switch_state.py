@@ -13,30 +13,23 @@ from gridpeers.plant.dynamics.kernel.compiled import Complex, Flags, Integers, R
 from gridpeers.plant.dynamics.kernel.network_arrays import Reduced
 
 FLOATING = 1e-12
-"""Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: without it
-phases without an inverter, which only the lines' impedances couple to the others, would have no determined voltage."""
+"""Admittance to ground, relative to all of a node's, in an island that single-phase inverters alone feed: else phases
+without an inverter would have no determined voltage."""
 
-EARTHING = 1e3
-"""Admittance (S) with which a grid-forming inverter earths the neutral of an island that has lost its earth."""
+EARTHING = 1e3  # admittance (S) with which a GFM earths the neutral of an island that has lost its earth
 
-UNEARTHED = 0.03 / 50.0
-"""Admittance (S) between a neutral and earth below which it is not earthed: an electrode that is larger than 50 V over
-30 mA protects nobody (IEC 60364-4-41)."""
+UNEARTHED = 0.03 / 50.0  # admittance (S) below which a neutral is not earthed: 50 V over 30 mA (IEC 60364-4-41)
 
-INSULATION = 1e-6
-"""Admittance to earth (S) of all neutrals that nothing earths: loads alone, which are currents in the inner loop, would
-leave their voltages undetermined."""
+INSULATION = 1e-6  # admittance to earth (S) of all neutrals that nothing earths: their voltages must be determined
 
 
 class SwitchState:
     """The island structure of a circuit, and its admittances with the inverters' filters.
 
-    `y_f`: filter admittance of each inverter (S per phase); 0 for a current source; `online`: which inverters are
-    connected; the others neither inject nor load the network.
+    `y_f`: filter admittance of each inverter (S per phase); `online`: the connected ones; the others are open.
 
-    `unknown`: nodes whose voltage is unknown: in live islands, of any admittance, not held by a source (u); `place`:
-    position of each node among them, or -1; `Y`: admittances with the connected inverters' filters (S);
-    `terminals`: nodes of the terminals: all A, then all B, then all C (3 n_inv); `earthing`: inverters that earth their
+    `unknown`: nodes in live islands, of any admittance, not held by a source; `place`: position of each node among
+    them, or -1; `terminals`: nodes of all A, then all B, then all C (3 n_inv); `earthing`: inverters that earth their
     neutral, because nothing else does in an island of theirs (IEC 60364-5-551).
     """
 
@@ -91,8 +84,7 @@ class SwitchState:
         self.earthing = tuple(self._earthing(formers, sp.csr_array(sp.diags_array(no_earth))))
         self._insulate()
         self.C = C[:, self.branches]
-        self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)
-        """Rows of `terminals` at which an inverter injects."""
+        self.feeding = np.flatnonzero((self.place[G] >= 0) & injects)  # rows of `terminals` where an inverter injects
 
     def __deepcopy__(self, memo: object) -> SwitchState:
         """Nothing in it is ever written: copies of a plant share it, as they share its circuit."""
@@ -101,7 +93,7 @@ class SwitchState:
     def _earthing(self, formers: Integers, no_earth: sp.csr_array) -> Iterator[int]:
         """Earth each neutral of these inverters that nothing earths in an island without a source; yield who does.
 
-        A filter of `no_earth` earths nothing: it is that of a GFL, which injects its current whatever the voltage is.
+        A filter of `no_earth` earths nothing: a GFL injects its current whatever the voltage is.
         """
         circuit = self.circuit
         for i in formers.tolist():
@@ -138,11 +130,7 @@ class SwitchState:
             self.Y = (self.Y + sp.diags_array(leak)).tocsr()
 
     def at_tangent(self, V_b: Complex, theta: Real) -> Reduced:
-        """Return the inner loop's arrays but those of the network: the loads' tangent, the islands' frames.
-
-        `V_b`: voltages of the live branches at the point of linearisation (V); `theta`: angle of every inverter there
-        (rad).
-        """
+        """Return the inner loop's arrays but the network's, at branch voltages (V) and inverters' angles (rad)."""
         A, B = self.loads.tangent(V_b)
         return Reduced(
             S=self.loads.S,
@@ -163,5 +151,4 @@ class SwitchState:
         return self.all_voltages(J, self.loads.currents(V_b), source_voltage)
 
     def all_voltages(self, J: Complex, I_b: Complex, source_voltage: Complex) -> Complex:
-        """Return every node's voltage (V), 0 in dead islands, from injections and branch currents (A)."""
         raise NotImplementedError

@@ -14,7 +14,7 @@ from gridpeers.plant.dynamics.live_network import LiveNetwork
 
 
 class Trip(NamedTuple):
-    """Inverters, and perhaps the substation, disconnected because their island has no solution."""
+    """Sources disconnected because their island has no solution."""
 
     step: int  # number of steps of the present `Dynamics.run` before it
     inverters: tuple[int, ...]  # disconnected inverters
@@ -23,10 +23,9 @@ class Trip(NamedTuple):
 
 
 def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Trip]:
-    """Continue with another network: factor it and find its first solution with the present injections.
+    """Continue with another network from the present injections; return the trips of islands without solution.
 
-    Inverters that lose their source of voltage stop; those that regain it start at zero current,
-    in step with the voltage there. An island without solution is de-energised; return its trips.
+    Inverters that lose their source of voltage stop; those that regain it start at zero current, in step with it.
     """
     before = network.reduction.online
     trips: list[Trip] = []
@@ -56,8 +55,7 @@ def connect(units: Inverters, network: LiveNetwork, circuit: Circuit) -> list[Tr
 def _solve_without(away: Flags, units: Inverters, network: LiveNetwork) -> None:
     """Find the voltages at the open terminals of inverters that are about to return.
 
-    Behind its filter an inverter is at zero current where its internal voltage is that of its open terminal, in each
-    phase; and where all of them are at zero current, none changes the terminal of another one.
+    At zero current the internal voltage is that of the open terminal, in each phase.
     """
     connected = units.connected.copy()
     units.connected[away] = False
@@ -71,19 +69,15 @@ def _solve_without(away: Flags, units: Inverters, network: LiveNetwork) -> None:
 
 
 def deenergise(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> list[Trip]:
-    """Disconnect all inverters of these islands; where there are none, the substation.
+    """Disconnect all inverters of these islands; where there are none, the substation, which stays off.
 
     An island with the substation thus first loses only its inverters: the grid may be able to feed it without them.
-    `switch_inverters` reconnects inverters; the substation stays off.
-
-    `step`: number of steps of the present run before; the trips repeat it.
     """
     trip = _trip(units, network, islands, step)
     return [trip, *(later._replace(step=step) for later in connect(units, network, network.circuit))]
 
 
 def _trip(units: Inverters, network: LiveNetwork, islands: Iterable[int], step: int) -> Trip:
-    """Mark the sources of these islands as disconnected; the network itself changes later."""
     reduction = network.reduction
     numbers = list(islands)
     lost = reduction.online & np.isin(reduction.inverter_island, numbers)
@@ -100,7 +94,6 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
 
     A reconnected inverter gets the set-points at which it rests: V_set is the terminal's voltage, and P_set the value
     whose droop gives no power at the island's frequency. Control decides the rest.
-    Return the trips of islands that have no solution afterwards.
     """
     moved = [i for i in which if on != bool(units.connected[i])]
     if not moved:
@@ -124,7 +117,6 @@ def switch_inverters(units: Inverters, network: LiveNetwork, which: Sequence[int
 
 
 def _black_start(units: Inverters, i: int) -> None:
-    """Start a returning GFM in step with the voltage there, or at its set-point without voltage."""
     V_1 = complex(aligned_sum(units.V[i])) / 3.0
     if abs(V_1) < 0.1 * units.V_b[i]:
         V_1 = complex(units.set_points[i, 1] * units.V_b[i] * PHASES[units.phase[i]])
@@ -139,7 +131,6 @@ def _island_speed(units: Inverters, network: LiveNetwork, i: int) -> float:
 
 
 def _rest_voltage(units: Inverters, i: int) -> float:
-    """Return the V_set (pu) at which inverter i rests without current."""
     if units.positive_sequence[i] or units.direct[i]:
         return float(abs(aligned_sum(units.V[i]))) / 3.0 / float(units.V_b[i])
     return _mean_voltage(units, i)

@@ -50,9 +50,6 @@ MOST_THREADS = 4  # threads, as far as there are cores: more of them share one p
 
 
 def each_on_a_core(work: Callable[[T], R], items: Sequence[T]) -> list[R]:
-    """Return the result of `work` for each item, in their order; raise the first item's error, if any.
-
-    Threads pay where `work` spends its time without Python's lock. No result may depend on the other items.
-    """
+    """Return the result of `work` for each item, in order. Threads pay where it needs no lock of Python."""
     with ThreadPoolExecutor(min(usable_cores(), MOST_THREADS)) as pool:
         return list(pool.map(work, items))

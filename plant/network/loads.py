@@ -14,7 +14,6 @@ from gridpeers.plant.network.merging import Merge
 
 
 def law_row(part: LoadPart) -> tuple[float, ...]:
-    """Return a part of a load as a row of `gridpeers.plant.dynamics.kernel.solve.COLUMNS`."""
     limits = (V * part.V_nom for V in (part.V_low, part.V_min, part.V_max))
     off = part.V_off * part.V_nom, part.V_off_above * part.V_nom
     return (part.S.real, part.S.imag, part.V_nom, *part.exponents, *limits, part.edge, *off)
@@ -22,10 +21,10 @@ def law_row(part: LoadPart) -> tuple[float, ...]:
 
 @dataclass(frozen=True, kw_only=True)
 class LoadBranches:
-    r"""Load branches from a node to ground (wye) or to another node (delta), as parallel arrays.
+    """Load branches from a node to ground (wye) or to another node (delta), as parallel arrays.
 
-    The voltage across a branch is :math:`V = a_f V_{n_f} - a_t V_{n_t}`; the current that it draws then is given by
-    `law`. Constant-impedance loads are not here, but in `Network.admittance`.
+    The voltage across a branch is V = a_f V[n_f] - a_t V[n_t]. Impedance loads are not here, but in
+    `Network.admittance`.
     """
 
     n_from: Integers  # node at the beginning
@@ -33,8 +32,7 @@ class LoadBranches:
     law: LoadLaw  # law of their currents
     V_nom: Real  # nominal voltage across the branch (V)
     phi0: Real  # nominal angle of the voltage across the branch (rad)
-    a_from: Real
-    """Ratio of the voltage at the branch's beginning to that of node `n_from`: 1 unless merged."""
+    a_from: Real  # voltage at the beginning over that of node `n_from`: 1 unless merged
     a_to: Real  # the same at its end; 0 at ground, where index -1 would read the last node's voltage
 
     def __len__(self) -> int:
@@ -81,7 +79,6 @@ class LoadBranches:
         return sp.csc_array((value, (row, column)), shape=(n, n))
 
     def voltages(self, V: Complex) -> Complex:
-        """Return the voltages across the branches (V) from the nodes' voltages (V, line-to-ground)."""
         return np.asarray(self.a_from * V[self.n_from] - self.a_to * V[self.n_to], dtype=np.complex128)
 
     def branch_currents(self, V: Complex) -> Complex:
@@ -91,10 +88,7 @@ class LoadBranches:
         return np.asarray(self.voltages(V) * np.conj(self.branch_currents(V)), dtype=np.complex128)
 
     def currents(self, V: Complex) -> Complex:
-        """Return the currents that the loads draw from the nodes (A), positive into the load.
-
-        Those of a delta load sum to zero unless ratios differ.
-        """
+        """Return the currents that the loads draw from the nodes (A)."""
         current = self.branch_currents(V)
         drawn = np.zeros(len(V), dtype=np.complex128)
         np.add.at(drawn, self.n_from, self.a_from * current)

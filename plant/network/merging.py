@@ -15,13 +15,9 @@ DELTA = np.array([[1.0, -1.0, 0.0], [0.0, 1.0, -1.0], [-1.0, 0.0, 1.0]])
 
 
 def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> Complex:
-    r"""Return the nodal admittance of a line (S), a pi of series impedance and halves of the shunt capacitance.
+    """Return the nodal admittance of a line (S): a pi of series impedance and halves of the shunt capacitance.
 
-    .. math:: Y = \begin{pmatrix} z^{-1} + y/2 & -z^{-1} \\ -z^{-1} & z^{-1} + y/2 \end{pmatrix}
-
-    Nodes in the order: phases of the from end, phases of the to end.
-
-    Kersting, Distribution System Modeling and Analysis, section 6.1 (exact line segment model).
+    Nodes: phases of the from end, then of the to end. Kersting, Distribution System Modeling and Analysis, section 6.1.
     """
     keep = [config.phases.index(phase) for phase in line.phases]
     p = len(keep)
@@ -35,16 +31,10 @@ def line_admittance(line: Line, config: LineConfig, *, charging: bool) -> Comple
 
 
 def transformer_admittance(transformer: Transformer, V_from: float, V_to: float) -> Complex:
-    """Return the nodal admittance of a three-phase transformer (S) at its nominal ratio.
+    """Return the nodal admittance of a transformer (S) at its nominal ratio; A, B, C of from_bus, then of to_bus.
 
-    A delta-delta transformer passes no zero sequence, so the mean of the three voltages at `to_bus` is undetermined,
-    and the matrix would be singular there. A zero-sequence admittance to ground at `to_bus` sets this mean to zero.
-    It carries no current, hence changes nothing, as long as nothing else at `to_bus` is connected to ground; loads
-    behind a delta winding must be delta loads.
-
-    Nodes in the order: A, B, C of from_bus, A, B, C of to_bus.
-
-    Kersting, Distribution System Modeling and Analysis, chapter 8.
+    Delta-delta passes no zero sequence, so the mean of the voltages at `to_bus` is undetermined. An admittance to
+    ground sets it to zero; it carries no current as long as nothing else there has ground. Kersting, chapter 8.
     """
     y = transformer.S_rated / (3.0 * V_from**2 * transformer.z)
     ratio = V_to / V_from
@@ -58,18 +48,10 @@ def transformer_admittance(transformer: Transformer, V_from: float, V_to: float)
 
 
 class Merge:
-    r"""Nodes merged by ideal devices, with their ratios.
+    """Nodes merged by closed switches and regulators, which have no impedance.
 
-    A closed switch or a regulator has no impedance, so it has no admittance either. Instead, each group of nodes
-    tied by such devices keeps one unknown, the voltage of its representative r:
-
-    .. math:: V_i = a_i V_{r(i)}, \qquad I_r = \sum_{i \in r} a_i I_i
-
-    with :math:`a_i = 1` through switches and the tap ratio through regulators. The second equation follows from the
-    first, because ideal devices take no power.
-
-    `representative`: node -> its representative. A representative represents itself; `ratio`: :math:`a_i`; exactly
-    1 for representatives.
+    Each group keeps one unknown, the voltage of its representative r: V_i = a_i V_r, and I_r = sum of a_i I_i, because
+    ideal devices take no power. `ratio`: a_i: 1 through switches, the tap's through regulators.
     """
 
     def __init__(self, representative: Integers, ratio: Real) -> None:
@@ -81,26 +63,21 @@ class Merge:
         return np.flatnonzero(self.representative == np.arange(len(self.representative))).astype(np.int64)
 
     def expand(self, V: Complex) -> Complex:
-        """Return every node's voltage (V) from the voltages at the representatives (the other entries are unused)."""
         return np.asarray(self.ratio * V[self.representative], dtype=np.complex128)
 
     def gather(self, current: Complex) -> Complex:
-        """Sum the currents of all nodes (A) at the representatives; the other entries become zero."""
         gathered = np.zeros(len(current), dtype=np.complex128)
         np.add.at(gathered, self.representative, self.ratio * current)
         return gathered
 
     def matrix(self) -> sp.csc_array:
-        """Return T with V = T V_rep and I_rep = T' I (n x n; columns of nodes that represent nothing are empty)."""
+        """Return T with V = T V_rep and I_rep = T' I; columns of nodes that represent nothing are empty."""
         n = len(self.representative)
         return sp.csc_array((self.ratio, (np.arange(n), self.representative)), shape=(n, n))
 
 
 def merge_nodes(names: Sequence[str], ties: Iterable[tuple[int, int, float]], preferred: Sequence[int]) -> Merge:
-    """Group nodes that are tied together.
-
-    `names`: names of the nodes, for errors; `ties`: ideal devices: V_to = ratio * V_from; `preferred`: nodes that
-    represent their groups by preference, the most preferred first; else the first node does.
+    """Group nodes tied by devices (from, to, V_to / V_from), represented by a `preferred` node, else the first.
 
     ValueError if two paths between the same nodes have different ratios: an ideal short circuit.
     """

@@ -27,29 +27,20 @@ from gridpeers.wire.wording import first_of
 ANGLE = {"A": 0.0, "B": -2.0 * pi / 3.0, "C": 2.0 * pi / 3.0}  # nominal angles of the phases (rad)
 
 DELTA_PAIRS = (("A", "B"), ("B", "C"), ("C", "A"))
-"""Ends of the three branches of a delta load; its nominal angles are +30, -90, +150 degrees."""
 
 
 class Network:
     """Nodes, switches and admittances of a feeder. Pure: every method is a function of the tables and of `closed`.
 
-    Nodes are (bus, phase), buses in the order of the feeder's table, phases A, B, C. All voltages are line-to-ground
-    phasors (V RMS) in one frame at nominal frequency; all reactances are those at nominal frequency.
+    Nodes are (bus, phase), in the order of the feeder's table. Voltages are line-to-ground phasors (V RMS) in one frame
+    at nominal frequency. Switches and regulators tie nodes together (`merge`); in `admittance` only representatives
+    have entries.
 
-    Switches and regulators are ideal and have no impedance. They tie nodes together (`merge`); tied nodes keep
-    one unknown. In `admittance` only representatives have entries.
+    `line_charging`: whether lines have shunt capacitance; `spares`: names of the spare inverters in this run.
 
-    `line_charging`: whether to include the lines' shunt capacitance. The published solution of the standard feeder has
-    it; `spares`: names of the spare inverters in this run; ValueError for an unknown one.
-
-    `V_nom`: nominal voltages (V, line-to-neutral);
-    `nominal`: nominal phasors (V). No transformer of our own tables shifts phases, so they hold behind transformers
-    too; in a feeder of `LinearElement`s they are the voltages without load;
-    `switches`: by name ("13-152"); `switch_name` finds the name;
-    `source_nodes`: nodes of the substation, if there is one. They always represent themselves (3);
-    `inverters`: in the table's order, spares last;
-    `Y_branches`, `Y_capacitors`, `Y_loads`: parts of the admittance matrix (S) before merging: lines and transformers;
-    capacitor banks; constant-impedance loads.
+    `V_nom`: nominal voltages (V, line-to-neutral); `nominal`: nominal phasors (V), in a feeder of `LinearElement`s
+    those without load; `source_nodes`: nodes of the substation, which always represent themselves; `inverters`: spares
+    last; `Y_branches`, `Y_capacitors`, `Y_loads`: parts of the admittance matrix (S) before merging.
     """
 
     def __init__(self, feeder: Feeder, *, line_charging: bool = True, spares: Iterable[str] = ()) -> None:
@@ -87,31 +78,20 @@ class Network:
         return neutrals_of(self._first)
 
     def index(self, bus: str, phase: str) -> int:
-        """Return the position of a node in all vectors; raise KeyError if there is no such node."""
         return self._index[bus, phase]
 
     def has(self, bus: str, phases: str) -> bool:
         return all((bus, phase) in self._index for phase in phases)
 
     def switch_name(self, text: str) -> str:
-        """Resolve a switch's name in either order of its buses, or its alias ("sw1_2"), to its name in `switches`."""
         return text if text in self.switches else switch_name(self.feeder, text)
 
     def merge(self, closed: frozenset[str]) -> Merge:
-        """Return the nodes that these closed switches and the regulators merge, with their ratios.
-
-        The substation's nodes represent their groups, then the inverters' nodes, else the first node of a group.
-        """
+        """Return the nodes merged by these switches and the regulators; sources and inverters represent theirs."""
         return merge_nodes(self._node_names(), self._ties(closed), self._wanted)
 
     def admittance(self, closed: frozenset[str]) -> sp.csc_array:
-        """Return the admittance matrix (S) with these switches closed, between representatives.
-
-        It has lines, transformers, capacitors and constant-impedance loads. Rows and columns of nodes that only follow
-        their representative are empty, and so is the matrix outside of the islands' blocks.
-
-        Return T' Y T, with T of `merge`: I_rep = Y_rep V_rep. Without the inverters' filters.
-        """
+        """Return the admittances (S) of branches, capacitors and impedance loads: T' Y T with T of `merge`."""
         T = self.merge(closed).matrix()
         Y = sp.csc_array(T.T @ self._Y @ T)
         Y.sum_duplicates()
@@ -124,11 +104,7 @@ class Network:
         return own + self._load_part_branches(parts) if parts else own
 
     def weak_loads(self, weak: Mapping[int, float]) -> str:
-        """Say which loads the network cannot feed even alone, and what to do; of none, that the load may be too much.
-
-        `weak`: branches of `loads`, and the short-circuit powers there (VA): see
-        `gridpeers.plant.dynamics.island_newton`.
-        """
+        """Say which loads the network cannot feed; `weak`: their branches, and short-circuit powers (VA)."""
         pairs = zip(self.feeder.loads, self._first.loads, strict=True)
         names = [load.bus for load, table in pairs if load.model != "Z" for S in table.S if S]
         names += [part.name for part in self.feeder.load_parts if not part.is_impedance]
@@ -150,10 +126,7 @@ class Network:
         )
 
     def with_loads(self, feeder: Feeder) -> Network:
-        """Return the same network with the loads of `feeder`, which is this one's with other powers of loads.
-
-        The load branches stay the same ones, in the same order: a load that is set to nothing keeps its branches.
-        """
+        """Return the same network with other powers of loads; a load that is set to nothing keeps its branches."""
         other = copy(self)
         other.feeder = feeder
         other.Y_loads = other._impedance_loads()  # noqa: SLF001  its own class
@@ -181,7 +154,6 @@ class Network:
         return [f"bus {bus} phase {phase}" for bus, phase in self.nodes]
 
     def _ties(self, closed: frozenset[str]) -> list[tuple[int, int, float]]:
-        """Return the pairs of nodes that closed switches and regulators tie, with their ratios."""
         for name in closed - self.switches.keys():
             raise ValueError(f'closed switch "{name}" is not in Network.switches; pass it through switch_name')
         devices: list[tuple[Switch | Regulator, float]] = [
@@ -260,7 +232,6 @@ class Network:
         )
 
     def _load_branches(self, chosen: list[bool]) -> LoadBranches:
-        """Return the branches of the chosen loads that have power in the network's first tables."""
         n_from, n_to, power, current, V_nom, phi0 = [], [], [], [], [], []
         for load, table in compress(zip(self.feeder.loads, self._first.loads, strict=True), chosen):
             pairs = DELTA_PAIRS if load.connection == "D" else tuple((phase, "") for phase in PHASES)

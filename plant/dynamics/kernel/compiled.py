@@ -1,7 +1,6 @@
 """How the plant's inner loop is compiled, by numba once, whose cache keeps the machine code; and its small arithmetic.
 
-The cache is in the user's cache folder. Where that cannot be written, each process compiles for itself. Numba's own
-choice would be a folder beside the sources, and an error where it can write none.
+Numba's own choice would be a folder beside the sources, and an error where it can write none.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ _HERE = Path(__file__).parent
 def kernel_folder() -> Path | None:
     """Return where machine code of these sources is kept; None where the user has no home.
 
-    An edit of `gfm.py` changes the code of its callers in `step.py`, so its name carries a hash of all files here.
+    Its name carries a hash of all files here, because an edit of `gfm.py` changes the code of its callers in `step.py`.
     """
     digest = hashlib.sha256(b"".join(source.read_bytes() for source in sorted(_HERE.glob("*.py")))).hexdigest()
     try:
@@ -119,16 +118,12 @@ def magnitude(z: complex) -> float:
 
 @compiled
 def unit_phasor(angle: float) -> complex:
-    """Return exp(j angle), the angle in rad."""
     return complex(np.cos(angle), np.sin(angle))
 
 
 @compiled
 def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
-    """Predictor x0 + h d, or corrector x0 + h (d1 + d) / 2 in the second pass.
-
-    `x0`: state at the start of the step; `d1`: slope of the first pass; not read in the first pass.
-    """
+    """Return the predictor x0 + h d, or in the second pass the corrector x0 + h (d1 + d) / 2."""
     if second:
         return x0 + 0.5 * h * (d1 + d)
     return x0 + h * d
@@ -136,11 +131,9 @@ def heun(x0: float, d1: float, d: float, h: float, second: bool) -> float:
 
 @compiled
 def multiply_add(AT: Real, x: Real, sign: float, y: Real) -> None:
-    """Add sign * A x to y, A given transposed, in an order that depends on nothing but the sizes.
+    """Add sign * A x to y, A given transposed, in an order that depends on nothing but the sizes, as BLAS may not.
 
-    A BLAS call may sum in another order with another number of threads or alignment; equal bytes across
-    processes are worth more here. Rows of AT run along y, so the inner loop vectorises without
-    reordering a sum; four at a time spare three quarters of the traffic on y.
+    Rows of AT run along y, so the inner loop vectorises without reordering a sum; four at a time spare traffic on y.
     """
     rows, n = AT.shape
     whole = rows - rows % 4

@@ -1,8 +1,7 @@
 """One pass of all inverters' controllers: from a network solution to the injections of the next one, compiled.
 
-Every method of time stepping consists of such passes. A pass is a whole step of a model in the order of its own
-blocks. A pass of length 0 leaves the states, except that it holds them within their limits, and writes what they are
-at this point: slopes and outputs. So a model is described once, for every method.
+Every method of time stepping consists of such passes. A pass of length 0 writes slopes and outputs at the present
+states, which it only holds within their limits. So a model is described once, for every method.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ whether its phase currents were limited (1 or 0)."""
 
 
 class Units(NamedTuple):
-    """The inverters of a run as the compiled functions take them: parameters, states, and their terminals."""
+    """The inverters of a run as the compiled functions take them."""
 
     f_nom: float  # nominal frequency (Hz)
     gfm: Any  # records of `gridpeers.plant.dynamics.kernel.gfm.PARAMETERS`
@@ -48,14 +47,12 @@ class Units(NamedTuple):
     J: Complex  # injections (A), n_inv x 3: in, those of the network solution; out, the new ones
     J_0: Complex  # injections (A) at the start of the step
     V: Complex  # terminal voltages (V), n_inv x 3, of the last network solution
-    I: Complex  # noqa: E741  # the paper's symbol
-    """Currents out of the inverters (A), n_inv x 3, of the last network solution."""
+    I: Complex  # noqa: E741  # the paper's symbol  # currents out of the inverters (A)
     limiting: Flags  # inverters whose phase currents were limited in the last network solution
 
 
 @compiled
 def read_voltage(i: int, V: Complex, readings: Real) -> None:
-    """Write the mean of the phases' voltages, the lowest and the highest (V) into an inverter's reading."""
     a, b, c = magnitude(V[i, 0]), magnitude(V[i, 1]), magnitude(V[i, 2])
     readings[i, 3], readings[i, 4], readings[i, 5] = (a + b + c) / 3.0, min(a, b, c), max(a, b, c)
 
@@ -104,10 +101,7 @@ def keep_start(units: Any) -> None:
 
 @compiled
 def turn_frames(units: Any, net: Any, theta: Real, rotation: Complex) -> None:
-    """Write the factor that turns phasors into each island's frame, by the present angle of its leader.
-
-    `theta`: room for a number an inverter; `rotation`: one factor an island, written here.
-    """
+    """Write the factor that turns phasors into each island's frame; `theta`: room for a number an inverter."""
     for k in range(units.gfm_at.size):
         theta[units.gfm_at[k]] = units.gfm_state[k].theta
     for island in range(net.leader.size):
@@ -118,12 +112,7 @@ def turn_frames(units: Any, net: Any, theta: Real, rotation: Complex) -> None:
 
 @compiled
 def advance_inverters(units: Any, h: float, second: bool, readings: Real) -> None:
-    """Take one pass of every inverter on the network.
-
-    `units`: `Units`: V is read; states, J and I are advanced; `h`: step (s); 0: only slopes and outputs at the present
-    states; `readings`: n_inv x READING, written here: f (Hz) at the end of the pass; P, Q and V of the network
-    solution.
-    """
+    """Take one pass of length `h` (s) of every inverter: V is read; states, J, I and `readings` are written."""
     set_points, J, V = units.set_points, units.J, units.V
     for k in range(units.gfm_at.size):
         i = units.gfm_at[k]

@@ -1,8 +1,8 @@
 """Grid-following inverter: PLL, freq-watt, volt-var, current control (`inverter-models.md` section 4).
 
-In the mode "positive_sequence" there are one PLL on the positive-sequence voltage, one current reference, and three
-phase currents driven to it; in the mode "balanced_power" each phase has a PLL and a reference of its own, so that the
-powers are equal. Per unit of the inverter's own rating; dq in the frame of the phase's PLL.
+In the mode "positive_sequence" there are one PLL, one current reference, and three phase currents driven to it; in the
+mode "balanced_power" each phase has its own, so that the powers are equal. Per unit of the own rating; dq in the frame
+of the phase's PLL.
 """
 
 from __future__ import annotations
@@ -41,7 +41,6 @@ PARAMETERS = np.dtype(
     ],
     align=True,
 )
-"""What a GFL is: `GflParameters` with the bases and droops of one unit."""
 
 STATE = np.dtype(
     [
@@ -65,27 +64,24 @@ STATE = np.dtype(
     ],
     align=True,
 )
-"""States of a GFL and its PLL frequency."""
 
 
 def own_feedback(par: GflParameters) -> complex:
-    """Return what the current after a pass gains from the current before it, at the same voltage (dq, section 4.6)."""
+    """Return the part of a current before a pass that the current after it gains, at the same voltage (dq, 4.6)."""
     return (1j * par.X_f * par.F_current - par.k_pc) / complex(par.R_f, par.X_f)
 
 
 def filter_admittance(par: GflParameters, S_b: float, V_b: float) -> complex:
-    """Return the admittance of one phase of the filter (S); arguments as for `pack`."""
     return 1.0 / (complex(par.R_f, par.X_f) * V_b**2 / (S_b / 3.0))
 
 
 def pack(
     par: GflParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float, method: Method = "first-order"
 ) -> NDArray[np.void]:
-    """Parameters of one unit as the compiled pass wants them; arguments as `gridpeers.plant.dynamics.kernel.gfm.pack`.
+    """Parameters of one unit as the compiled pass wants them; arguments as of `kernel.gfm.pack`.
 
-    In the method "second-order" the unit is a current source towards the network, in either model.
-
-    ValueError if the current controller's one-pass feedback cannot be stable (checklist row 23).
+    In the method "second-order" the unit is a current source towards the network, in either model. ValueError if the
+    current controller's one-pass feedback cannot be stable (checklist row 23).
     """
     if method == "first-order" and par.model == "voltage_source" and abs(own_feedback(par)) >= 1.0:
         raise ValueError(
@@ -116,11 +112,7 @@ def settle(
     S: complex,
     v: float,
 ) -> None:
-    """Set a state to rest, in step with the voltage (section 7).
-
-    `V`, `I`: phase voltages (V) and currents out of the inverter (A); `S`: terminal power (pu); `v`: mean terminal
-    voltage (pu).
-    """
+    """Set a state to rest (section 7) with these voltages (V) and currents (A), power and mean voltage (pu)."""
     theta = float(np.angle(V @ np.array([1.0, A120, A120**2])))
     turn = np.exp(-1j * theta) * np.array([1.0, A120, A120.conjugate()])
     if g["balanced_power"]:
@@ -141,10 +133,9 @@ def settle(
 
 @compiled
 def power_reference(g: Any, P_set: float, f_m: float) -> float:
-    """Freq-watt characteristic (7) with dead band, section 4.3 (pu).
+    """Freq-watt characteristic (7), section 4.3 (pu).
 
-    Outside the dead band the *full* deviation acts, so that the characteristic jumps at its edges, or `from_edge` the
-    deviation from the edge.
+    Outside the dead band the full deviation acts, or `from_edge` that from the edge.
     """
     P_d = P_set
     if g.frequency_watt and not (g.f_nom - g.db_UF < f_m < g.f_nom + g.db_OF):
@@ -195,10 +186,7 @@ def lock_others(
 def current_pass(
     g: Any, c0: complex, c: complex, d1: complex, i_ref: complex, i: complex, u: complex, h: float, second: bool
 ) -> tuple[complex, complex, complex]:
-    """One phase's current controller: new integrator, output, slope (sections 4.6, 4.7; dq, pu).
-
-    The output is the internal voltage e in the voltage-source form, the current in the other.
-    """
+    """One phase's current controller: new integrator, output (e, or i of a current source), slope (4.6, 4.7; pu)."""
     slope = (i_ref - c) * (1.0 / g.T_if) if g.current_source else g.k_ic * (i_ref - i)
     c_new = c0 + 0.5 * h * (d1 + slope) if second else c0 + h * slope
     if g.current_source:
@@ -224,13 +212,10 @@ def advance_gfl(
     h: float,
     second: bool,
 ) -> tuple[complex, complex, complex]:
-    """One pass of a step; returns the injections J_A, J_B, J_C (A) of the next network solution.
+    """One pass of a step, in the order of blocks of section 5; returns the injections (A) of the next network solution.
 
-    The order of the blocks is that of section 5 and matters in the first 20 ms.
-
-    `P_set`, `V_set`, `Q_set`: set-points (pu), equations (7) and (8); `x0`, `x`, `d`: records of `STATE`: start of the
-    step; trial state, advanced here; first pass' slopes; `V_A`, `V_B`, `V_C`: terminal voltages (V) of this pass'
-    network solution; `J_A`, `J_B`, `J_C`: injections (A) that went into that solution.
+    `P_set`, `V_set`, `Q_set`: pu; `x0`, `x`, `d`: records of `STATE`: start of the step; trial state, advanced here;
+    slopes of the first pass; V (V) and J (A): of the last network solution.
     """
     # 1: measure in the frame the pass starts with
     to_dq = unit_phasor(-x.theta)

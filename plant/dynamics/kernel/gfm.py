@@ -1,7 +1,7 @@
 """Grid-forming inverter: droop, limiters and voltage controller (`inverter-models.md` section 3).
 
-One controller for three phases; its output is one internal voltage E and one angle theta. All
-control quantities are per unit of the inverter's own rating, speeds in rad/s relative to nominal.
+One controller for three phases, of internal voltage E and angle theta. Per unit of the own rating, speeds in rad/s
+relative to nominal.
 """
 
 from __future__ import annotations
@@ -33,7 +33,6 @@ PARAMETERS = np.dtype(
     ],
     align=True,
 )
-"""What a GFM is: `GfmParameters` with the bases and droops of one unit."""
 
 STATE = np.dtype(
     [
@@ -51,14 +50,12 @@ STATE = np.dtype(
     ],
     align=True,
 )
-"""States of a GFM and its two outputs."""
 
 
 def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_nom: float) -> NDArray[np.void]:
     """Parameters of one unit as the compiled pass wants them.
 
-    `S_b`: rating (VA, three phases); `m_p`: P-f droop (pu frequency per pu power); `m_q`: Q-V droop (pu voltage per pu
-    reactive power); `f_nom`: nominal frequency (Hz), base of m_p.
+    `S_b`: VA, three phases; `m_p`, `m_q`: pu frequency, voltage per pu power; `f_nom`: Hz, base of m_p.
     """
     Z_b = V_b**2 / (S_b / 3.0)
     record = np.zeros((), PARAMETERS)
@@ -73,11 +70,7 @@ def pack(par: GfmParameters, S_b: float, V_b: float, m_p: float, m_q: float, f_n
 
 
 def settle(g: np.void, state: np.void, J_A: complex, S: complex, v: float) -> None:
-    """Set a state to rest (section 7).
-
-    `J_A`: injection of phase A (A), from which the internal voltage follows; `S`: measured power (pu); `v`: measured
-    voltage (pu).
-    """
+    """Set a state to rest (section 7) by the injection of phase A (A), and the measured power and voltage (pu)."""
     E = J_A / g["y_f"]
     state["p"], state["q"], state["v"] = S.real, S.imag, v
     state["x_over"] = state["x_under"] = state["y_over"] = state["y_under"] = state["w"] = 0.0
@@ -105,12 +98,8 @@ def advance_gfm(
 ) -> None:
     """One pass of a step: from what the network solution shows to the next internal voltage.
 
-    Integrator slopes are taken from the filters' values at the end of the pass, in both passes
-    (section 5): that is what the reference implementation does, and the first 20 ms depend on it.
-
-    `P_set`, `V_set`: set-points (pu), equations (3) and (4); `x0`, `x`, `d`: records of `STATE`: at the start of the
-    step; the trial state, advanced here; slopes of the first pass, written in the first and read in the second; `P`,
-    `Q`, `v`: power and voltage (pu) of this pass' network solution, as the model measures them.
+    Integrator slopes are taken from the filters' values at the end of the pass, in both passes (section 5), as in
+    GridLAB-D: the first 20 ms depend on it. Set-points, `P`, `Q`, `v`: pu; `x0`, `x`, `d`: as of `advance_gfl`.
     """
     # measurement filters, 3.2
     dp = (P - x.p) / g.T_p

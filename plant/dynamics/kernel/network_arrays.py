@@ -1,8 +1,7 @@
 """A network in the inner loop, by dense matrices or by sparse factors; what of the latter is compiled.
 
-The sparse matrix is the real form of a network and of its loads' tangent, in blocks of 2 x 2. A node's real and
-imaginary part stay together, so that a pivot is a block: the real form of a reactance alone has a diagonal of zeros,
-but its blocks are regular. Blocks are (a, b, c, d) for [[a, b], [c, d]].
+The sparse matrix has blocks of 2 x 2, a node's real and imaginary part: the real form of a reactance alone has a
+diagonal of zeros, but its blocks are regular. Blocks are (a, b, c, d) for [[a, b], [c, d]].
 """
 
 from __future__ import annotations
@@ -37,8 +36,7 @@ def add_tangent(
 ) -> None:
     """Add what branches draw, A V + B V^* (A), to a matrix before it is factored.
 
-    `f`: the matrix; written; `first`, `second`, `a_first`, `a_second`: nodes of each branch, or -1, and the ratios with
-    which they count; `across`: entry that couples the two nodes, or -1; `A`, `B`: factors of each branch (S).
+    `across`: entry that couples a branch's two nodes, or -1; the others as in `SparseMaps` and `Reduced`.
     """
     for b in range(first.size):
         p, q, r, s = A[b].real + B[b].real, B[b].imag - A[b].imag, A[b].imag + B[b].imag, A[b].real - B[b].real
@@ -68,10 +66,7 @@ def subtract_product(to: Real, left: Real, right: Real) -> None:
 
 @compiled
 def factorise_blocks(f: BlockFactors) -> bool:
-    """Factorise a matrix in place, without pivoting; return whether its determinant is positive.
-
-    A matrix that is singular has factors that are not finite.
-    """
+    """Factorise in place, without pivoting; return whether the determinant is positive. Singular: not finite."""
     positive = True
     for k in range(f.D.shape[0]):
         a, b, c, d = f.D[k]
@@ -128,10 +123,7 @@ COPY = -2  # in place of the position of a terminal that copies the first one of
 
 
 class SparseMaps(NamedTuple):
-    """A network by sparse factors for the inner loop.
-
-    Unknowns are node voltages, [Re V_1, Im V_1, Re V_2, ...].
-    """
+    """A network by sparse factors for the inner loop; its unknowns are [Re V_1, Im V_1, Re V_2, ...]."""
 
     factored: BlockFactors  # of the admittances and the loads' tangent
     constant: Real  # right-hand side (A) without injections: sources, and the constant part of the tangent
@@ -140,15 +132,14 @@ class SparseMaps(NamedTuple):
     a_first: Real  # ratio with which the first node's voltage counts in the branch's
     a_second: Real  # the same for the second
     from_sources: Complex  # part of each branch's voltage that the ideal sources give (V)
-    terminals: Integers
-    """Positions of the inverters' terminals, n_inv x 3, or -1; `COPY` for a copy of an inverter's first terminal."""
+    terminals: Integers  # positions of terminals, n_inv x 3, or -1; `COPY` of an inverter's first terminal
     fixed: Complex  # voltages (V) of the terminals that have no position: a source's, or 0
     feeds: Flags  # which inverters inject
     scratch: Real  # room for the solution and its right-hand side
     increments: Real  # how the branch voltages changed from one solution to the next (V), 4 x 2 m, the last one last
     rate: Real
-    """Part of an iteration's change that the next one has, when last seen, 1: unknown; and how much it can grow by a
-    change of the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
+    """Part of an iteration's change that the next one has, when last seen, 1: unknown; and its growth by a change of
+    the branch voltages (1/V), for it is proportional to their distance from the tangent's."""
 
 
 _NOTHING, _NOWHERE, _NO_PHASOR = np.zeros(0), np.zeros(0, np.int64), np.zeros(0, np.complex128)
@@ -184,12 +175,7 @@ def branch_voltages(maps: SparseMaps, V: Real, x: Real) -> float:
 
 @compiled
 def draw_remainders(maps: SparseMaps, I_b: Complex, i_c: Complex, A: Complex, B: Complex, x: Real, right: Real) -> None:
-    """Take what the branches draw (A) beyond the loads' tangent from the nodes at their ends.
-
-    `I_b`: currents of the branches (A) at x; `i_c`, `A`, `B`: the tangent; see
-    `gridpeers.plant.dynamics.kernel.network_arrays.Reduced`; `x`: [Re V_b; Im V_b] of the branches (V); `right`:
-    currents into the nodes (A); written.
-    """
+    """Take what branches draw (A) beyond the tangent at x = [Re V_b; Im V_b] from the currents into their nodes."""
     first, second, a_first, a_second = maps.first, maps.second, maps.a_first, maps.a_second
     m = first.size
     for b in range(m):
@@ -224,14 +210,10 @@ def note_increment(maps: SparseMaps, x_0: Real, x: Real) -> None:
 
 
 NO_MATRIX, NO_VECTOR = np.zeros((0, 0)), _NOTHING
-"""In place of the dense matrices of a network that is solved by sparse factors."""
 
 
 class Reduced(NamedTuple):
-    """A network at a tangent of its loads, by dense matrices or by sparse factors.
-
-    Real matrices act on [Re; Im] and are stored transposed, rows contiguous.
-    """
+    """A network at a tangent of its loads; real matrices act on [Re; Im] and are stored transposed, rows contiguous."""
 
     S: Complex  # constant power of the live branches (VA)
     I0: Complex  # constant current of the live branches (A)
@@ -242,8 +224,7 @@ class Reduced(NamedTuple):
     B: Complex  # tangent, factor of V_b^* (S)
     branch_island: Integers  # island of each live branch
     inverter_island: Integers  # island of each inverter
-    leader: Integers
-    """For each island the inverter whose angle sets its frame; -1: the frame does not rotate."""
+    leader: Integers  # inverter whose angle sets each island's frame; -1: it does not rotate
     theta_lin: Real  # that inverter's angle at the point of linearisation (rad)
     PT: Real = NO_MATRIX  # J to x, (6 n_inv) x (2 m)
     QT: Real = NO_MATRIX  # N to x, (2 m) x (2 m)

@@ -1,11 +1,9 @@
 """The plant's inner loop of second order, compiled: Heun's method for controllers and network as one DAE.
 
-They are x' = f(x, y), 0 = g(x, y), with the controllers' states x, and the voltages and currents y. A step is the
-predictor x_1 = x_0 + h f(x_0, y_0) and the corrector x_0 + h/2 (f(x_0, y_0) + f(x_1, y_1)). At each of these states
-g = 0 is solved for y, the network together with the inverters' feed-forward: the state space form of Hairer, Wanner,
-Solving Ordinary Differential Equations II, VI.1. So nothing acts a pass late, and readings are of the step's end.
-
-f is a pass of length 0 of the models, which `step` advances by passes of length h: each model is described once.
+x' = f(x, y), 0 = g(x, y), with the controllers' states x, and the voltages and currents y. A step is the predictor x_1
+= x_0 + h f(x_0, y_0) and the corrector x_0 + h/2 (f(x_0, y_0) + f(x_1, y_1)). At each of these states g = 0 is solved
+for y, network and inverters' feed-forward together: the state space form of Hairer, Wanner, Solving Ordinary
+Differential Equations II, VI.1. f is a pass of length 0 of the models. So nothing acts a pass late.
 """
 
 from __future__ import annotations
@@ -19,8 +17,7 @@ from gridpeers.plant.dynamics.kernel.controller_pass import advance_inverters, k
 from gridpeers.plant.dynamics.kernel.network_arrays import extrapolate, note_increment
 from gridpeers.plant.dynamics.kernel.step import FAILURES, solve_within_limits
 
-CONSISTENT = 1e-10
-"""Largest change of a current in the last round between network and inverters (pu of the inverter's rated current)."""
+CONSISTENT = 1e-10  # last change of a current between network and inverters (pu of rated current)
 
 LOOSE = 0.01  # tolerance of a round's network solution, as a part of the round's change (pu voltage per pu current)
 
@@ -41,24 +38,17 @@ class Slopes(NamedTuple):
 
 
 class FeedForward(NamedTuple):
-    """How each inverter's current depends at once on the terminal's voltage and on itself."""
-
     y: Complex
     """Admittance (S) between the internal voltage that a pass gives and the terminal; 0: a pass gives the current
     itself, or its internal voltage is a state and the admittance is part of the network."""
-    gain: Complex
-    """1 / (1 - a), where the current after a pass changes by a times what the current before it changes."""
+    gain: Complex  # 1 / (1 - a), a: part of a current before a pass that the current after it gains
     I_b: Real  # rated currents (A)
     V_b: float  # highest nominal voltage (V)
 
 
 @compiled
 def take_round(units: Any, forward: Any, used: Complex, change: Complex, readings: Real) -> float:
-    """Write slopes and injections that belong to the present voltages; returns a current's largest change (pu).
-
-    `units`: `Units` whose states at the start of the step are the present ones; `used`: injections (A) of the network
-    solution; `change`: how the injections change (A); written.
-    """
+    """Write slopes, injections and their `change` (A) at the present voltages; return the largest one (pu)."""
     advance_inverters(units, 0.0, False, readings)
     largest = 0.0
     for i in range(units.online.size):
@@ -88,11 +78,6 @@ def solve_together(
     An inverter's feed-forward of its own voltage and current is linear and solved in closed form. What remains is the
     current reference P / u_d, weighted by k_pc: each round gains a decade, and the secant through the last two rounds
     (Anderson acceleration of depth 1, each island by itself) two.
-
-    `units`: `Units` whose states at the start of the step are the present ones; `rotation`: factor that turns phasors
-    into each island's frame; `readings`: n_inv x READING, written here.
-
-    Return iterations of the network, without the one that each round after the first takes at least.
     """
     n, islands = units.online.size, net.leader.size
     J = units.J
@@ -145,10 +130,8 @@ def run_second_order_steps(
 ) -> int:
     """Advance to the end of `steps` steps; returns, and resumes after a failure, as `step.run_steps` does.
 
-    `begin`: solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor; the last is 2 `steps`, at the
-    end; `present`: the same, with the present states in place of those at the start of the step; `slopes`: `Slopes` of
-    the same memory; `x`: branch voltages in the islands' frames, the first guess of the next solution; `out`: steps x
-    n_inv x READING: f, P, Q and V at the end of each step.
+    `begin`: solution to begin with: 2 k at the start of step k, 2 k + 1 at its predictor, 2 `steps` at the end;
+    `present`: `units` with the present states in place of those at the start of the step; `slopes`: the same memory.
     """
     total = 0
     if steps == 0:

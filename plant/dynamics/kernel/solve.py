@@ -16,9 +16,7 @@ COLUMNS = ("P", "Q", "V_nom", "n_p", "n_q", "V_low", "V_min", "V_max", "edge", "
 """Columns of `law`: P (W), Q (var), voltages (V), and the exponents n_p, n_q and edge; see `LoadPart`."""
 
 
-STEEPNESS = 500.0
-"""How fast a load drops out around V_off or V_off_above: the hyperbolic tangent of this times the distance (pu), as in
-OpenDSS."""
+STEEPNESS = 500.0  # of the hyperbolic tangent by which a load drops out (1/pu), as in OpenDSS
 
 
 @compiled
@@ -35,10 +33,7 @@ def power(m: float, n: float) -> float:
 
 @compiled
 def limited_admittance(row: Real, V: float) -> tuple[complex, complex]:
-    """Return a load's admittance I / V (S) at this magnitude of its voltage (V), and its slope (S/V).
-
-    `V`: magnitude of the voltage across the load (V).
-    """
+    """Return a load's admittance I / V (S) at a magnitude of its voltage (V), and its slope (S/V)."""
     P, Q, V_nom, n_p, n_q, V_low, V_min, V_max, edge, V_off, V_off_above = row
     per_square = 1.0 / (V_nom * V_nom)
     if (V_low >= V and V_low != V_min) or V <= 0.0:
@@ -91,8 +86,7 @@ MAX_ITERATIONS = 60
 
 CAUTION = 0.1  # part of the tolerance that what is left of an iteration may have by its rate so far
 
-NOISE = 100.0
-"""Change of an iteration, as a multiple of the tolerance, from which on the next one tells its rate, not rounding."""
+NOISE = 100.0  # change, over the tolerance, from which on the next one tells its rate, not rounding
 
 
 @compiled
@@ -113,7 +107,6 @@ def load_currents(S: Complex, I0: Complex, limited_at: Integers, law: Real, x: R
 
 @compiled
 def remainder(current: complex, V_b: complex, i_c: complex, A: complex, B: complex) -> complex:
-    """Return what a branch draws (A) beyond the tangent of its load at the voltage V_b (V)."""
     return current - i_c - A * V_b - B * V_b.conjugate()
 
 
@@ -170,13 +163,9 @@ def solve_network(
 ) -> int:
     """Solve for the terminal voltages; returns the iterations, or -1 if there is no finite solution to the tolerance.
 
-    `J`: injections, n_inv x 3 (A);
-    `rotation`: exp(-j angle) into each island's frame;
-    `x`: branch voltages in that frame (V), [Re; Im]: first guess, then solution;
-    `I_b`: branch currents in that frame (A), written here;
-    `V`: terminal voltages, n_inv x 3 (V), written here;
-    `tolerance`: largest change of a branch voltage in the last iteration (V);
-    `work`: room for 6 n_inv + 2 m + 2 m + 2 m + 6 n_inv numbers.
+    `rotation`: exp(-j angle) into each island's frame; `x`, `I_b`: branch voltages (V) and currents (A) in it: first
+    guess, then solution; `tolerance`: largest change of a branch voltage in the last iteration (V); `work`: room for 12
+    n_inv + 6 m numbers.
     """
     if net.sparse.constant.size:
         return solve_sparse(net, J, rotation, x, I_b, V, tolerance)
@@ -258,16 +247,10 @@ def settle_powers(
 ) -> tuple[int, float]:
     """Find the injections with which every inverter delivers its power; return the rounds taken, and the last change.
 
-    The change is that of an injection (pu of its rated current). Where they have not settled, one round more than
-    `most` is returned; where the network has no solution at the injections J, `NO_NETWORK`.
-
-    `net`: a `gridpeers.plant.dynamics.kernel.network_arrays.Reduced` of islands at rest;
-    `J`: injections (A), n_inv x 3: first guess, then solution;
-    `S`: powers of all three phases (VA);
-    `y`: admittances of the inverters that are part of the network (S);
-    `rated`: ratings over nominal voltages (A);
-    `delivers`: inverters whose injection is to be found; the others keep theirs;
-    `balanced`: inverters of equal powers, in place of a balanced injection.
+    The change is that of an injection (pu of its rated current). Where they have not settled, `most` + 1 is returned;
+    where the network has no solution, `NO_NETWORK`. `J` (A): first guess, then solution; `S`: powers of three phases
+    (VA); `y`: admittances of the inverters that are part of the network (S); `rated`: ratings over nominal voltages
+    (A); `delivers`: inverters whose injection is to be found; `balanced`: those of equal powers.
     """
     n = J.shape[0]
     work = np.empty(12 * n + 6 * net.S.size)

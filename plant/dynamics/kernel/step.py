@@ -1,11 +1,9 @@
 """The plant's inner loop, compiled: two network solutions and two controller passes a step (section 5).
 
-**Current limit** (`inverter-models.md` 3.7). A phase whose current is beyond the limit keeps its angle and loses the
-surplus: its injection becomes the one that gives the limit at the voltage found. That moves the voltages, so limiting
-and solving alternate until both rest. As in GridLAB-D this begins at the voltages of the last solution, and the
-injections only ever shrink: what remains may be less than the limit, and depends on the way. To begin at the unlimited
-solution would be plainer, but differs a hundred times more from GridLAB-D. The controller knows nothing of all this;
-its next pass gives the unlimited injection again.
+**Current limit** (`inverter-models.md` 3.7). A phase beyond the limit keeps its angle and loses the surplus: its
+injection becomes the one that gives the limit at the voltage found. That moves the voltages, so limiting and solving
+alternate until both rest. As in GridLAB-D this begins at the voltages of the last solution, and injections only ever
+shrink; beginning at the unlimited solution differs a hundred times more. The controller knows nothing of this.
 """
 
 from __future__ import annotations
@@ -26,11 +24,7 @@ MAX_LIMITING = 2000
 
 @compiled
 def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Complex, limiting: Flags) -> float:
-    """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V).
-
-    `gfm`, `gfm_at`, `online`, `J`, `V`, `limiting`: as in `gridpeers.plant.dynamics.kernel.controller_pass.Units`: J is
-    reduced, and `limiting` says whose.
-    """
+    """Reduce the injections of the phases beyond their limit; return the largest change of an internal voltage (V)."""
     largest = 0.0
     for k in range(gfm_at.size):
         i = gfm_at[k]
@@ -50,11 +44,7 @@ def limit_currents(gfm: Any, gfm_at: Integers, online: Flags, J: Complex, V: Com
 
 @compiled
 def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real) -> int:
-    """Solve again and again until no phase is beyond its limit; return the iterations, or -1 as `solve_network`.
-
-    `units`: a `gridpeers.plant.dynamics.kernel.controller_pass.Units` of which a phase was beyond its limit after the
-    last solution.
-    """
+    """Solve until no phase is beyond its limit, after one was; return the iterations, or -1 as `solve_network`."""
     total = 0
     for _ in range(MAX_LIMITING):
         iterations = solve_network(net, units.J, rotation, x, I_b, units.V, tolerance, work)
@@ -71,10 +61,7 @@ def solve_on(net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tol
 def solve_within_limits(
     net: Any, units: Any, rotation: Complex, x: Real, I_b: Complex, tolerance: float, work: Real
 ) -> int:
-    """Solve the network with every phase within its limit; arguments and result as of `solve_on`.
-
-    `step` has these lines in its loop: passing a network through one function more takes 1.5 us of 25.
-    """
+    """Solve the network with every phase within its limit; `step` has these lines in its loop, which is faster."""
     units.limiting[:] = False
     limit_currents(units.gfm, units.gfm_at, units.online, units.J, units.V, units.limiting)
     return solve_on(net, units, rotation, x, I_b, tolerance, work)
@@ -88,12 +75,10 @@ FAILURES = 3
 def run_steps(begin: int, steps: int, h: float, tolerance: float, net: Any, units: Any, x: Real, out: Real) -> int:
     """Advance to the end of `steps` steps; returns the network iterations, or -1 - (FAILURES k + what) for step k.
 
-    A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with
-    `begin` = 2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0` of the units.
-
-    `begin`: network solution to begin with, two a step; `x`: branch voltages in the islands' frames, the first guess of
-    the next solution; `out`: steps x n_inv x READING: each step's f of the corrector; P, Q and V of the second
-    solution.
+    A solution that failed leaves everything as it stood before it: with another tangent in `net`, a call with `begin` =
+    2 k + what goes on there. The start of step k is in `gfm_0`, `gfl_0` and `J_0` of the units. `x`: branch voltages in
+    the islands' frames, the first guess of the next solution; `out`: steps x n_inv x READING: f of the corrector; P, Q
+    and V of the second solution.
     """
     n, m = units.J.shape[0], net.S.size
     work = np.empty(12 * n + 6 * m)
