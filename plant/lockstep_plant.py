@@ -51,16 +51,13 @@ from gridpeers.wire.traffic import TickTraffic
 
 Phase = Literal["gathering", "preparing", "ticking", "joining", "holding", "closing", "over"]
 
-TELEMETRY_TICKS = 10
-"""Ticks between two telemetry messages after tick 0: enough for a progress bar, few enough to be cheap."""
+TELEMETRY_TICKS = 10  # ticks between two telemetry messages after tick 0: enough for a progress bar
 
 AGAIN = 1.0  # time (s) after which a question without an answer is asked again
 SILENT = 3.0  # time (s) after a recorder's last word after which it counts as silent; it speaks every second
 
 
 class LockstepPlant(PlantNode):
-    """The plant under simulated time."""
-
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None = None) -> None:
         super().__init__(config, plant, links)
         if self._end_tick is None:
@@ -70,18 +67,15 @@ class LockstepPlant(PlantNode):
         self._plant = plant
         joiners = {name for actions in self._schedule.values() for name in actions.join}.difference(config.agents)
         self._everyone = (*config.agents, *(name for name in plant.inverters if name in joiners))
-        """All agents that may ever take part, in the order of the inverters."""
         self._roster: tuple[str, ...] = ()  # agents of the last roster sent
         self._roster_number = -1
         self._roster_changed = False  # whether an agent has joined or gone since
-        self._joining: tuple[str, ...] = ()
-        """Newcomers that the held tick waits for: they may appear although the run has begun."""
+        self._joining: tuple[str, ...] = ()  # newcomers that the held tick waits for; they may appear then
         self._barrier = TickBarrier(PLANT, config.deadline)
         self._last_heard = self._barrier.last_heard
         self._ask_at = inf  # when open questions are asked again (s on the driver's clock)
         self._unacknowledged = UnacknowledgedTelemetry(config.recorders)
-        self._recorders_at = dict.fromkeys(config.recorders, -inf)
-        """When each recorder that the run waits for has spoken last (s on the driver's clock)."""
+        self._recorders_at = dict.fromkeys(config.recorders, -inf)  # when each recorder spoke last (s, driver's clock)
         self._prepare_bytes = b""  # the last roster sent
         self._states: dict[str, State] = {}
         for name in self._everyone:
@@ -113,7 +107,6 @@ class LockstepPlant(PlantNode):
 
     @property
     def deadline(self) -> float | None:
-        """End of the present wait, or time to ask again (s on the driver's clock)."""
         deadline = min(self._barrier.deadline or inf, self._ask_at)
         return None if deadline == inf else deadline
 
@@ -185,7 +178,7 @@ class LockstepPlant(PlantNode):
         self._gather(now)
 
     def _ask_again(self, now: float) -> None:
-        """Ask again for the nameplates, or for the `Ready`, that have not come; keep agents that wait informed."""
+        """Ask again for nameplates or `Ready` that have not come; keep agents that wait informed."""
         self._ask_at = now + AGAIN
         if self.phase == "preparing":
             self._publish_aside(self.keys.control, self._prepare_bytes)
@@ -358,7 +351,6 @@ class LockstepPlant(PlantNode):
         return True
 
     def _grant(self, now: float) -> None:
-        """Send every agent its measurement, and with it the grant of this tick."""
         self.phase, self._ask_at = "ticking", inf
         self._barrier.wait_for(dict.fromkeys(self._roster, f"State({self.tick})"), now)
         for measurement in self._measurements():
@@ -399,13 +391,16 @@ class LockstepPlant(PlantNode):
     # ---------------------------------------------------------------- telemetry and the end
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
-        others = self._unacknowledged.others(self._reporter.seq)
-        sound, awaited = self.reproducible, missing_agents
-        self._send_all(
-            self._reporter.report(
-                self.t, final=final, outcome=self.outcome, reproducible=sound, awaited=awaited, others=others
-            )
+        messages = self._reporter.report(
+            self.t,
+            final=final,
+            outcome=self.outcome,
+            reproducible=self.reproducible,
+            awaited=missing_agents,
+            others=self._unacknowledged.others(self._reporter.seq),
         )
+        for message in messages:
+            self._send(message)
 
     def _close(self, reason: str, now: float) -> None:
         if self._tick_traffic is not None:

@@ -1,8 +1,7 @@
 """The plant as a node: the common part of both kinds of time. Pure.
 
-The node meets the agents by their tokens and nameplates and refuses those that cannot take part. It holds the
-set-points that the links deliver, passes on the accounts of emulated links, and sends telemetry to recorders.
-`gridpeers.plant.lockstep_plant` and `gridpeers.plant.realtime.realtime_plant` decide when the plant advances.
+It meets the agents by their tokens and nameplates, refuses those that cannot take part, passes on the accounts of
+emulated links, and sends telemetry to recorders. Its subclasses decide when the plant advances.
 """
 
 from __future__ import annotations
@@ -57,10 +56,7 @@ IDLE = "; its agent is idle, its inverter stays on primary droop"  # end of the 
 
 
 class PlantNode(Node):
-    """The plant as a participant of a run.
-
-    `rate`: most messages of one sender per s of run time; see `gridpeers.wire.membership`.
-    """
+    """The plant as a participant of a run; `rate`: most messages of one sender per s of run time."""
 
     def __init__(self, config: PlantConfig, plant: PlantLike, links: Links | None, rate: float = inf) -> None:
         super().__init__(PLANT, config.run, rate)
@@ -96,7 +92,6 @@ class PlantNode(Node):
 
     @property
     def t(self) -> float:
-        """Present run time of the plant (s)."""
         return time_of(self.tick, self.config.T_c)
 
     # ---------------------------------------------------------------- liveliness
@@ -119,7 +114,6 @@ class PlantNode(Node):
                     self._tokens.add(key)
 
     def vanished(self, key: str, now: float) -> None:
-        """Note that a token is gone, and with it its holder."""
         self._tokens.discard(key)
         self._note_token(key, now, appeared=False)
         match self.keys.parts(key):
@@ -188,7 +182,6 @@ class PlantNode(Node):
         self._reporter.note(PlantEvent(t=self.t, kind=kind, subject=subject, text=text))
 
     def stop(self, key: str, reason: str, *, refused: bool = False) -> None:
-        """Tell one agent, or all, to close."""
         epoch = self.config.epoch
         stop = Stop(sender=PLANT, epoch=epoch, seq=self.tick, t=self.t, reason=printable(reason), refused=refused)
         self._publish(key, encode(stop))
@@ -227,16 +220,11 @@ class PlantNode(Node):
         self._publish_journal(self.keys.telemetry, self.config.epoch, self.t)
 
     def _report_links(self, *, last: bool = False) -> None:
-        """Send the account of the emulated links to the plant since the last report."""
         self._publish_link_reports(self.keys.telemetry, self._links, self.config.epoch, t=self.t, last=last)
 
     def _report(self, *, final: bool, missing_agents: tuple[str, ...] = ()) -> None:
         """Send telemetry, with the names of agents to start."""
         raise NotImplementedError
-
-    def _send_all(self, messages: Iterable[Telemetry]) -> None:
-        for message in messages:
-            self._send(message)
 
     def _send(self, message: Telemetry) -> None:
         self._publish(self.keys.telemetry, encode(message))

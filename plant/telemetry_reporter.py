@@ -21,8 +21,7 @@ def measurement_of(
 ) -> Measurement:
     """Return the measurement of one inverter (t in s) from its reading, within the range of a sensor.
 
-    Beyond its range a sensor shows the end of its scale. So a plant that swings wildly still grants its ticks; the
-    telemetry has the true values.
+    Beyond its range a sensor shows the end of its scale, so a plant that swings wildly still grants its ticks.
     """
     return Measurement(
         sender=PLANT,
@@ -43,7 +42,6 @@ def measurement_of(
 
 
 def _scale(field: str) -> Callable[[float], float]:
-    """Return the scale of a sensor, which clips to the bounds of a measurement's field."""
     bounds = get_type_hints(Measurement, include_extras=True)[field].__metadata__[0]
     low, high = float(bounds.ge), float(bounds.le)
     return lambda value: value if low <= value <= high else min(max(value, low), high)
@@ -130,19 +128,35 @@ class Reporter:
 
 
 WINDOW = 1_000_000
-"""Bytes without acknowledgement beyond which the plant goes on with no further tick. A loopback link takes as many
-without its reader, so Zenoh has no reason to close it."""
+"""Bytes without acknowledgement beyond which the plant goes on with no further tick: so many does a loopback link take
+without its reader."""
 
 
-def count_last(kept: deque[tuple[int, bytes]], number: int) -> int:
-    """Return how many of the last messages count to the Telemetry of this number."""
-    return sum(1 for _ in takewhile(lambda message: message[0] == number, reversed(kept)))
+class KeptTelemetry:
+    """Messages on the key of telemetry, in their order.
+
+    Each has the number of the next or same Telemetry: messages between two of them count to the later one.
+    """
+
+    def __init__(self) -> None:
+        self._kept: deque[tuple[int, bytes]] = deque()
+        self.bytes = 0
+
+    def keep(self, number: int, payload: bytes) -> None:
+        self._kept.append((number, payload))
+        self.bytes += len(payload)
+
+    def drop_before(self, number: int) -> None:
+        while self._kept and self._kept[0][0] < number:
+            self.bytes -= len(self._kept.popleft()[1])
+
+    def others(self, number: int) -> int:
+        """Return the number of messages that count to a Telemetry that is yet to be kept."""
+        return sum(1 for _ in takewhile(lambda message: message[0] == number, reversed(self._kept)))
 
 
-class UnacknowledgedTelemetry:
+class UnacknowledgedTelemetry(KeptTelemetry):
     """Messages for the recorders that a run waits for; without any, nothing is kept.
-
-    Each message has the number of the next or same Telemetry: messages between two of them count to the later one.
 
     >>> kept = UnacknowledgedTelemetry(["history"])
     >>> for number, payload in [(0, b"T0"), (1, b"L1"), (1, b"T1")]:
@@ -154,34 +168,23 @@ class UnacknowledgedTelemetry:
     """
 
     def __init__(self, recorders: Iterable[str]) -> None:
+        super().__init__()
         self._needed = dict.fromkeys(recorders, 0)  # number of the Telemetry that each recorder needs next
-        self._kept: deque[tuple[int, bytes]] = deque()
-        self._bytes = 0
 
     def keep(self, number: int, payload: bytes) -> None:
         if self._needed:
-            self._kept.append((number, payload))
-            self._bytes += len(payload)
+            super().keep(number, payload)
 
     def acknowledged(self, recorder: str, number: int) -> list[bytes] | None:
-        """Take a recorder's word that it has all before a number; return what to publish again if it is no news.
-
-        None if it is news: then nothing is to be published again.
-        """
+        """Take a recorder's word that it has all before a number; return what to publish again, None if it is news."""
         again = number <= self._needed[recorder]
         self._needed[recorder] = max(number, self._needed[recorder])
-        while self._kept and self._kept[0][0] < min(self._needed.values()):
-            self._bytes -= len(self._kept.popleft()[1])
+        self.drop_before(min(self._needed.values()))
         return [payload for its, payload in self._kept if its >= number] if again else None
-
-    def others(self, number: int) -> int:
-        """Return the number of messages that count to a Telemetry that is yet to be kept."""
-        return count_last(self._kept, number)
 
     @property
     def is_full(self) -> bool:
-        """Whether the plant is to wait."""
-        return self._bytes > WINDOW
+        return self.bytes > WINDOW
 
     @property
     def is_empty(self) -> bool:

@@ -6,21 +6,16 @@ from collections import deque
 
 from gridpeers.wire.messages import Pacing
 
-TOLERATED = 0.01
-"""Part of the steps that may be more than one control period late before it is said that pace is not kept."""
+TOLERATED = 0.01  # part of the steps that may be more than one control period late
 
-HOPELESS = 10
-"""Control periods behind which the schedule is put off: what is made up for in a rush is not real time either."""
+HOPELESS = 10  # control periods behind which the schedule is put off: a rush is not real time either
 
 FIRST = 100  # steps before which nothing is judged
 _KEPT = 5_000  # delays that are remembered, the latest, for the percentiles of a run that stays
 
 
 class RealTimePacer:
-    """Due times of the plant's steps, and the delays behind them.
-
-    `now`: when step 0 is due (s).
-    """
+    """Due times of the plant's steps from `now` (s) on, and the delays behind them."""
 
     def __init__(self, period: float, now: float) -> None:
         self.period = period
@@ -32,7 +27,6 @@ class RealTimePacer:
 
     @property
     def due(self) -> float:
-        """When the next step is due (s)."""
         return self._start + self._slipped + self.steps * self.period
 
     def note(self, now: float) -> float:

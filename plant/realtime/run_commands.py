@@ -18,42 +18,32 @@ from gridpeers.wire.wording import printable
 if TYPE_CHECKING:
     from gridpeers.plant.realtime.realtime_plant import RealtimePlant
 
-
-NO_LINKS = "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
-"""Error when a run has no emulated links."""
-
 AGAIN = 1.0  # time (s, wall) after which a command that was not acknowledged is sent again
 
 
 class LinkCommandSender:
-    """Has the links to the plant and to all agents carry out commands.
-
-    `links`: the links to the plant; without any, commands are rejected.
-    """
+    """Has the links to the plant, `links`, and those to all agents carry out commands."""
 
     def __init__(self, epoch: int, keys: Keys, links: Links | None, publish: Callable[[str, bytes], None]) -> None:
         self._epoch, self._keys, self._links, self._publish = epoch, keys, links, publish
         self._given: list[LinkRequest] = []
         self._acknowledged: dict[str, int] = {}  # number of the last command that each agent has acknowledged
-        self._sent: dict[str, tuple[int, float]] = {}
-        """Number of the last command that was sent to each agent, and when (s)."""
+        self._sent: dict[str, tuple[int, float]] = {}  # number of the last command sent to each agent, and when (s)
 
     @property
     def links(self) -> Links:
-        """The links to the plant.
-
-        ValueError if the run has no emulated links.
-        """
+        """The links to the plant; ValueError if the run has no emulated links."""
         if self._links is None:
-            raise ValueError(NO_LINKS)
+            raise ValueError(
+                "this run has no emulated links that could be changed; runs started by gridpeers plant or up have"
+            )
         return self._links
 
     def give(self, tree: dict[str, Any], t: float, reply_to: str) -> tuple[LinkRequest, str, tuple[str, ...]]:
         """Have links carry out a person's command, for messages sent at t (s of run time) or later.
 
-        It is in force for the plant's own links, and published for recorders; `send` sends it to the agents.
-
-        Return the command, what it does in words, and the receivers of the links that it changes.
+        It is in force for the plant's own links, and published for recorders; `send` sends it to the agents. Return the
+        command, what it does in words, and the receivers of the links that it changes.
 
         ValueError if it is no command to links, or the run has no emulated links.
         """
@@ -80,8 +70,7 @@ class LinkCommandSender:
         question = encode(self._request(0, {}, t, reply_to))
         for name in names:
             self._publish(self._keys.link_request(name), question)
-        own = self.links.status(t)
-        epoch = self._epoch
+        own, epoch = self.links.status(t), self._epoch
         self._pass_on(
             LinkAcknowledgement(sender=PLANT, epoch=epoch, seq=0, t=t, ok=True, text="", reply_to=reply_to, data=own)
         )
@@ -108,8 +97,7 @@ class LinkCommandSender:
         self._publish(self._keys.answer(answer.reply_to), encode(answer))
 
 
-MOST_SWITCHES = 500  # most switches in a status, which must fit into an answer
-MOST_LOADS = 150  # most loads with another power than their table's in a status
+MOST_SWITCHES, MOST_LOADS = 500, 150  # most of them in a status, which must fit into an answer
 
 
 class RunCommands:
@@ -118,23 +106,21 @@ class RunCommands:
 
     def answer(self, command: Command, now: float) -> Answer:
         """Carry a command out, as far as that goes before its answer; return the answer."""
-        node = self._node
+        node, data = self._node, dict[str, Any]()
         try:
             if node.phase not in ("gathering", "running") and command.verb != "telemetry":
                 raise ValueError("the run is ending")
-            text, data = self._do(command, now)
+            if command.verb == "status":
+                text, data = f"run {node.config.run} is {node.phase} at t = {node.t:.2f} s", self.status()
+            elif command.verb in ("link", "links"):
+                text, data = self._command_links(command, now)
+            else:
+                text = self._say(command)
             ok = True
         except ValueError as error:
-            text, data, ok = str(error), {}, False
-        return Answer(
-            sender=PLANT,
-            epoch=node.config.epoch,
-            seq=command.seq,
-            t=node.t,
-            ok=ok,
-            text=printable(text),
-            data=data,
-        )
+            text, ok = str(error), False
+        epoch, seq = node.config.epoch, command.seq
+        return Answer(sender=PLANT, epoch=epoch, seq=seq, t=node.t, ok=ok, text=printable(text), data=data)
 
     def follow_up(self, command: Command, now: float) -> None:
         node = self._node
@@ -146,49 +132,40 @@ class RunCommands:
         elif command.verb == "down":
             node.close("the run was ended by command", now)
 
-    def _do(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
-        verb = command.verb
-        if verb == "status":
-            status = self.status()
-            return f"run {status['run']} is {status['phase']} at t = {status['t']:.2f} s", status
-        if verb in ("link", "links"):
-            return self._command_links(command, now)
-        return self._say(command), {}
-
     def _say(self, command: Command) -> str:
         """Carry out a command whose answer is a sentence alone."""
         node, verb, argument = self._node, command.verb, command.argument
         if verb == "telemetry":
             if not (argument.isascii() and argument.isdigit() and len(argument) < 16):
                 raise ValueError(f'telemetry: "{argument[:20]}" is no number of a Telemetry; give one, e.g. 0')
-            return str(node.recorder_feed.kept.again_from(int(argument)))
+            return str(node.recorder_feed.again_from(int(argument)))
+        when = f"at t = {node.t:.2f} s"
         if verb == "down":
-            return f"run {node.config.run} ends at t = {node.t:.2f} s"
+            return f"run {node.config.run} ends {when}"
         if verb == "stop":
             instance = node.members.instance(argument)
             if not instance:
                 running = ", ".join(name for name in node.plant.inverters if node.members.instance(name)) or "none"
                 raise ValueError(f'no agent "{argument}" is running; running are: {running}')
             node.stop(node.keys.stop_request(argument, instance), "stopped by command")
-            return f"{argument} was asked to leave at t = {node.t:.2f} s"
+            return f"{argument} was asked to leave {when}"
         if verb == "load":
             if command.load is None:
                 raise ValueError(f"load {argument}: nothing is to be set; give a factor, or real or reactive power")
-            return f"{node.plant.set_load(argument, command.load)}, at t = {node.t:.2f} s"
+            return f"{node.plant.set_load(argument, command.load)}, {when}"
         if verb == "synchronise":
             node.plant.switch(argument, "close", synchronised=True)
-            return f"switch {argument}: close in step at t = {node.t:.2f} s"
+            return f"switch {argument}: close in step {when}"
         if node.plant.switch(argument, verb):
-            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already at t = {node.t:.2f} s"
-        return f"switch {argument}: {verb} at t = {node.t:.2f} s"
+            return f"switch {argument} was {'open' if verb == 'open' else 'closed'} already {when}"
+        return f"switch {argument}: {verb} {when}"
 
     def _command_links(self, command: Command, now: float) -> tuple[str, dict[str, Any]]:
         """Return the command's effect in words; its number, its start (s), and the agents that are sent it.
 
         It holds from one control period after the due tick on: by then all agents have it.
         """
-        node = self._node
-        agents = self._agents(present=True)
+        node, agents = self._node, self._agents(present=True)
         if command.verb == "links":
             assert node.link_commands.links is not None  # a run without any is an error
             return "the links are asked for their status", {"number": 0, "t": node.t, "asked": agents}

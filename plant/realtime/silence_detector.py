@@ -10,26 +10,35 @@ Ages count the time for which the plant itself listened: while it stood still, s
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 
 from gridpeers.wire.messages import AgentStatus
 
-SETTLING = 0.1
-"""Time (s, wall) for which a neighbour must be reported as not heard before that is an event: meanwhile the plant
-itself detects one that is frozen."""
-
+SETTLING = 0.1  # time (s, wall) for which a neighbour must be reported as not heard; a frozen one is detected meanwhile
 ACQUAINTANCE = 1.0  # time (s, wall) after a join in which agents may not have heard each other yet
-
-LISTENED = 2.0
-"""Control periods between two steps of the plant that count as time in which it listened; what is beyond it slept."""
-
+LISTENED = 2.0  # control periods between two steps of the plant in which it counts as listening; longer, it slept
 RECENT = 3.0  # control periods within which the plant must have heard an agent that a neighbour does not hear
+
+
+@dataclass
+class _Agent:
+    """An agent that takes part; times are s for which the plant has listened."""
+
+    joined: float
+    last: float  # when it was heard last, or joined
+    holding: bool = False  # whether it reports that it has no measurement
+    failed: bool = False  # whether its law has failed: it sends nothing more
+    silent: bool = False
+    unheard: dict[str, float] = field(default_factory=dict)
+    """Neighbours that it does not hear, and from when on that is an event."""
+    reported: set[str] = field(default_factory=set)  # neighbours whose silence has been an event
 
 
 class SilenceDetector:
     """Keep the time at which each agent was heard last, and report silences.
 
-    `max_age`: age (s of run time) beyond which a state is not used; `T_c`: control period (s of run time); `period`:
-    the same in wall time (s).
+    `max_age`: age (s of run time) beyond which a state is not used; `T_c`, `period`: control period (s of run time and
+    of wall time).
     """
 
     def __init__(self, max_age: float, T_c: float, period: float) -> None:
@@ -37,94 +46,77 @@ class SilenceDetector:
         self._limit = max_age * period / T_c  # the same in wall time (s)
         self._clock = 0.0  # time (s, wall) for which the plant has listened
         self._now: float | None = None  # time of the last update of the clock (s)
-        self._joined: dict[str, float] = {}
-        self._last: dict[str, float] = {}  # time at which each agent was heard last, or joined
-        self._holding: set[str] = set()  # agents that report that they have no measurement
-        self._failed: set[str] = set()  # agents whose law has failed: they send nothing more
-        self._silent: set[str] = set()
-        self._unheard: dict[str, dict[str, float]] = {}
-        """By agent, the neighbours that it does not hear, and the time from which on that is an event."""
-        self._reported: dict[str, set[str]] = {}  # by agent, the neighbours whose silence has been an event
+        self._agents: dict[str, _Agent] = {}
 
     def joined(self, name: str) -> None:
-        self._joined[name] = self._last[name] = self._clock
+        self._agents[name] = _Agent(self._clock, self._clock)
 
     def heard(self, name: str, *, failed: bool = False) -> None:
         """Note a state that came off the wire, perhaps the last, by which an agent says that its law has failed."""
-        (self._failed.add if failed else self._failed.discard)(name)
-        self._last[name] = self._clock
-        self._holding.discard(name)
+        if agent := self._agents.get(name):
+            agent.last, agent.failed, agent.holding = self._clock, failed, False
 
     def forget(self, name: str) -> None:
-        for known in (self._joined, self._last, self._unheard, self._reported):
-            known.pop(name, None)
-        self._silent.discard(name)
-        self._holding.discard(name)
-        self._failed.discard(name)
-        for unheard in self._unheard.values():
-            unheard.pop(name, None)
-        for reported in self._reported.values():
-            reported.discard(name)
+        self._agents.pop(name, None)
+        for agent in self._agents.values():
+            agent.unheard.pop(name, None)
+            agent.reported.discard(name)
 
     def reported(self, status: AgentStatus) -> None:
         """Note an agent's report of its neighbours; while it does not tick, it uses no state anyway."""
-        if status.sender not in self._joined:
+        if (agent := self._agents.get(status.sender)) is None:
             return
         if status.phase != "running":
-            if self._clock >= self._joined[status.sender] + SETTLING:  # before, it waits for its first measurement
-                self._holding.add(status.sender)
+            # before, it waits for its first measurement
+            agent.holding = agent.holding or self._clock >= agent.joined + SETTLING
             return
         unheard: dict[str, float] = {}
-        before = self._unheard.get(status.sender, {})
         for name, age in zip(status.neighbours, status.ages, strict=False):
-            if 0.0 <= age <= self._max_age or name not in self._joined:
+            if 0.0 <= age <= self._max_age or name not in self._agents:
                 continue
             since = self._clock + SETTLING
             if age < 0.0:  # never heard since one of the two joined, or since the agent last stood still
-                since = max(since + self._limit, self._acquainted(status.sender, name))
-            unheard[name] = before.get(name, since)
+                met = max(agent.joined, self._agents[name].joined) + ACQUAINTANCE
+                since = max(since + self._limit, met)
+            unheard[name] = agent.unheard.get(name, since)
         # a neighbour that is no longer named has lost its token there: it is not heard either
-        named = set(status.neighbours)
-        self._unheard[status.sender] = {name: at for name, at in before.items() if name not in named} | unheard
+        lost = {name: at for name, at in agent.unheard.items() if name not in status.neighbours}
+        agent.unheard = lost | unheard
 
     def take(self, now: float) -> Iterator[tuple[str, str]]:
         """Yield the agents whose silence begins or ends by the plant's step at this time (s, wall), with a sentence."""
         self._clock += 0.0 if self._now is None else min(max(0.0, now - self._now), LISTENED * self._period)
         self._now = now
-        for name, last in self._last.items():
-            if self._clock - last > self._limit:
-                if name not in self._silent:
-                    self._silent.add(name)
-                    yield name, f"{name} is silent: no state for {self._max_age:g} s, {self._why(name)}"
-            elif name in self._silent:
-                self._silent.discard(name)
+        for name, agent in self._agents.items():
+            was, agent.silent = agent.silent, self._clock - agent.last > self._limit
+            if agent.silent and not was:
+                why = "it says that it has no measurement" if agent.holding else "nothing comes from it"
+                why = "as its law has failed" if agent.failed else why
+                yield name, f"{name} is silent: no state for {self._max_age:g} s, {why}"
+            elif was and not agent.silent:
                 yield name, f"{name} is heard again"
-        for name in self._unheard:
-            yield from self._take_unheard(name)
+        for name, agent in self._agents.items():
+            yield from self._take_unheard(name, agent)
 
-    def _why(self, name: str) -> str:
-        if name in self._failed:
-            return "as its law has failed"
-        return "it says that it has no measurement" if name in self._holding else "nothing comes from it"
-
-    def _take_unheard(self, name: str) -> Iterator[tuple[str, str]]:
+    def _take_unheard(self, name: str, agent: _Agent) -> Iterator[tuple[str, str]]:
         """Yield the neighbours that an agent no longer hears, or hears again; one that nobody hears is silent."""
-        unheard = {other: at for other, at in self._unheard[name].items() if other in self._last}
-        reported = self._reported.setdefault(name, set())
-        back = sorted(other for other in reported if other not in unheard and other in self._last)
-        reported.intersection_update(unheard)
+        back = sorted(agent.reported.difference(agent.unheard))
+        agent.reported.intersection_update(agent.unheard)
         recent = self._clock - RECENT * self._period
         news = [
             other
-            for other, at in unheard.items()
-            if at <= self._clock and other not in reported and other not in self._silent and self._last[other] >= recent
+            for other, at in agent.unheard.items()
+            if at <= self._clock and other not in agent.reported and self._heard_since(other, recent)
         ]
-        reported.update(news)
+        agent.reported.update(news)
         if back:
             yield name, f"{name} hears {', '.join(back)} again"
         if news:
-            others = ", ".join(news)
-            yield name, f"{name} does not hear {others}: no state for {self._max_age:g} s, though one came here"
+            yield (
+                name,
+                f"{name} does not hear {', '.join(news)}: no state for {self._max_age:g} s, though one came here",
+            )
 
-    def _acquainted(self, *names: str) -> float:
-        return max(self._joined[name] for name in names) + ACQUAINTANCE
+    def _heard_since(self, name: str, time: float) -> bool:
+        other = self._agents[name]
+        return not other.silent and other.last >= time

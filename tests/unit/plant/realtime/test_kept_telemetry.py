@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
-from gridpeers.plant.realtime.recorder_feed import KeptTelemetry
+from gridpeers.plant.realtime.recorder_feed import RecorderFeed
 from gridpeers.scenarios.drivers.telemetry_stream import ASTRAY, TelemetryStream
 from gridpeers.wire.messages import Answer, Command, LinkReport, Message, Telemetry
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
@@ -94,10 +94,10 @@ def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(
     assert not link.stream.lost
 
 
-def test_what_the_plant_has_no_more_is_a_gap_that_is_known() -> None:
+def test_what_the_plant_has_no_more_is_a_gap_that_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its memory is bounded: after a longer absence the recorder goes on with what there is, and knows it."""
     lab = running(end=None)
-    lab.side.recorder_feed.kept = KeptTelemetry(limit=4_000)
+    monkeypatch.setattr(lab.side.recorder_feed, "_limit", 4_000)
     link = Link(lab)
     lab.step(50)
     link.carry()
@@ -118,17 +118,21 @@ def test_what_the_plant_has_no_more_is_a_gap_that_is_known() -> None:
 
 def test_the_memory_of_the_plant_is_bounded() -> None:
     """However long it runs and whatever it is asked; what counts to one Telemetry goes together."""
-    kept = KeptTelemetry(limit=1_000)
+    sent: list[bytes] = []
+    feed = RecorderFeed((), sent.append, limit=1_000)
+    feed.paced = True
     for number in range(5_000):
-        kept.add(number, bytes(10))
-        kept.add(number, bytes(90))
+        feed.publish(number, bytes(10))
+        feed.publish(number, bytes(90))
         if number % 700 == 0:
-            kept.again_from(0)
-        kept.take(3)
-    first = kept.again_from(0)
+            feed.again_from(0)
+        feed.replay()
+    first = feed.again_from(0)
+    sent.clear()
+    feed.end()
 
     assert 4_990 <= first <= 4_991
-    assert len(kept.take(None)) == 2 * (5_000 - first)
+    assert len(sent) == 2 * (5_000 - first)
 
 
 @pytest.mark.parametrize("argument", ["", "x", "-1", "1" * 30, "٣"])
@@ -207,16 +211,19 @@ def test_the_end_of_a_run_does_not_wait_for_what_is_published_again(end: str) ->
     assert [message.seq for message in told[-150:]] == list(range(told[-1].seq - 149, told[-1].seq + 1))
 
 
-@pytest.mark.parametrize("seed", range(5))
-def test_what_comes_again_is_what_was_kept(seed: int) -> None:
+def test_what_comes_again_is_what_was_kept() -> None:
     """Messages of any size, asked for at any time: those that are still kept come, byte by byte and in order."""
-    rng, kept = random.Random(seed), KeptTelemetry(limit=4000)
-    sent: list[bytes] = []
+    rng, sent = random.Random(1), list[bytes]()
+    got: list[bytes] = []
+    feed = RecorderFeed((), got.append, limit=4000)
     for number in range(300):
         sent.append(rng.randbytes(rng.choice((0, 10, 400, 1500))))
-        assert kept.add(number, sent[-1])
+        got.clear()
+        feed.publish(number, sent[-1])
+        assert got == sent[-1:]
         if rng.random() < 0.1:
-            first = kept.again_from(rng.randrange(number + 1))
-            some = kept.take(rng.randrange(3))
+            got.clear()
+            first = feed.again_from(rng.randrange(number + 1))
+            feed.replay()
 
-            assert some + kept.take(None) == sent[first:]
+            assert got == sent[first:]

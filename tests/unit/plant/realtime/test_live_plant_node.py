@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.plant.realtime.live_plant_node import REFUSAL_INTERVAL, REFUSALS
+from gridpeers.plant.realtime.realtime_plant import REFUSAL_INTERVAL, REFUSALS
 from gridpeers.wire.messages import Measurement, Stop, Telemetry
 from tests.toy.toy_configs import agent_config
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
