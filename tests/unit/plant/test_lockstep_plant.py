@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Literal
 
 import pytest
@@ -14,7 +13,7 @@ from gridpeers.plant.lockstep_plant import AGAIN, LockstepPlant
 from gridpeers.plant.plant_config import ScheduledAction
 from gridpeers.plant.plant_interface import Reading
 from gridpeers.plant.telemetry_reporter import Reporter, measurement_of
-from gridpeers.wire.codec import RejectedError, decode, encode
+from gridpeers.wire.codec import decode, encode
 from gridpeers.wire.keys import Keys
 from gridpeers.wire.messages import (
     Answer,
@@ -363,26 +362,6 @@ def test_who_leaves_is_told_before_its_inverter_goes_off() -> None:
     assert lab.events() == [left, f"{died}; {STAYS}", "inv4 joins at t = 0.1 s, as the scenario says"]
 
 
-def test_who_is_there_is_not_awaited_though_it_is_to_join() -> None:
-    """An agent that leaves and joins at one tick is awaited anew; one that has never left is not."""
-    lab = ticking((0.1, "inv1", "join"), (0.1, "inv2", "leave"), (0.1, "inv2", "join"))
-    lab.tick(5)
-
-    assert lab.missing == [("token", "inv2")]
-
-
-def test_who_is_dismissed_after_its_death_has_no_process_to_be_told() -> None:
-    """Its inverter goes off all the same."""
-    lab = ticking((0.1, "inv2", "leave"))
-    lab.token("inv2", gone=True)
-    lab.state(0, "inv1", "inv3", "inv4")
-    lab.ready(1, "inv1", "inv3", "inv4")
-    lab.tick(4)
-
-    assert lab.stopped() == {}
-    assert lab.toy.measure()["inv2"].P == 0.0
-
-
 def test_a_death_before_the_first_tick_breaks_the_run() -> None:
     """It would be another run; so is one without the newcomer for whom the tick is held."""
     lab = Lab()
@@ -428,21 +407,6 @@ def test_the_plant_waits_for_its_recorder_however_long(monkeypatch: pytest.Monke
     lab.needs(2)
     assert lab.node.phase == "ticking"
     assert lab.last(Measurement).seq == tick
-
-
-def test_who_dies_while_the_plant_waits_for_its_recorder_is_off_the_next_roster(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A death is no reason to go on without the recorder, nor to wait for the dead."""
-    lab = recorded(end=20.0)
-    monkeypatch.setattr(telemetry_reporter, "WINDOW", 0)
-    lab.tick(10)
-    assert lab.node.phase == "holding"
-    lab.token("inv4", gone=True)
-    assert lab.last(Prepare).seq == 0
-
-    lab.needs(2)
-    assert lab.last(Prepare).roster == NAMES[:3]
 
 
 def test_what_a_recorder_needs_once_more_is_published_again() -> None:
@@ -522,13 +486,6 @@ def test_a_sensor_shows_the_end_of_its_scale_and_never_more() -> None:
     assert (wild.f, wild.P, wild.Q, wild.V, wild.P_set, wild.V_set) == (2000.0, -1e11, 1e11, 1e6, 1e11, 0.0)
     assert measured() == measured(f=60.0)
     assert (measured().f, measured().P) == (60.0, 5e4)
-
-
-def test_a_reading_that_is_no_number_is_not_made_one() -> None:
-    """It goes out as it is, and the agent refuses it: it has no measurement then."""
-    with pytest.raises(RejectedError) as refused:
-        measured(f=math.nan)
-    assert refused.value.kind == "not finite"
 
 
 def test_texts_go_out_printable() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import resource
 import shutil
 import subprocess
 import sys
@@ -98,18 +97,6 @@ def test_without_a_folder_to_write_functions_run_and_nothing_is_kept(
     assert not compiled.is_compiled("fill")
 
 
-def test_on_a_full_disk_functions_run_and_nothing_is_kept(folder: Path) -> None:
-    """A full home: the process compiles for itself, and leaves no part of a file."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (20, hard))
-    try:
-        assert filled() == ([3.0, 3.0], 0)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-
-    assert list(folder.iterdir()) == []
-
-
 def test_machine_code_in_a_folder_that_is_read_alone_is_used(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """An image whose builder left a warm cache starts without compiling; what it lacks is compiled and not kept."""
     filled()
@@ -125,19 +112,6 @@ def test_machine_code_in_a_folder_that_is_read_alone_is_used(folder: Path, monke
 def refuse(*_: object) -> None:
     """Write nothing, as the system refuses it."""
     raise PermissionError
-
-
-def test_a_user_without_a_home_has_no_cache_folder(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A user id that the system does not know, as containers have: nothing is kept."""
-
-    def unknown() -> Path:
-        raise RuntimeError("Could not determine home directory.")
-
-    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
-        monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(Path, "home", unknown)
-
-    assert compiled.kernel_folder() is None
 
 
 def test_only_a_plant_that_takes_steps_compiles_the_step(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -110,15 +110,6 @@ def test_an_island_without_solution_ends_as_it_does_among_all_at_once(monkeypatc
     assert parts.network.reduction.online.tolist() == [i not in (4, 5) for i in range(2 * ISLANDS)]
 
 
-def test_an_error_on_another_core_is_raised_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Work that fails on any thread fails for the caller, with the first item's error."""
-    monkeypatch.setattr(threads, "usable_cores", lambda: 3)
-
-    with pytest.raises(ZeroDivisionError):
-        threads.each_on_a_core(lambda x: 1 // x, [1, 2, 0, 3, 0])
-    assert threads.each_on_a_core(lambda x: 6 // x, [3, 2, 1]) == [2, 3, 6]
-
-
 def _threads() -> set[int]:
     return {library["num_threads"] for library in threadpool_info() if library["user_api"] == "blas"}
 

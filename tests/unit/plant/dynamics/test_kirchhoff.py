@@ -14,7 +14,7 @@ from gridpeers.plant.dynamics import Dynamics, reduction
 from gridpeers.plant.equipment import Feeder, InverterRow, Line, LineConfig, Load, Source, Switch, Transformer
 from gridpeers.plant.feeder.circuits import circuit_of
 from gridpeers.plant.feeder.plant import installed_inverters
-from gridpeers.plant.network import Network, solve_power_flow
+from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
 from tests.unit.plant import networks
 
@@ -83,29 +83,6 @@ def test_currents_balance_where_couplings_are_not_mutual(
     assert kirchhoff_residual(dynamics) < LARGEST
 
 
-@pytest.mark.parametrize("most_dense", [0, 10_000])
-def test_the_start_is_the_power_flow_where_couplings_are_not_mutual(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, most_dense: int
-) -> None:
-    """The first point of the inner loop is that of `solve_power_flow` with the inverters' currents fed in."""
-    monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
-    network = Network(asymmetric(tmp_path))
-    circuit = circuit_of(network, network.closed0, network.loads())
-    dynamics = Dynamics(circuit, installed_inverters(network, PlantSettings()), 0.002)
-    dynamics.start(np.full(3, 0.3), V_set=np.full(3, 1.0))
-    S = (dynamics.inverters.V * np.conj(dynamics.inverters.I)).ravel()
-
-    def fed(V: np.ndarray) -> np.ndarray:
-        currents = np.zeros(V.size, complex)
-        currents[circuit.terminals.ravel()] = np.conj(S / V[circuit.terminals.ravel()])
-        return currents
-
-    flow = solve_power_flow(network, network.closed0, injection=fed, tolerance=1e-12)
-
-    V = network.merge(network.closed0).expand(dynamics.voltages())
-    np.testing.assert_allclose(V / network.V_nom, flow.V / network.V_nom, atol=1e-9)
-
-
 def with_open_ends(seed: int) -> Feeder:
     """Make a feeder with lines without charging whose far ends are open, behind a wye-wye transformer.
 
@@ -140,7 +117,7 @@ def with_open_ends(seed: int) -> Feeder:
     )
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(6))
 def test_currents_balance_where_terms_of_the_network_cancel(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
     """At the start and after islanding, with unloaded line ends behind a wye-wye transformer."""
     monkeypatch.setattr(reduction, "MOST_DENSE", 0)

@@ -229,27 +229,6 @@ def test_phases_of_unequal_voltage_deliver_equal_powers_at_rest(model: str) -> N
     assert powers == pytest.approx(np.full(3, 0.6 + 0.2j), abs=1e-9)
 
 
-def test_in_positive_sequence_the_currents_are_equal_instead() -> None:
-    """The other mode drives the same current in all phases at the same voltages."""
-    dynamics = at_unequal_voltages(GFL_D)
-
-    dynamics.run(500)
-    currents = np.abs(dynamics.inverters.I[0])
-
-    assert currents == pytest.approx(np.full(3, currents[0]), rel=1e-9)
-
-
-def test_a_power_step_reaches_every_phase_alike() -> None:
-    """After a step of P the phases have a third of it each, whatever their voltages."""
-    dynamics = at_unequal_voltages(replace(GFL_D, mode="balanced_power"))
-    dynamics.inverters.hold(0, 0.9, 1.0)
-
-    dynamics.run(2000)
-    powers = dynamics.inverters.V[0] * np.conj(dynamics.inverters.I[0]) / (S_B / 3.0)
-
-    assert powers.real == pytest.approx(np.full(3, 0.9), abs=1e-6)
-
-
 def test_the_frequency_is_the_mean_of_the_three_plls() -> None:
     """A jump of phase B alone moves the reading by a third of what that PLL sees."""
     dynamics = at_unequal_voltages(replace(GFL_D, mode="balanced_power"))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from gridpeers.plant.dynamics import live_network, power_flow_at_rest, reduction
+from gridpeers.plant.dynamics import power_flow_at_rest, reduction
 from gridpeers.plant.dynamics.kept_network import BlockPattern, eliminated, elimination_order
 from gridpeers.plant.dynamics.kernel.network_arrays import factorise_blocks, solve_blocks
 from gridpeers.plant.dynamics.kernel.solve import NO_NETWORK
@@ -37,26 +37,6 @@ def rows(
 def test_both_forms_give_the_same_run(monkeypatch: pytest.MonkeyPatch, method: Method) -> None:
     """Frequency, powers and voltages through islanding, load loss and reclosing differ by rounding alone."""
     np.testing.assert_allclose(rows(monkeypatch, 0, method), rows(monkeypatch, 10_000, method), rtol=1e-9, atol=1e-3)
-
-
-def test_a_tangent_that_is_renewed_gives_the_same_run_in_fewer_iterations(monkeypatch: pytest.MonkeyPatch) -> None:
-    """After the islanding a tangent at the present voltages saves iterations, and moves nothing but rounding."""
-    spent: list[int] = []
-    refresh = live_network.LiveNetwork.refresh
-
-    def counted(network: live_network.LiveNetwork, iterations: int, solutions: int) -> None:
-        spent[-1] += iterations
-        refresh(network, iterations, solutions)
-
-    monkeypatch.setattr(live_network.LiveNetwork, "refresh", counted)
-    runs = []
-    for worth in (10**9, 40):
-        monkeypatch.setattr(live_network, "WORTH", worth)
-        spent.append(0)
-        runs.append(rows(monkeypatch, 0, "first-order"))
-
-    np.testing.assert_allclose(runs[0], runs[1], rtol=1e-9, atol=1e-3)
-    assert spent[1] < 0.9 * spent[0]
 
 
 def test_a_start_to_which_the_tangent_does_not_lead_is_found_by_newton(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -128,29 +108,6 @@ def test_the_factors_solve_the_network_and_know_the_sign_of_its_determinant(node
     assert nodes < 40 or len(signs) == 2, "the loads must be large enough to turn the sign, or nothing is tested"
 
 
-def test_a_network_of_reactances_alone_needs_no_pivoting() -> None:
-    """Its real form has zeros on the diagonal, but its blocks of a node are regular."""
-    Y = sp.csc_array(np.array([[-3j, 1j, 1j], [1j, -2j, 0], [1j, 0, -2j]]))
-    none = np.zeros(0, complex)
-    factors = BlockPattern(Y, sp.csc_array((3, 0))).matrix(none, none)
-    factorise_blocks(factors)
-    x = np.array([1.0, 2.0, 0.0, -1.0, 3.0, 0.5])
-
-    solution = x.copy()
-    solve_blocks(factors, solution)
-
-    np.testing.assert_allclose(Y @ solution.view(complex), x.view(complex), rtol=1e-12)
-
-
-def test_a_tree_keeps_its_number_of_entries() -> None:
-    """Eliminated from its leaves a tree of n nodes has n - 1 couplings and no fill."""
-    Y, _ = a_network(np.random.default_rng(3), 200, 0)
-    none = sp.csc_array((200, 0))
-    order = elimination_order(Y, none)
-
-    assert BlockPattern(Y[order][:, order].tocsc(), none).later.size == 199
-
-
 NONE = np.zeros(0, complex)
 
 
@@ -172,7 +129,7 @@ def meshed(rng: np.random.Generator, nodes: int) -> np.ndarray:
     return Y + np.diag(20.0 + np.abs(Y).sum(axis=0))
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_stored_zeros_and_one_way_couplings_have_entries_of_their_own(seed: int) -> None:
     """The factors solve a matrix that stores zeros, at random places, as LAPACK does."""
     rng = np.random.default_rng(seed)
@@ -212,7 +169,7 @@ def test_terms_that_cancel_leave_no_entry_and_no_neighbour_is_touched() -> None:
     assert (reduced.data != 0.0).all()
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_elimination_is_that_of_the_matrix_where_couplings_are_not_mutual(seed: int) -> None:
     """What is left of a network with y_ij unlike y_ji, or 0 where y_ji is not, is its Schur complement."""
     rng = np.random.default_rng(seed)

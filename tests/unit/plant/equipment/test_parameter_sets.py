@@ -8,16 +8,12 @@ import pytest
 from msgspec.structs import replace
 
 import gridpeers as gp
-from gridpeers.lab.predict.inverter_group import inverter_group_of
-from gridpeers.lab.predict.response import response
-from gridpeers.plant.build import build_plant
 from gridpeers.plant.equipment import Bus, Source
 from gridpeers.plant.equipment.inverter_parameters import REGFM_A1, GflParameters, GfmParameters, OwnParameters
 from gridpeers.plant.tables import FeederError, read_feeder
 from gridpeers.plant.tables.read import DATA
 from gridpeers.scenarios.catalogue_files import CATALOGUE
 from gridpeers.scenarios.schema import ScenarioError, load_scenario
-from gridpeers.scenarios.schema.configs import configs
 
 SETS = "set,key,value\nslow,T_pf_s,0.2\nslow,k_pPLL,40\nslow,volt_var,false\nstiff,P_max_pu,1.2\n"
 
@@ -56,28 +52,6 @@ def test_an_inverters_own_keys_come_before_its_set_and_its_set_before_its_kind(t
     assert [it.T_pf for it in gfl] == [0.2, 0.2, 0.1]
     assert [it.T_qf for it in gfl] == [0.15, 0.15, 0.15]
     assert [it.volt_var for it in gfl] == [False, False, True]
-
-
-def test_the_plant_runs_each_inverter_with_its_own_parameters(tmp_path: Path) -> None:
-    """A bound of P_set that one inverter alone has holds for that one alone."""
-    folder = folder_of(tmp_path, "set,key,value\nweak,P_set_lim_pu,0.7\n", inv2="weak")
-    plant = build_plant(configs(*load_scenario(scenario_of(tmp_path, folder)), "I")[0])
-
-    for name in ("inv2", "inv3"):
-        plant.hold(name, 0.9 * 350e3, 2401.0)
-
-    assert [plant.measure()[name].P_set for name in ("inv2", "inv3")] == pytest.approx([0.7 * 350e3, 0.9 * 350e3])
-
-
-def test_a_scenario_may_give_an_inverter_another_set_or_none(tmp_path: Path) -> None:
-    """Key `parameters` replaces what inverters.csv names, and "" takes it away."""
-    folder = folder_of(tmp_path, inv2="slow", inv3="slow")
-    tables = '\n[plant.inverter.inv2]\nparameters = ""\n[plant.inverter.inv5]\nparameters = "slow"\n'
-    _, feeder = load_scenario(scenario_of(tmp_path, folder, tables))
-
-    T_pf = [feeder.parameters_of(row, GfmParameters(), GflParameters()) for row in feeder.inverters]
-
-    assert [it.T_pf for it in T_pf if isinstance(it, GflParameters)] == [0.05, 0.2, 0.2, 0.05, 0.05, 0.05]
 
 
 def test_the_published_values_of_a_model_are_a_set_of_every_feeder(tmp_path: Path) -> None:
@@ -174,16 +148,3 @@ def test_wrong_parameters_of_an_added_inverter_are_refused(params: object, said:
     """The error names the inverter and what would be right."""
     with pytest.raises(ValueError, match=said):
         gp.Feeder.read("microgrid123").add_inverter("inv11", "87", "GFL", 2e5, params=params)  # type: ignore[arg-type]
-
-
-def test_predictions_take_each_inverters_own_parameters(tmp_path: Path) -> None:
-    """A GFL of twenty times the lag answers a load step about twenty times slower at first; all alike is as before."""
-    slow = "set,key,value\nslow,T_pf_s,1.0\n"
-    scenario, feeder = load_scenario(scenario_of(tmp_path, folder_of(tmp_path, slow, inv2="slow")))
-    group = inverter_group_of(scenario, feeder, "IV")
-    model = response(group)
-
-    first = model.E  # what a tick of load does to the states, from rest; powers come last
-
-    assert first[-6] / first[-5] == pytest.approx(0.05 / 1.0, rel=0.3)
-    assert response(group).A.shape[0] == response(inverter_group_of(*load_scenario("islanding"), "IV")).A.shape[0]

@@ -44,18 +44,6 @@ def test_islands_are_named_by_their_first_inverter(network: Network) -> None:
     assert not any(alone)
 
 
-def test_who_delivers_is_told(network: Network) -> None:
-    """A report names the inverters that deliver in each island, and leaves out those that are disconnected."""
-    closed = opened(network, *PAPER_ISLANDS)
-    told = Islands(network).report(1.0, closed, reduced(network, closed, off=("inv5",)))
-
-    assert [(event.t, event.kind, event.subject, event.text) for event in told] == [
-        (1.0, "island", "inv1", "island of inv1, inv2, inv3"),
-        (1.0, "island", "inv4", "island of inv4, inv6"),
-        (1.0, "island", "inv7", "island of inv7, inv8, inv9"),
-    ]
-
-
 def test_an_island_that_stays_as_it_is_is_told_once(network: Network) -> None:
     """A switch that only drops load changes no island; one that parts another leaves the third untold."""
     whole, parts = opened(network, "13-152"), opened(network, "13-152", "sw1_2")
@@ -111,9 +99,9 @@ def schedule(draw: random.Random) -> tuple[SwitchEvent, ...]:
 @pytest.mark.parametrize(
     ("category", "seed", "method"),
     [
-        *(("off", i, "first-order") for i in range(7)),
-        *(("III", i, "first-order") for i in range(4)),
-        *((category, 0, "second-order") for category in ("off", "III")),
+        *(("off", i, "first-order") for i in range(2)),
+        ("III", 0, "first-order"),
+        ("III", 1, "second-order"),
     ],
 )
 def test_no_schedule_of_switchings_ends_the_plant(category: Literal["off", "III"], seed: int, method: Method) -> None:
@@ -175,15 +163,6 @@ def test_branches_see_the_voltages_of_their_loads() -> None:
     np.testing.assert_allclose(across, [at_1[0], at_1[1], at_2[0], at_2[1], at_2[0] - at_2[1], at_2[1] - at_2[2]])
     assert abs(at_2[0] / at_1[0]) == pytest.approx(1.05)
     np.testing.assert_allclose(np.abs(circuit.V_branch), 2400.0 * np.array([1, 1, 1, 1, 3**0.5, 3**0.5]))
-
-
-def test_terminals_are_where_the_inverters_stand(network: Network) -> None:
-    """Terminals come in the inverters' order, phases A, B, C, whatever is merged with them."""
-    circuit = Circuits(network).of(network.closed0)
-
-    assert [[network.nodes[i] for i in row] for row in circuit.terminals] == [
-        [(unit.bus, phase) for phase in "ABC"] for unit in network.inverters
-    ]
 
 
 def test_a_switch_state_has_one_circuit(network: Network) -> None:

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import gc
 from typing import Any
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
 from gridpeers.plant.dynamics import live_network
-from gridpeers.plant.dynamics.circuit import Circuit
 from gridpeers.plant.equipment.named_loads import named_loads, set_power, with_powers
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.feeder.switchboard import LoadBoard
@@ -25,11 +22,6 @@ T_C = 0.02
 def plant(feeder: str = "microgrid123", *events: SwitchEvent, loads: tuple[LoadEvent, ...] = ()) -> Plant:
     """A plant of ours."""
     return Plant(Network(read_feeder(feeder)), PlantSettings(feeder=feeder, events=events, loads=loads), T_C, T_C)
-
-
-def total(p: Plant) -> float:
-    """Real power (kW) of all inverters."""
-    return sum(reading.P for reading in p.measure().values()) / 1e3
 
 
 def run(p: Plant, seconds: float) -> None:
@@ -84,33 +76,6 @@ def test_a_load_is_changed_once_and_restored_to_the_byte() -> None:
     assert (again.Y_loads != first.Y_loads).nnz == 0
     np.testing.assert_array_equal(again.loads().law.S, first.loads().law.S)
     np.testing.assert_array_equal(again.loads().law.I0, first.loads().law.I0)
-
-
-def test_nothing_and_ten_times_are_taken(network: Network) -> None:
-    """Zero power leaves the other loads; what an island cannot feed de-energises it, which the run survives."""
-    p = plant("microgrid123", ISLANDED)
-    run(p, 0.1)
-    before = total(p)
-    for name in named_loads(network.feeder):
-        p.set_load(name, LoadSetting(factor=0.0))
-    run(p, 0.5)
-    assert abs(total(p)) < 0.05 * before
-
-    for name in named_loads(network.feeder):
-        p.set_load(name, LoadSetting(factor=10.0))
-    run(p, 0.5)
-    assert any(event.kind == "trip" for event in p.take_events())
-    assert all(np.isfinite(reading.P) for reading in p.measure().values())
-
-
-def test_what_is_left_out_stays() -> None:
-    """--P alone keeps the reactive power, also that of a setting that has not come into force yet."""
-    board = LoadBoard(Network(read_feeder("microgrid123")))
-
-    assert board.put("48", LoadSetting(Q=60e3)).startswith("load 48: 210 kW and 60 kvar")
-    assert board.put("48", LoadSetting(P=300e3)).startswith("load 48: 300 kW and 60 kvar at nominal voltage")
-    board.apply(0)
-    assert board.put("48", LoadSetting(P=100e3)).startswith("load 48: 100 kW and 60 kvar")
 
 
 @pytest.mark.parametrize(
@@ -239,59 +204,3 @@ def test_events_say_the_power_that_was_set() -> None:
 
         assert set_power(event.text) == pytest.approx(S, rel=1e-5)
     assert set_power("load 48 set") is None
-
-
-def test_all_models_of_load_are_scaled(network: Network) -> None:
-    """Constant power, current and impedance each draw half of it at the same voltages."""
-    table = network.feeder
-    half = {name: 0.5 * load.S for name, load in named_loads(table).items()}
-    V = network.nominal * 0.97
-    for model in ("P", "I", "Z"):
-        whole = Network(replace(table, loads=tuple(replace(load, model=model) for load in table.loads)))
-        less = whole.with_loads(with_powers(whole.feeder, half))
-        drawn = [
-            network.loads().currents(V) + network.Y_loads @ V  # both parts: one of them is nothing
-            for network in (whole, less)
-        ]
-        np.testing.assert_allclose(drawn[1], 0.5 * drawn[0], atol=1e-9)
-
-
-def test_the_network_of_an_event_to_come_is_factored_at_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In real time an event must not be late: its network is factored at the start, and stays if people set loads."""
-    made = []
-
-    def reduce_network(*arguments: Any) -> Any:
-        made.append(arguments[0])
-        return original(*arguments)
-
-    original = live_network.reduce_network
-    monkeypatch.setattr(live_network, "reduce_network", reduce_network)
-    back = LoadEvent(t=2.0, load="48", setting=LoadSetting(factor=1.0))
-    later = replace(ISLANDED, t=2.0)
-    p = plant("microgrid123", later, loads=(LoadEvent(t=1.9, load="48", setting=LoadSetting(factor=1.3)), back))
-    at_start = len(made)
-    for number in range(3):
-        p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * (number + 1)))
-        p.advance()
-    by_hand = len(made) - at_start
-    run(p, 2.1 - p.tick * T_C)
-
-    assert (at_start, by_hand) == (3, 3)
-    assert len(made) == at_start + by_hand
-    assert [event.t for event in p.take_events() if event.kind == "switch"] == [2.0]
-
-
-def test_loads_that_are_set_to_ever_new_powers_take_no_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    """In a run of hours people may set thousands: the plant keeps the circuits of the last few."""
-    monkeypatch.setattr(live_network, "KEPT", 4)
-    p = plant()
-
-    def circuits(numbers: range) -> int:
-        for number in numbers:
-            p.set_load("48", LoadSetting(factor=1.0 + 1e-3 * number))
-            p.advance()
-        gc.collect()
-        return sum(type(it) is Circuit for it in gc.get_objects())
-
-    few = circuits(range(1, 6))
-    assert circuits(range(6, 10)) == few

@@ -60,27 +60,6 @@ def test_each_function_trips_after_its_clearing_time_and_not_a_step_before(categ
     assert steps_until_trip(relays, **beyond(name, threshold), most=round(400.0 / h)) == round(time / h)
 
 
-def test_a_setting_of_a_scenario_in_hertz_is_taken_as_it_stands() -> None:
-    """At 50 Hz the standard's defaults are in proportion; what somebody writes is meant in Hz."""
-    relays = Relays(Protection(trips={"OF2": (51.5, 0.1)}), 1, H, 50.0)
-    at = dict(zip(relays.names, relays.thresholds.tolist(), strict=True))
-
-    assert at["OF2"] == 51.5
-    assert at["OF1"] == pytest.approx(51.0)
-    assert at["UV1"] == 0.88
-
-
-@pytest.mark.parametrize(("category", "name"), SETTINGS)
-def test_at_its_threshold_no_function_trips(category: str, name: str) -> None:
-    """The threshold itself is not beyond it, however long it lasts; the other functions are out of the way."""
-    threshold, time = DEFAULTS[category][name]
-    away = {other: (1e3 if other[0] == "O" else -1.0, 1e3) for other in DEFAULTS[category] if other != name}
-    relays = Relays(replace(chosen(category), trips=away), 1, 0.1, 60.0)
-    at = dict.fromkeys(beyond(name, threshold), threshold)
-
-    assert steps_until_trip(relays, **at, most=round(time / 0.1) + 2) == 0
-
-
 def test_a_step_back_within_the_threshold_starts_the_clearing_time_anew() -> None:
     """A sag of 79 steps, one step of normal voltage and 79 steps of sag do not trip a function of 80 steps."""
     relays = Relays(Protection(category="II"), 1, H, 60.0)
@@ -214,17 +193,6 @@ def test_who_trips_again_and_again_stays_off() -> None:
     assert not recovery.locked[0]
 
 
-def test_trips_far_apart_are_not_counted_together() -> None:
-    """After a minute in service an inverter may trip and come back as often as at first."""
-    recovery = Recovery(2.0, 1, 0.1, 60.0)
-
-    for _ in range(3 * ATTEMPTS):
-        assert not recovery.trip(0)
-        wait(recovery, 20)
-        recovery.enter(0)
-        wait(recovery, 600)
-
-
 UNLIMITED = GfmParameters(I_max=1000.0)
 """GFM of any current: overloads, and black starts into the whole load, come to the functions that are tested here."""
 
@@ -272,20 +240,6 @@ def test_underfrequency_trips_before_the_frequency_is_nonsense(category: str) ->
     assert "UF2: 56.5 Hz" in first.text
     assert f[live].min() > 54.0
     assert np.isfinite(f).all()
-
-
-def test_a_trip_acts_at_its_very_step() -> None:
-    """The clearing time ends within a control period: the row of that step has power, the next one has none."""
-    p = plant(Protection(), *opened(1.0, "13-152"), limits=CLOUDS)
-
-    run(p, 3.0)
-
-    t, _, P, _ = history(p)
-    first = trips(p.take_events())[0]
-    k = int(np.argmin(np.abs(t - first.t)))
-    assert round(first.t / 0.002) % round(T_C / 0.002) != 0
-    assert np.all(P[k] != 0.0)
-    assert np.all(P[k + 1] == 0.0)
 
 
 def test_a_dead_island_has_no_frequency_and_its_inverters_no_island() -> None:
@@ -348,38 +302,6 @@ def test_leaders_that_return_start_a_dead_island_with_all_that_tripped_there() -
     assert {r.island for r in p.measure().values()} == {"inv1"}
     assert sum(r.P for r in p.measure().values()) == pytest.approx(2060e3, rel=0.02)
     assert all(59.5 < r.f < 60.1 for r in p.measure().values())
-
-
-def test_an_island_that_cannot_carry_its_load_is_not_started_for_ever() -> None:
-    """The remaining inverters try twice more; then they stay off until another joins."""
-    p = plant(Protection(enter_service=0.2), *opened(1.0, "13-152"))
-    run(p, 2.0)
-    p.connect("inv1", False)
-    p.connect("inv4", False)
-
-    run(p, 6.0)
-
-    told = [event.text for event in trips(p.take_events())]
-    assert sum(text.startswith("black start") for text in told) == 2
-    assert sum("3 times" in text for text in told) == 1
-    assert {r.V for r in p.measure().values()} == {0.0}
-
-
-def test_who_left_does_not_come_back_by_itself() -> None:
-    """An inverter whose agent left after a trip waits for nobody; the others start without it."""
-    p = plant(Protection(enter_service=1.0), *opened(1.0, "13-152"), *opened(2.2, "60-160"))
-    run(p, 2.0)
-    p.connect("inv1", False)
-    p.connect("inv4", False)
-    run(p, 2.1)
-    p.connect("inv2", False)
-    p.connect("inv1", True)
-    p.connect("inv4", True)
-
-    run(p, 5.0)
-
-    on = {name for name, reading in p.measure().items() if reading.P != 0.0}
-    assert on == {f"inv{k}" for k in (1, 3, 4, 5, 6, 7, 8, 9)}
 
 
 def test_an_island_without_solution_takes_no_other_with_it(network: Network) -> None:

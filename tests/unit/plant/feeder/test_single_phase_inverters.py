@@ -10,8 +10,7 @@ from gridpeers.plant.dynamics import reduction
 from gridpeers.plant.equipment import Bus, Feeder, InverterRow, Line, LineConfig, Load, Source, Switch
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import Method, PlantSettings, PowerLimit, Protection, SwitchEvent
-from gridpeers.plant.tables import read_feeder
+from gridpeers.plant.plant_config import PlantSettings, PowerLimit, Protection, SwitchEvent
 from tests.unit.plant.networks import feeder, three_phase_bus
 
 V_NOM = 2400.0
@@ -88,25 +87,6 @@ def run(p: Plant, until: float) -> list[str]:
     return [event.text for event in p.take_events()]
 
 
-@pytest.mark.parametrize("method", ["first-order", "second-order"])
-def test_both_forms_of_the_network_give_the_same_run(monkeypatch: pytest.MonkeyPatch, method: Method) -> None:
-    """Dense and sparse, a large feeder with single-phase inverters goes through islanding, load loss and reclosing."""
-    added = [unit(f"leg{phase}", "GFM", "47", phase, 60e3) for phase in "ABC"]
-    added += [unit("roof", "GFL", "96", "B", 50e3), unit("lateral", "GFM", "114", "A", 40e3)]
-    table = read_feeder("microgrid123")
-    table = replace(table, inverters=(*table.inverters, *(replace(row, V_nom=4160.0 / 3.0**0.5) for row in added)))
-    events = (("13-152", "open", 0.1), ("60-160", "open", 0.3), ("60-160", "close", 0.5))
-    settings = PlantSettings(events=tuple(SwitchEvent(t=t, switch=s, action=a) for s, a, t in events), method=method)  # type: ignore[arg-type]
-    runs = []
-    for most_dense in (0, 10_000):
-        monkeypatch.setattr(reduction, "MOST_DENSE", most_dense)
-        p = Plant(Network(table), settings, T_C, T_C)
-        run(p, 0.8)
-        runs.append(np.array(p.take_rows()))
-
-    np.testing.assert_allclose(runs[0], runs[1], rtol=1e-9, atol=1e-3)
-
-
 def test_a_lateral_is_an_island_of_its_own_grid_forming_inverter() -> None:
     """Behind its open switch phase B has the frequency of the droop of its own GFM, the rest that of the other."""
     p = plant(
@@ -158,19 +138,6 @@ def test_an_overloaded_lateral_trips_and_starts_again_by_itself() -> None:
     assert pytest.approx(75e3, rel=0.01) == now["leg"].P + now["roof"].P
     assert pytest.approx(1e3, rel=0.2) == now["roof"].P
     assert now["inv1"].f == pytest.approx(60.0, abs=1e-3)
-
-
-def test_three_legs_of_a_bus_feed_the_island_that_the_grid_leaves() -> None:
-    """Each gives what its own phase takes, at the frequency of its own droop."""
-    legs = tuple(unit(f"leg{phase}", "GFM", "2", phase, 100e3) for phase in "ABC")
-    p = plant(small(*legs), SwitchEvent(t=0.1, switch="grid", action="open"))
-    told = run(p, 5.0)
-    now = p.measure()
-
-    assert "island of legA, legB, legC" in told
-    for name, load in (("legA", 60e3), ("legB", 80e3), ("legC", 50e3)):
-        assert pytest.approx(load, rel=0.01) == now[name].P, name
-        assert now[name].f - 60.0 == pytest.approx(0.6 * (0.5 - now[name].P / 100e3), abs=1e-4), name
 
 
 @pytest.mark.parametrize("most_dense", [0, 10_000])

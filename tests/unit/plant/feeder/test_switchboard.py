@@ -9,8 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.bridges.opendss import read_opendss
-from gridpeers.plant.dynamics import Dynamics, PlantError
-from gridpeers.plant.dynamics.kernel import gfl
+from gridpeers.plant.dynamics import PlantError
 from gridpeers.plant.equipment import Feeder, InverterRow
 from gridpeers.plant.equipment.imported_equipment import LoadPart, bus_behind
 from gridpeers.plant.feeder import Plant
@@ -19,7 +18,6 @@ from gridpeers.plant.feeder.switchboard import Switchboard
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import GflParameters, GfmParameters, PlantSettings, SwitchEvent
 from gridpeers.plant.tables import read_feeder
-from tests.unit.plant.dynamics.circuits import BALANCED, GFL_D, V_B, on_stiff_bus
 from tests.unit.plant.feeder.test_feeder import opened, plant, run
 from tests.unit.plant.networks import feeder, three_phase_bus
 
@@ -61,55 +59,10 @@ def test_a_switch_of_an_imported_line_is_named_after_the_line(network: Network) 
     assert imported.name not in board.closed
 
 
-def test_an_idle_operation_says_so(network: Network) -> None:
-    """Closing a closed switch, or opening an open one, changes nothing and is told as such."""
-    board = Switchboard(network, (event(0.0, "13-152", "close"),), H)
-    board.put(1, "13-152", "open")
-    board.put(1, "13-152", "open")
-
-    texts = [note.text for step in (0, 1) for note in board.operate(step)]
-
-    assert texts == [
-        "switch 13-152 was closed already",
-        "switch 13-152 opened",
-        "switch 13-152 was open already",
-    ]
-
-
-def test_switch_states_are_foreseen_in_order_of_time(network: Network) -> None:
-    """The states of a schedule are known before any of it has come, however it is written down."""
-    board = Switchboard(network, (event(2.0, "13-152", "close"), event(1.0, "13-152", "open")), H)
-
-    assert list(board.foreseen()) == [network.closed0 - {"13-152"}, network.closed0]
-    assert board.closed == network.closed0
-
-
 def test_an_unknown_switch_is_refused_when_it_is_put_down(network: Network) -> None:
     """A misspelled switch is an error at the start of a run, not at its time."""
     with pytest.raises(ValueError, match=r'switch "13-125": no such switch'):
         Switchboard(network, (event(1.0, "13-125", "open"),), H)
-
-
-def test_a_switch_that_was_refused_leaves_nothing_to_be_done(network: Network) -> None:
-    """Nothing happens at that step, so nothing is told of it."""
-    board = Switchboard(network, (), H)
-    with pytest.raises(ValueError, match="no such switch"):
-        board.put(5, "sw9", "open")
-
-    assert not board.steps
-
-
-def test_what_was_operated_is_forgotten(network: Network) -> None:
-    """A run in which people switch for hours does not get slower, and what comes is foreseen from what is."""
-    board = Switchboard(network, (event(1.0, "60-160", "open"),), H)
-    for step in range(100):
-        board.put(step, "13-152", "open" if step % 2 else "close")
-        board.operate(step)
-    board.put(100, "13-152", "close")
-    board.drop(100, board.due(100)[0])
-
-    assert list(board.steps) == [500]
-    assert list(board.foreseen()) == [network.closed0 - {"13-152", "60-160"}]
 
 
 V_NOM = 2400.0
@@ -151,34 +104,10 @@ def test_both_limits_are_reported_in_both_directions() -> None:
     ]
 
 
-@pytest.mark.parametrize(("exponents", "edge"), [((0.0, 0.0), 0.0), ((1.0, 1.0), 1.0)])
-def test_a_law_without_a_jump_is_not_reported(exponents: tuple[float, float], edge: float) -> None:
-    """Constant power and constant current go on without a jump at the limits."""
-    assert texts(limits(exponents, edge), 0.9, 1.0, 1.1, 1.0) == []
-
-
 def test_an_oscillation_across_a_limit_is_one_event() -> None:
     """Crossings that follow each other within the pause are one spell; a dead load stays where it was."""
     assert len(texts(limits((1.0, 2.0)), *(0.94, 0.96) * 20, period=0.9 * PAUSE)) == 1
     assert texts(limits((1.0, 2.0)), 1.0, 0.0, 1.0) == []
-
-
-def test_a_run_tells_which_loads_jumped() -> None:
-    """When islanding lowers the voltages, the plant reports the loads that cross V_min, and none if none jumps."""
-
-    def crossings(exponents: tuple[float, float]) -> list[str]:
-        tables = read_feeder("ieee34")
-        parts = tuple(replace(part, exponents=exponents, edge=0.0, V_min=0.98) for part in tables.load_parts)
-        opening = SwitchEvent(t=0.02, switch="sw0", action="open")
-        plant = Plant(
-            Network(replace(tables, load_parts=parts)), PlantSettings(events=(opening,), P_set0=0.58), 0.02, 0.02
-        )
-        for _ in range(10):
-            plant.advance()
-        return [event.text for event in plant.take_events() if "V_min" in event.text]
-
-    assert crossings((0.0, 0.0)) == []
-    assert any("falls below V_min" in text for text in crossings((1.0, 2.0)))
 
 
 pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
@@ -220,11 +149,8 @@ def scaled(folder: Path, connection: tuple[str, str], unit: str, factor: float) 
     ("connection", "unit", "name", "factor"),
     [
         (DELTA, GENERATOR, "generator.g", 1.0),
-        (DELTA, GENERATOR, "generator.g", 0.05),
-        (DELTA, PV, "pvsystem.pv", 1.0),
         (DELTA, PV, "pvsystem.pv", 0.05),
         (FLOATING, GENERATOR, "generator.g", 0.05),  # beside all of the load there is a point, though OpenDSS has none
-        (DELTA, HARDLY_GROUNDED, "generator.g", 1.0),
         (DELTA, HARDLY_GROUNDED, "generator.g", 0.05),
     ],
 )
@@ -256,10 +182,6 @@ def test_loads_that_are_too_much_together_are_not_named(tmp_path: Path) -> None:
         Plant(Network(replace(feeder, load_parts=parts)), PlantSettings(), 0.02, 0.02)
 
 
-OVER_HZ = 0.2
-"""Over-frequency of the stiff bus (Hz): a third of the rating at 1 % droop."""
-
-
 def islanded() -> Plant:
     """Give the microgrid feeder, islanded for a second."""
     p = plant(*opened(0.1, "13-152"))
@@ -273,7 +195,7 @@ def frequencies(p: Plant) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
     return np.array(p.take_rows())[:, 1::6]
 
 
-@pytest.mark.parametrize("P_set", [1e7, 1e12, -1e12, 1e300])
+@pytest.mark.parametrize("P_set", [1e7, -1e300])
 def test_a_gfm_told_nonsense_holds_its_bound_and_the_run_goes_on(P_set: float) -> None:
     """10 MW ended the plant by no convergence, 1 TW gave 1 MHz: P_set is bounded at 3 pu, and so is the frequency."""
     p = islanded()
@@ -287,19 +209,7 @@ def test_a_gfm_told_nonsense_holds_its_bound_and_the_run_goes_on(P_set: float) -
     assert np.all(np.abs(frequencies(p) - 60.0) < 2.0)
 
 
-def test_a_voltage_set_point_of_nonsense_is_held_within_its_band() -> None:
-    """V_set of ten times nominal is held at 1.2 pu, V_set 0 at 0.8 pu."""
-    p = islanded()
-
-    p.hold("inv1", 300e3, 24e3)
-    p.hold("inv2", 200e3, 0.0)
-
-    readings = p.measure()
-    assert readings["inv1"].V_set == pytest.approx(1.2 * 2401.8, rel=1e-3)
-    assert readings["inv2"].V_set == pytest.approx(0.8 * 2401.8, rel=1e-3)
-
-
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("value", [np.nan, np.inf])
 def test_set_points_that_are_no_numbers_are_left_out(value: float) -> None:
     """Neither NaN nor an infinity gets in, alone or beside a good value."""
     p = islanded()
@@ -331,28 +241,6 @@ def test_a_spell_of_limited_set_points_is_told_once_with_value_and_bound() -> No
     assert "1800 kW" in begun[0].text
     (ended,) = p.take_events()
     assert "100 set-points" in ended.text
-
-
-def over_frequency(parameters: GflParameters, P_set: float) -> float:
-    """Tell a GFL on a stiff bus P_set (pu), and raise the frequency it measures; return the P reference (pu)."""
-    dynamics: Dynamics = on_stiff_bus(parameters)
-    units, h = dynamics.inverters, dynamics.h
-    units.hold(0, P_set, 1.0)
-    state, J = units.gfl_state, units.J[0].copy()
-    for k in range(1000):
-        x0, d = state.copy(), state.copy()
-        for second in (False, True):
-            V = V_B * BALANCED * np.exp(2j * np.pi * OVER_HZ * (k + second) * h)
-            J = np.array(gfl.advance_gfl(units.gfl[0], *units.set_points[0], x0[0], state[0], d[0], *V, *J, h, second))
-    return float(state["P_f"][0])
-
-
-def test_a_gfl_reference_above_the_rating_is_clipped_in_place_as_in_gridlabd() -> None:
-    """inverter-models 4.4: at P_set 1.2 pu a GFL gives 1 - 1/3 pu at 60.2 Hz; without the limit it gives 1.2 - 1/3."""
-    parameters = replace(GFL_D, frequency_watt=True, T_ff=0.05, T_pf=0.05)
-
-    assert over_frequency(parameters, 1.2) == pytest.approx(1.0 - OVER_HZ / 0.6, abs=1e-3)
-    assert over_frequency(replace(parameters, P_set_lim=3.0), 1.2) == pytest.approx(1.2 - OVER_HZ / 0.6, abs=1e-3)
 
 
 def test_a_start_beyond_the_limits_of_the_gfm_that_holds_an_island_up_is_refused() -> None:

@@ -18,22 +18,6 @@ def test_nodes_are_in_the_order_of_the_tables(network: Network) -> None:
     assert [network.index(*node) for node in network.nodes] == list(range(286))
 
 
-def test_nominal_phasors(network: Network) -> None:
-    """Nominal phasors are V_nom at 0, -120, +120 degrees, behind the delta-delta transformer too."""
-    a, b, c = (network.nominal[network.index("610", phase)] for phase in "ABC")
-
-    assert abs(a) == pytest.approx(480 / 3**0.5)
-    np.testing.assert_allclose(np.degrees(np.angle([a, b, c])), [0.0, -120.0, 120.0], atol=1e-12)
-
-
-def test_source_is_bus_150_at_nominal_voltage(network: Network) -> None:
-    """The substation is bus 150 at 1.0 pu, and its nodes represent themselves."""
-    assert [network.nodes[i] for i in network.source_nodes] == [("150", "A"), ("150", "B"), ("150", "C")]
-    np.testing.assert_allclose(network.source_voltage, network.nominal[network.source_nodes])
-    merge = network.merge(network.closed0)
-    assert list(merge.representative[network.source_nodes]) == list(network.source_nodes)
-
-
 @pytest.mark.parametrize("text", ["67s-67", "67-67s", "sw1_2"])
 def test_switch_is_found_by_every_name(network: Network, text: str) -> None:
     """A switch answers to its buses in both orders and to its alias."""
@@ -59,36 +43,6 @@ def test_aliases_are_not_names(network: Network) -> None:
         network.admittance(frozenset({"sw1_2"}))
 
 
-def test_all_is_one_island_at_first(network: Network) -> None:
-    """Grid-connected, every bus hangs together."""
-    assert network.islands(network.closed0) == (frozenset(bus.name for bus in network.feeder.buses),)
-
-
-def test_event_1_islands_the_microgrids(network: Network) -> None:
-    """Opening 13-152 leaves 1-34 with the substation and islands everything beyond."""
-    assert network.islands(opened(network, "13-152")) == (
-        zones(network, "rest"),
-        zones(network, "passive", "MG1", "MG2", "MG3"),
-    )
-
-
-def test_event_2_drops_the_passive_zone(network: Network) -> None:
-    """Opening 60-160 as well leaves the passive zone dead and the three microgrids together."""
-    assert set(network.islands(opened(network, "13-152", "60-160"))) == {
-        zones(network, "rest"),
-        zones(network, "passive"),
-        zones(network, "MG1", "MG2", "MG3"),
-    }
-
-
-def test_opening_60_160_alone_keeps_the_passive_zone_on_the_grid(network: Network) -> None:
-    """With 13-152 closed, opening 60-160 leaves the passive zone with the substation."""
-    assert set(network.islands(opened(network, "60-160"))) == {
-        zones(network, "rest", "passive"),
-        zones(network, "MG1", "MG2", "MG3"),
-    }
-
-
 def test_three_microgrids(network: Network) -> None:
     """sw1_2 and sw2_3 split the island into MG1 with the passive zone, MG2 and MG3, one GFM in each."""
     islands = network.islands(opened(network, *PAPER_ISLANDS))
@@ -101,16 +55,6 @@ def test_three_microgrids(network: Network) -> None:
     }
     grid_forming = {inverter.bus for inverter in network.inverters if inverter.kind == "GFM"}
     assert sorted(len(grid_forming & island) for island in islands) == [0, 1, 1, 1]
-
-
-def test_islands_are_ordered_by_their_first_bus(network: Network) -> None:
-    """Islands come in the order of their first bus in the table, whatever the switches."""
-    order = [bus.name for bus in network.feeder.buses]
-    islands = network.islands(opened(network, *PAPER_ISLANDS, "60-160"))
-
-    firsts = [min(order.index(bus) for bus in island) for island in islands]
-    assert firsts == sorted(firsts)
-    assert sum(len(island) for island in islands) == len(order)
 
 
 def test_lines_without_charging_carry_no_current_at_equal_voltages() -> None:
@@ -157,23 +101,6 @@ def test_delta_transformer_passes_no_zero_sequence() -> None:
     current = network.Y_branches @ np.array([1000.0, 1000.0, 1000.0, 0.0, 0.0, 0.0])
 
     np.testing.assert_allclose(current, 0.0, atol=1e-9)
-
-
-def test_capacitors_give_their_reactive_power_at_rated_voltage(network: Network) -> None:
-    """The banks of the feeder give 750 kvar together at their rated voltage."""
-    V = network.nominal * 2401.8 / (4160 / 3**0.5)
-
-    assert V @ np.conj(network.Y_capacitors @ V) == pytest.approx(-750e3j)
-
-
-def test_closing_again_restores_exactly(network: Network) -> None:
-    """The matrix is a function of the switches alone: opened and closed again, it is the same to the bit."""
-    before = network.admittance(network.closed0)
-    apart = network.admittance(opened(network, *PAPER_ISLANDS))
-    after = network.admittance(opened(network, *PAPER_ISLANDS) | set(map(network.switch_name, PAPER_ISLANDS)))
-
-    assert np.array_equal(before.toarray(), after.toarray())
-    assert not np.array_equal(before.toarray(), apart.toarray())
 
 
 def test_matrix_is_symmetric_and_separates_islands(network: Network) -> None:
@@ -251,14 +178,6 @@ def test_parallel_regulator_and_switch_are_an_error() -> None:
     """Two ties between the same nodes at different ratios are a short circuit, which is told with both nodes."""
     with pytest.raises(ValueError, match=r"a bus and b bus are tied twice, at 1.00000 and at 1.05000"):
         merge_nodes(["a bus", "b bus"], [(0, 1, 1.0), (0, 1, 1.05)], [])
-
-
-def test_ties_in_a_loop_are_no_error() -> None:
-    """Closed switches in a ring tie their nodes more often than needed, which is harmless."""
-    merge = merge_nodes(["a", "b", "c"], [(0, 1, 1.0), (1, 2, 1.0), (2, 0, 1.0)], [2])
-
-    assert merge.representative.tolist() == [2, 2, 2]
-    assert merge.ratio.tolist() == [1.0, 1.0, 1.0]
 
 
 def test_ratios_multiply_along_a_chain() -> None:

@@ -61,7 +61,7 @@ def report(number: int) -> LinkReport:
     return LinkReport(sender="inv1", epoch=1, seq=0, t=0.0, data=str(number).encode())
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_recorder_that_was_cut_off_has_all_rows_and_reports_in_order_and_once(seed: int) -> None:
     """However often and long the link was down, and even if the last word fell into it."""
     draw = random.Random(seed)

@@ -7,7 +7,7 @@ from msgspec.structs import replace
 
 from gridpeers.agents.agent import Agent
 from gridpeers.plant.plant_config import ScheduledAction
-from gridpeers.plant.realtime.realtime_plant import REFUSAL_INTERVAL, REFUSALS
+from gridpeers.plant.realtime.realtime_plant import REFUSALS
 from gridpeers.wire.messages import Measurement, Stop, Telemetry
 from tests.toy.toy_configs import agent_config
 from tests.unit.plant.realtime.realtime_lab import KEYS, Lab, running
@@ -149,39 +149,3 @@ def test_of_thousands_that_are_refused_some_are_told() -> None:
     assert all(stop.refused for stop in told)
     assert lab.side.rejects.counts["excess"] == 10_000 - REFUSALS
     assert len(lab.take(Stop)) == 1
-
-
-def test_an_ended_run_neither_waits_for_strangers_nor_tells_all_of_them() -> None:
-    """Thousands that were refused, and thousands that come after the end: it is over once its own agents are gone."""
-    lab = running(3)
-    for i in range(3_000):
-        lab.side.appeared(KEYS.alive_agent("inv2", f"x{i}"), lab.now)
-    lab.ask("down")
-    lab.now += REFUSALS * REFUSAL_INTERVAL
-    lab.take(Stop)
-    for i in range(3_000):
-        lab.side.appeared(KEYS.alive_agent(f"who{i}", "x"), lab.now)
-    lab.do()
-    told = [key for key, message in lab.sent if isinstance(message, Stop)]
-    for key in told:
-        lab.side.vanished(KEYS.alive_agent(*KEYS.parts(key)[1:]), lab.now)
-    for name in ("inv1", "inv2", "inv3"):
-        assert not lab.side.finished
-        lab.token(name, gone=True)
-
-    assert len(told) == REFUSALS
-    assert lab.side.finished
-
-
-def test_of_a_token_it_says_whether_its_holder_takes_part() -> None:
-    """Agents and recorders that it has noted, also one that has said that it leaves; not who was refused."""
-    lab = running(3)
-    lab.side.appeared(KEYS.alive_recorder("r"), lab.now)
-    lab.token("inv2", "b")
-    lab.leave("inv3")
-    noted = {key: lab.side.is_noted(key) for key in map(KEYS.alive_agent, ("inv1", "inv2", "inv3"), "aba")}
-
-    assert list(noted.values()) == [True, False, True]
-    assert lab.side.is_noted(KEYS.alive_recorder("r"))
-    assert not lab.side.is_noted(KEYS.alive_recorder("s"))
-    assert not lab.side.is_noted("gridpeers/toy/alive/agent")

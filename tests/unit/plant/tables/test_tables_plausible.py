@@ -6,9 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from gridpeers.plant.feeder import Plant
-from gridpeers.plant.network import Network
-from gridpeers.plant.plant_config import PlantSettings
 from gridpeers.plant.tables import FeederError, feeders, read_feeder
 from gridpeers.plant.tables.read import DATA
 
@@ -145,37 +142,3 @@ def test_a_column_given_twice_is_told_once(folder: Path) -> None:
     (folder / "lines.csv").write_text(text)
 
     assert problems(folder) == ('lines.csv: column "length_m" stands there twice; keep one',)
-
-
-def test_a_folder_in_the_place_of_a_table_is_told(folder: Path) -> None:
-    """An optional table that cannot be read is not the same as one that is not there."""
-    (folder / "capacitors.csv").unlink()
-    (folder / "capacitors.csv").mkdir()
-
-    assert problems(folder) == ("capacitors.csv: is no file",)
-
-
-def test_a_number_with_an_underscore_is_none(folder: Path) -> None:
-    """1_00 is 100 in Python and a typing error in a table."""
-    edit(folder, "lines.csv", 4, length_m="1_00")
-
-    assert problems(folder) == ('lines.csv row 4: length_m must be a number, got "1_00"',)
-
-
-def test_one_inverter_on_one_bus_has_an_operating_point(folder: Path) -> None:
-    """The smallest feeder, a GFM and its load on one bus, starts: nothing is left to be found by droop."""
-    for path in folder.glob("*.csv"):
-        path.unlink()
-    tables = {
-        "buses": "bus,phases,V_nom_kV_LL\n1,ABC,4.16\n",
-        "lines": "line,from_bus,to_bus,phases,config,length_m\n",
-        "line_configs": "config,phase_1,phase_2,R_ohm_per_km,X_ohm_per_km,B_uS_per_km\n1,A,A,0.3,0.6,1\n",
-        "loads_main": "bus,connection,model,P_a_kW,Q_a_kvar,P_b_kW,Q_b_kvar,P_c_kW,Q_c_kvar\n1,Y,P,40,10,40,10,40,10\n",
-        "inverters": "name,kind,bus,microgrid,P_rated_kW,m_p_pu,m_q_pu\ninv1,GFM,1,MG1,200,0.01,0.05\n",
-    }
-    for name, text in tables.items():
-        (folder / f"{name}.csv").write_text(text)
-
-    plant = Plant(Network(read_feeder(str(folder))), PlantSettings(feeder=str(folder)), 0.02, 0.01)
-
-    assert pytest.approx(120e3) == plant.measure()["inv1"].P
