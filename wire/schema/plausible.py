@@ -4,6 +4,8 @@
 
 `Range` bounds the values that code can use. `Plausible` bounds what makes sense: wide enough for every value that
 somebody might want to try, and too narrow for one that only a lost unit explains.
+
+An `objection` is the end of a sentence that says why a value cannot be right, or "".
 """
 
 from __future__ import annotations
@@ -35,24 +37,20 @@ class Range:
 
     @property
     def span(self) -> str:
-        if math.isfinite(self.low + self.high):
-            return f"{_bound(self.low)} to {_bound(self.high)}"
+        low, high = (str(bound) if isinstance(bound, int) else f"{bound:g}" for bound in (self.low, self.high))
         if math.isfinite(self.low):
-            return f"at least {_bound(self.low)}"
-        return f"at most {_bound(self.high)}" if math.isfinite(self.high) else ""
+            return f"{low} to {high}" if math.isfinite(self.high) else f"at least {low}"
+        return f"at most {high}" if math.isfinite(self.high) else ""
 
     def objection(self, value: Any, unit: str = "") -> str:
-        """Return why a value is no number within the range, "" if it is."""
-        shown = printable(str(value), 60)
         if isinstance(value, bool) or not isinstance(value, (int, float)):
-            return f"must be a number, got {shown}"
-        shown = f"{value:g}"
+            return f"must be a number, got {printable(str(value), 60)}"
         if not math.isfinite(value):
-            return f"must be a finite number, got {shown}"
+            return f"must be a finite number, got {value:g}"
         if self.low <= value <= self.high:
             return ""
         bounds = f"from {self.span}" if " to " in self.span else self.span
-        return f"must be {bounds}{f' {unit}' if unit else ''}, got {shown}"
+        return f"must be {bounds}{f' {unit}' if unit else ''}, got {value:g}"
 
 
 @dataclass(frozen=True)
@@ -64,9 +62,7 @@ class Plausible:
     low: float
     """Lowest value; with `above_zero` that of plausible ones, and zero and less is an error of its own."""
     high: float
-    """Highest value."""
     above_zero: bool = False
-    """Whether zero makes no sense at all."""
     hint: str | Callable[[float], str] = ""
     """End of the sentence about a value that is not plausible, or a function from the value to it."""
 
@@ -75,26 +71,27 @@ class Plausible:
         return f"{self.low:g} to {self.high:g}"
 
     def objection(self, value: float, unit: str = "") -> str:
-        """Return why a number cannot be right and what would be, "" if it can.
+        """Return why a number cannot be right and what would be.
 
         Examples
         --------
         >>> Plausible("a control period", 5e-4, 2.0, above_zero=True).objection(20.0, "s")
         '20 s is not plausible for a control period (0.0005 to 2 s); did you mean 0.02 (20 ms)?'
         """
-        text = f" {unit}" if unit else ""
-        span = f"{self.span}{text}"
-        try:
-            value = float(value)  # a whole number may be beyond any float
-        except OverflowError:
+        if abs(value) > 1e300:  # a whole number may be beyond any float
             value = math.inf if value > 0 else -math.inf
+        text = f" {unit}" if unit else ""
         hint = self.hint if isinstance(self.hint, str) else self.hint(value)
+        rule = ""
         if not math.isfinite(value):
-            return f"{self.what} must be a finite number, got {value}; {span} makes sense{hint}"
-        if self.above_zero and value <= 0:
-            return f"{self.what} must be above 0, got {value:g}{text}; {span} makes sense{hint}"
-        if self.low == 0 and value < 0:
-            return f"{self.what} must not be negative, got {value:g}{text}; {span} makes sense{hint}"
+            rule, text = "be a finite number", ""
+        elif self.above_zero and value <= 0:
+            rule = "be above 0"
+        elif self.low == 0 and value < 0:
+            rule = "not be negative"
+        span = f"{self.span} {unit}" if unit else self.span
+        if rule:
+            return f"{self.what} must {rule}, got {value:g}{text}; {span} makes sense{hint}"
         if self.low <= value <= self.high:
             return ""
         return f"{value:g}{text} is not plausible for {self.what} ({span}){self._meant(value, unit) or hint}"
@@ -108,36 +105,26 @@ class Plausible:
 
 @dataclass(frozen=True)
 class Probability:
-    """A probability from 0 to 1."""
-
     what: str
     """Name of the event."""
     above_zero: bool = False
-    """Whether 0 is none, as the number is divided by."""
+    """Whether 0 is an error, as the number is divided by; then also what is so small that no number is left."""
 
     @property
     def span(self) -> str:
         return "above 0, to 1" if self.above_zero else "0 to 1"
 
     def objection(self, value: float, unit: str = "") -> str:
-        """Return why a number is no such probability, "" if it is."""
-        if (LEAST if self.above_zero else 0.0) <= value <= 1.0:
+        if (1e-12 if self.above_zero else 0.0) <= value <= 1.0:
             return ""
         bounds = "above 0 and up to 1" if self.above_zero else "from 0 to 1"
         return f"{self.what} is a probability {bounds}, got {value:g}{in_percent(value)}"
-
-
-def _bound(value: float) -> str:
-    return str(value) if isinstance(value, int) else f"{value:g}"
 
 
 def in_percent(value: float) -> str:
     """Return the end of a sentence about a number from 0 to 1 that was written in percent, "" if it was not."""
     return f"; did you mean {value / 100.0:g} ({value:g} %)?" if 1.0 < value <= 100.0 else ""
 
-
-LEAST = 1e-12
-"""Least probability that must be above 0: dividing by a smaller one leaves no number."""
 
 _OTHER_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
     "s": ((1e-3, "ms"),),

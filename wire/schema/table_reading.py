@@ -7,7 +7,7 @@ import json
 import operator
 import types
 import typing
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Literal, TypeVar, get_args, get_origin
 
 import msgspec
@@ -28,6 +28,8 @@ from gridpeers.wire.schema.table_schema import (
 )
 from gridpeers.wire.wording import printable, suggestion
 
+T = TypeVar("T", bound=msgspec.Struct)
+
 _KIND_WORDS = {
     float: "a number",
     int: "a whole number",
@@ -35,102 +37,6 @@ _KIND_WORDS = {
     bool: "true or false",
     dict: "a table",
 }
-
-
-def shown(raw: object) -> str:
-    try:
-        text = json.dumps(raw, ensure_ascii=False, default=str)
-    except (TypeError, ValueError, RecursionError):  # what Python has and no file
-        text = repr(raw)
-    return printable(text, 1000)
-
-
-def in_words(*kinds: Any) -> str:
-    """Return types in words, such as 'one of "a", "b" or a list of numbers'."""
-    kinds = tuple(part for kind in kinds for part in kinds_of(kind))
-    words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(structs_in(kind))))
-    return " or ".join(words)
-
-
-def wrong_type(field: Field, raw: Any) -> str:
-    kinds = kinds_of(field.type)
-    literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
-    if literal is not None and isinstance(raw, str):
-        rest = [kind for kind in kinds if kind is not literal]
-        more = f"; or write {_named(rest, field)}" if rest else ""
-        choices = [choice for choice in get_args(literal) if choice]
-        return f"there is no {shown(raw)}; {suggestion(raw, choices, 'choices')}{more}"
-    hint = number_in(raw) if isinstance(raw, str) and {float, int} & {*kinds} else ""
-    return f"must be {_named(kinds, field)}, got {shown(raw)}{hint}"
-
-
-def expected(field: Field) -> str:
-    kind, example = without_none(field.type), field.mark(Example)
-    if get_origin(kind) is dict:
-        return f"write at least one table [{field.key}.NAME]"
-    if structs_in(kind) == [kind]:
-        return f"write a table [{field.key}]"
-    if kind is str and example:
-        return f"write {field.key} = {example.text}"
-    return f"write {_named(kinds_of(kind), field)}"
-
-
-def kinds_of(kind: Any) -> tuple[Any, ...]:
-    """Return the types of which a value may be one; None is none, as TOML has no null."""
-    return tuple(part for part in _parts(kind) if part is not types.NoneType)
-
-
-def structs_in(kind: Any) -> list[Any]:
-    return [part for part in kinds_of(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
-
-
-def inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
-    """Return the struct in a `tuple[Struct, ...]` or a `dict[str, Struct]`."""
-    if get_origin(kind) is not container:
-        return None
-    inner = get_args(kind)[1 if container is dict else 0]
-    return inner if structs_in(inner) == [inner] else None
-
-
-def keys_of(struct: type) -> list[str]:
-    nameless = (OtherKeys, NamedTables)
-    return [field.key for field in fields_of(struct) if not (NO_KEY in field.marks or field.mark(nameless))]
-
-
-def _named(kinds: typing.Sequence[Any], field: Field) -> str:
-    example = field.mark(Example)
-    return in_words(*kinds) + (f" such as {example.text}" if example else "")
-
-
-def _word(kind: Any, kinds: typing.Sequence[Any]) -> str:
-    origin = get_origin(kind)
-    if origin is Literal:
-        return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
-    if structs_in(kind):
-        several = sum(bool(structs_in(other)) for other in kinds) > 1
-        keys = f"a {kind.__struct_config__.tag_field}" if several else f"the keys {', '.join(keys_of(kind))}"
-        return f"a table with {keys}"
-    if origin in (tuple, list):
-        inner = get_args(kind)[0]
-        if inner in (int, float):
-            return "a list of numbers"
-        if get_origin(inner) is Literal:
-            return f"a list with {_word(inner, kinds)}"
-        pairs = get_origin(inner) is tuple and Ellipsis not in get_args(inner)
-        return "a list of pairs" if pairs else "a list of lists" if get_origin(inner) is tuple else "a list"
-    return _KIND_WORDS.get(origin or kind, getattr(kind, "__name__", str(kind)))
-
-
-def without_none(kind: Any) -> Any:
-    return functools.reduce(operator.or_, kinds_of(kind))
-
-
-def _parts(kind: Any) -> tuple[Any, ...]:
-    return get_args(kind) if get_origin(kind) in (types.UnionType, typing.Union) else (kind,)
-
-
-T = TypeVar("T", bound=msgspec.Struct)
-
 _UNIT_WORDS = {"s": "in seconds", "pu": "per unit", "Hz": "in hertz"}
 _KNOWN_UNITS = ("us", "ms", "s", "pu", "percent", "kW", "W", "kvar", "kV", "V", "mHz", "Hz")
 
@@ -154,26 +60,13 @@ def read_table(struct: type[T], data: Mapping[str, Any]) -> tuple[T, list[Proble
 
 
 def read_parameters(cls: type, given: Mapping[str, Any]) -> tuple[dict[str, Any], list[Problem]]:
-    """Return the value of every parameter of a class, such as a law, by name; they are of use only without problems.
-
-    Examples
-    --------
-    >>> from gridpeers.agents.laws.dapi import Dapi
-    >>> for name, text in read_parameters(Dapi, {"k": 5000, "betta": 1, "a": "1"})[1]:  # doctest: +ELLIPSIS
-    ...     print(f"{name}: {text}")
-    betta: unknown parameter; did you mean "beta"? The parameters are P_set_min, P_set_max, ...
-    k: must be from 0.001 to 1000 s, got 5000
-    a: must be a number, got "1"; write 1
-    """
+    """Return the value of every parameter of a class, such as a law, by name; they are of use only without problems."""
     reader = _Reader(cls, "parameter")
     return reader.values(cls, given, ""), reader.problems
 
 
 def parameter_values(cls: type, given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the value of every parameter of a class, converted to its type.
-
-    Raise ValueError if a value is wrong or missing; the text has all problems.
-    """
+    """Return the value of every parameter of a class; raise ValueError with all problems if one is wrong or missing."""
     values, problems = read_parameters(cls, given)
     if problems:
         raise ValueError("; ".join(f"{name}: {text}" for name, text in problems))
@@ -192,78 +85,64 @@ class _Reader:
         """Convert one table; what it leaves out comes from `base`, without one from the defaults."""
         return struct(**self.values(struct, data, path, base))
 
-    def values(self, struct: type, data: Any, path: str, base: Any = None) -> dict[str, Any]:
-        """Convert one table to the values of a class by name."""
+    def values(self, cls: type, data: Any, path: str, base: Any = None) -> dict[str, Any]:
         noted = len(self.problems)
-        fields = [field for field in fields_of(struct) if not (INLINE in field.marks or NO_KEY in field.marks)]
-        inline = [field for field in fields_of(struct) if INLINE in field.marks]
-        others = next((field for field in fields if field.mark(OtherKeys)), None)
-        named = next((field for field in fields if field.mark(NamedTables)), None)
-        inline_keys = [key for field in inline for key in keys_of(field.type)]
-        keys = [*(field.key for field in fields if field not in (others, named)), *inline_keys]
-        values: dict[str, Any] = self._top if struct is self._root else {}
-        tag = struct.__struct_config__.tag_field if issubclass(struct, msgspec.Struct) else None
+        values: dict[str, Any] = self._top if cls is self._root else {}
         is_table = isinstance(data, Mapping)
         if not is_table:
-            names = ", ".join([*_names(fields), *inline_keys])
-            self._add(path, f"must be a table with the {self._noun}s {names}, got {shown(data)}")
+            self._add(path, f"must be a table with the {self._noun}s {', '.join(_names(cls))}, got {shown(data)}")
             data = {}
-        for field in inline:
-            values[field.name] = self.table(
-                field.type, {key: data[key] for key in keys_of(field.type) if key in data}, path
-            )
-        if others is not None:
-            values[others.name] = ()
-        if named is not None:
-            values[named.name] = {}
-        for key in data:
-            if others is not None and key not in keys and others.mark(OtherKeys).accepts(key):
+        plain = [field for field in fields_of(cls) if _is_plain(field)]
+        rest = dict(data)
+        for key in (_tag_field(cls), *(field.key for field in plain)):
+            rest.pop(key, None)
+        for field in fields_of(cls):
+            if INLINE in field.marks:
+                own = {key: rest.pop(key) for key in keys_of(field.type) if key in rest}
+                values[field.name] = self.table(field.type, own, path)
+            elif others := field.mark(OtherKeys):
                 found: list[Problem] = []
-                values[others.name] += others.mark(OtherKeys).read(key, data[key], found)
-                self.problems += [Problem(_join(path, problem.path), problem.text) for problem in found]
-            elif key not in keys and key != tag:
-                tables = named.mark(NamedTables).known() if named else {}
-                if key in tables and named:
-                    values[named.name][key] = self.table(tables[key], data[key], _join(path, key))
-                else:
-                    self._add(_join(path, key), self._unknown(key, struct, [*_names(fields), *inline_keys]))
-        for field in fields:
-            if field in (others, named):
-                continue
-            start = self._top.get(field.name) if INHERITED in field.marks else None
+                accepted = [*filter(others.accepts, rest)]
+                values[field.name] = tuple(it for key in accepted for it in others.read(key, rest.pop(key), found))
+                self.problems += below(path, found)
+            elif named := field.mark(NamedTables):
+                tables = named.known() if rest else {}
+                values[field.name] = {
+                    key: self.table(tables[key], rest.pop(key), _join(path, key)) for key in [*rest] if key in tables
+                }
+        for key in rest:
+            self._add(_join(path, key), self._unknown(key, cls))
+        for field in plain:
+            place, start = _join(path, field.key), self._top.get(field.name) if INHERITED in field.marks else None
             if field.key in data:
-                values[field.name] = self._value(field, data[field.key], _join(path, field.key), start)
+                values[field.name] = self._value(field, data[field.key], place, start)
             elif base is not None or start is not None:
                 values[field.name] = getattr(base, field.name) if base is not None else start
-            elif not field.required:
-                values[field.name] = field.default
             else:
-                if is_table:
-                    self._add(_join(path, field.key), f"is missing; {expected(field)}")
-                values[field.name] = _placeholder(field.type)
+                values[field.name] = _fallback(field)
+                if field.required and is_table:
+                    self._add(place, f"is missing; {_expected(field)}")
         wrong = {problem.path for problem in self.problems[noted:]}
-        found = contradictions(
-            struct, types.SimpleNamespace(**values), lambda field: _join(path, field.key) not in wrong
-        )
-        self.problems += below(path, found)
+        right = types.SimpleNamespace(**values)
+        self.problems += below(path, contradictions(cls, right, lambda field: _join(path, field.key) not in wrong))
         return values
 
     def _value(self, field: Field, raw: Any, path: str, base: Any) -> Any:
         """Convert the value of one key; return the default for a wrong one."""
-        kind = without_none(field.type)
-        structs = structs_in(kind)
+        kind = _without_none(field.type)
+        structs = _structs_in(kind)
         if structs == [kind]:
             return self.table(kind, raw, path, base)
         if structs and isinstance(raw, Mapping):
             before, chosen = len(self.problems), self._chosen(structs, raw, path)
             value = self.table(chosen, raw, path) if chosen else None
             return value if len(self.problems) == before else _fallback(field)
-        if (inner := inner_struct(kind, tuple)) is not None:
+        if inner := _inner_struct(kind, tuple):
             if isinstance(raw, list):
                 return tuple(self.table(inner, item, f"{path}[{i}]") for i, item in enumerate(raw))
             self._add(path, f"must be written as [[{path}]], got {shown(raw)}")
             return ()
-        if (inner := inner_struct(kind, dict)) is not None:
+        if inner := _inner_struct(kind, dict):
             if isinstance(raw, Mapping) and all(isinstance(item, Mapping) for item in raw.values()):
                 return {name: self.table(inner, item, f"{path}.{name}") for name, item in raw.items()}
             example = field.mark(Example)
@@ -271,11 +150,9 @@ class _Reader:
             self._add(path, f"must be {right}, got {shown(raw)}")
             return {}
         try:
-            value = msgspec.convert(raw, kind)
+            value, wrong = msgspec.convert(raw, kind), ""
         except msgspec.ValidationError:
-            self._add(path, wrong_type(field, raw))
-            return _fallback(field)
-        wrong = ""
+            value, wrong = None, _wrong_type(field, raw)
         if isinstance(value, str) and not value.isprintable() and self._noun == "key":
             wrong = f"has characters that cannot be printed: {value!a}; write letters, digits and signs"
         elif isinstance(value, int | float) and not isinstance(value, bool):
@@ -289,17 +166,19 @@ class _Reader:
         if len(structs) == 1:
             return structs[0]
         tags = {str(struct.__struct_config__.tag): struct for struct in structs}
-        key = str(structs[0].__struct_config__.tag_field)
+        key = str(_tag_field(structs[0]))
+        tag = raw.get(key)
         if key not in raw:
             self._add(_join(path, key), f"is missing; write one of {', '.join(tags)}")
-        elif (tag := raw[key]) not in list(tags):
+        elif tag not in [*tags]:  # it may be a table
             self._add(_join(path, key), f"there is no {shown(tag)}; {suggestion(str(tag), tags, f'{key}s')}")
         else:
-            return tags[tag]
+            return tags[str(tag)]
         return None
 
-    def _unknown(self, key: str, struct: type, known: list[str]) -> str:
+    def _unknown(self, key: str, cls: type) -> str:
         """Say what to write instead of an unknown key."""
+        known = [*_names(cls)]
         bare, _, unit = key.rpartition("_")
         for stem in [key] + ([bare] if unit in _KNOWN_UNITS else []):
             for right, word in _UNIT_WORDS.items():
@@ -308,8 +187,8 @@ class _Reader:
             if stem != key and stem in known:
                 return f"unknown {self._noun}; write {stem}"
         if f"{key}s" not in known:
-            for where, table in _tables(self._root):
-                if table is not struct and key in keys_of(table):
+            for where, table in _tables(self._root, "", "at the top of the file, before any table"):
+                if table is not cls and key in keys_of(table):
                     return f"unknown key here; it belongs {where}"
         return f"unknown {self._noun}; {suggestion(key, known, f'{self._noun}s')}"
 
@@ -317,35 +196,48 @@ class _Reader:
         self.problems.append(Problem(path, text))
 
 
-def _tables(root: type) -> Iterator[tuple[str, type]]:
-    """Yield every table of a file with the words that say where it is, the outer ones first."""
-    yield "at the top of the file, before any table", root
-    further = [("", root)]
-    while further:
-        path, struct = further.pop(0)
-        for field in fields_of(struct):
-            kind, key = field.type, _join(path, field.key)
-            if INLINE in field.marks:
-                further.append((path, kind))
-            elif mark := field.mark(NamedTables):
-                yield from ((f"into [{path}.{name}]", table) for name, table in mark.known().items())
-            elif structs_in(kind) == [kind]:
-                yield f"into [{key}]", kind
-                further.append((key, kind))
-            elif (inner := inner_struct(kind, dict)) is not None:
-                yield f"into [{key}.NAME]", inner
-                further.append((f"{key}.NAME", inner))
-            elif (inner := inner_struct(kind, tuple)) is not None and not field.mark(OtherKeys):
-                yield f"into [[{key}]]", inner
+def _is_plain(field: Field) -> bool:
+    """Return whether the field has one key of its own."""
+    return not (INLINE in field.marks or NO_KEY in field.marks or field.mark((OtherKeys, NamedTables)))
 
 
-def _names(fields: list[Field]) -> Iterator[str]:
-    """Yield the keys of fields, those of named tables among them."""
-    for field in fields:
-        if mark := field.mark(NamedTables):
-            yield from mark.known()
-        elif not field.mark(OtherKeys):
+def keys_of(struct: type) -> list[str]:
+    """Return the keys of a table, less those by which fields take any name."""
+    return [field.key for field in fields_of(struct) if _is_plain(field)]
+
+
+def _names(cls: type) -> Iterator[str]:
+    """Yield all that may be written in a table."""
+    for field in fields_of(cls):
+        if _is_plain(field):
             yield field.key
+        elif named := field.mark(NamedTables):
+            yield from named.known()
+    for field in fields_of(cls):
+        if INLINE in field.marks:
+            yield from _names(field.type)
+
+
+def _tables(struct: type, path: str, where: str) -> Iterator[tuple[str, type]]:
+    """Yield the tables of a file with the words that say where each is."""
+    if where:
+        yield where, struct
+    for field in fields_of(struct):
+        kind, key = field.type, _join(path, field.key)
+        if INLINE in field.marks:
+            yield from _tables(kind, path, "")
+        elif named := field.mark(NamedTables):
+            yield from ((f"into [{path}.{name}]", table) for name, table in named.known().items())
+        elif _structs_in(kind) == [kind]:
+            yield from _tables(kind, key, f"into [{key}]")
+        elif inner := _inner_struct(kind, dict):
+            yield from _tables(inner, f"{key}.NAME", f"into [{key}.NAME]")
+        elif (inner := _inner_struct(kind, tuple)) and not field.mark(OtherKeys):
+            yield f"into [[{key}]]", inner
+
+
+def _tag_field(cls: type) -> str | None:
+    return cls.__struct_config__.tag_field if issubclass(cls, msgspec.Struct) else None
 
 
 def _fallback(field: Field) -> Any:
@@ -357,10 +249,93 @@ def _placeholder(kind: Any) -> Any:
     kind = kinds_of(kind)[0]
     if get_origin(kind) is Literal:
         return get_args(kind)[0]
-    if structs_in(kind):
+    if _structs_in(kind):
         return kind(**{field.name: _placeholder(field.type) for field in fields_of(kind) if field.required})
     return (get_origin(kind) or kind)()
 
 
 def _join(path: str, key: str) -> str:
     return f"{path}.{key}" if path else key
+
+
+def kinds_of(kind: Any) -> tuple[Any, ...]:
+    """Return the types of which a value may be one; None is left out, as TOML has no null."""
+    parts = get_args(kind) if get_origin(kind) in (types.UnionType, typing.Union) else (kind,)
+    return tuple(part for part in parts if part is not types.NoneType)
+
+
+def _without_none(kind: Any) -> Any:
+    return functools.reduce(operator.or_, kinds_of(kind))
+
+
+def _structs_in(kind: Any) -> list[Any]:
+    return [part for part in kinds_of(kind) if isinstance(part, type) and issubclass(part, msgspec.Struct)]
+
+
+def _inner_struct(kind: Any, container: type) -> type[msgspec.Struct] | None:
+    """Return the struct in a `tuple[Struct, ...]` or a `dict[str, Struct]`."""
+    if get_origin(kind) is not container:
+        return None
+    inner = get_args(kind)[1 if container is dict else 0]
+    return inner if _structs_in(inner) == [inner] else None
+
+
+def shown(raw: object) -> str:
+    try:
+        text = json.dumps(raw, ensure_ascii=False, default=str)
+    except (TypeError, ValueError, RecursionError):  # what Python has and no file
+        text = repr(raw)
+    return printable(text, 1000)
+
+
+def in_words(*kinds: Any) -> str:
+    """Return types in words, such as 'one of "a", "b" or a list of numbers'."""
+    kinds = tuple(part for kind in kinds for part in kinds_of(kind))
+    words = dict.fromkeys(_word(kind, kinds) for kind in sorted(kinds, key=lambda kind: bool(_structs_in(kind))))
+    return " or ".join(words)
+
+
+def _word(kind: Any, kinds: Sequence[Any]) -> str:
+    origin = get_origin(kind)
+    if origin is Literal:
+        return "one of " + ", ".join(shown(choice) for choice in get_args(kind) if choice)
+    if _structs_in(kind):
+        several = sum(bool(_structs_in(other)) for other in kinds) > 1
+        return f"a table with {f'a {_tag_field(kind)}' if several else 'the keys ' + ', '.join(keys_of(kind))}"
+    if origin in (tuple, list):
+        inner = get_args(kind)[0]
+        if inner in (int, float):
+            return "a list of numbers"
+        if get_origin(inner) is Literal:
+            return f"a list with {_word(inner, kinds)}"
+        pairs = get_origin(inner) is tuple and Ellipsis not in get_args(inner)
+        return "a list of pairs" if pairs else "a list of lists" if get_origin(inner) is tuple else "a list"
+    return _KIND_WORDS.get(origin or kind, getattr(kind, "__name__", str(kind)))
+
+
+def _with_example(kinds: Sequence[Any], field: Field) -> str:
+    example = field.mark(Example)
+    return in_words(*kinds) + (f" such as {example.text}" if example else "")
+
+
+def _wrong_type(field: Field, raw: Any) -> str:
+    kinds = kinds_of(field.type)
+    literal = next((kind for kind in kinds if get_origin(kind) is Literal), None)
+    if literal is not None and isinstance(raw, str):
+        rest = [kind for kind in kinds if kind is not literal]
+        more = f"; or write {_with_example(rest, field)}" if rest else ""
+        choices = [choice for choice in get_args(literal) if choice]
+        return f"there is no {shown(raw)}; {suggestion(raw, choices, 'choices')}{more}"
+    hint = number_in(raw) if isinstance(raw, str) and {float, int} & {*kinds} else ""
+    return f"must be {_with_example(kinds, field)}, got {shown(raw)}{hint}"
+
+
+def _expected(field: Field) -> str:
+    kind, example = _without_none(field.type), field.mark(Example)
+    if get_origin(kind) is dict:
+        return f"write at least one table [{field.key}.NAME]"
+    if _structs_in(kind) == [kind]:
+        return f"write a table [{field.key}]"
+    if kind is str and example:
+        return f"write {field.key} = {example.text}"
+    return f"write {_with_example(kinds_of(field.type), field)}"

@@ -16,9 +16,9 @@ scenarios and the axes of plots take keys, units and ranges from them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin, get_type_hints
 
 import msgspec
@@ -54,7 +54,6 @@ class OtherKeys:
     """The field, a tuple, takes what stands under keys that no other field has."""
 
     accepts: Callable[[str], bool]
-    """Whether a key is one of them."""
     read: Callable[[str, Any, list[Problem]], tuple[Any, ...]]
     """From a key and its value to elements of the tuple, problems noted."""
     write: Callable[[Any], tuple[str, Any]]
@@ -78,8 +77,6 @@ class Label:
 
 @dataclass(frozen=True)
 class Flag:
-    """An annotation that says one thing."""
-
     name: str
 
 
@@ -93,12 +90,8 @@ INHERITED = Flag("inherited")
 """Annotation of a table that takes what it leaves out from the table of the same name at the top of the file."""
 
 
-_RANGES = (Plausible, Probability, Range)
-
-
 class Field(NamedTuple):
     name: str
-    """Of the attribute."""
     key: str
     """In the file: the name, of a struct with its unit at the end where the unit can be a part of a key."""
     type: Any
@@ -123,7 +116,7 @@ class Field(NamedTuple):
 
     @property
     def span(self) -> str:
-        allowed = self.number.mark(_RANGES)
+        allowed = self._allowed
         return allowed.span if allowed else ""
 
     @property
@@ -141,10 +134,13 @@ class Field(NamedTuple):
 
     def objection(self, value: Any) -> str:
         """Return why a number cannot be the field's, "" if it can."""
-        allowed = self.number.mark(_RANGES)
-        if text := allowed.objection(value, self.unit) if allowed else "":
-            return str(text)
+        if (allowed := self._allowed) and (text := allowed.objection(value, self.unit)):
+            return text
         return f"must be a finite number, got {value}" if isinstance(value, float) and not math.isfinite(value) else ""
+
+    @property
+    def _allowed(self) -> Plausible | Probability | Range | None:
+        return self.number.mark((Plausible, Probability, Range))  # type: ignore[no-any-return]
 
 
 @cache
@@ -162,23 +158,22 @@ def fields_of(cls: type) -> tuple[Field, ...]:
     >>> [field.key for field in fields_of(Filter)]
     ['T_s', 'delay_s', 'k']
     """
-    if not issubclass(cls, msgspec.Struct):
-        return tuple(_parameters(cls))
-    found = []
+    return tuple((_of_struct if issubclass(cls, msgspec.Struct) else _of_class)(cls))
+
+
+def _of_struct(cls: type[msgspec.Struct]) -> Iterator[Field]:
     for info in msgspec.structs.fields(cls):
         kind, marks = _apart(info.type)
         unit = next((mark.text for mark in marks if isinstance(mark, Unit) and mark.in_key), "")
         suffix = f"_{unit}" if unit.isidentifier() else ""
-        key = info.encode_name if info.encode_name.endswith(suffix) else info.encode_name + suffix
-        make: Callable[[], Any] | None = None
-        if not info.required:
-            given = info.default is not msgspec.NODEFAULT
-            make = _constant(info.default) if given else info.default_factory
-        found.append(Field(info.name, key, kind, marks, make))
-    return tuple(found)
+        key = info.encode_name.removesuffix(suffix) + suffix
+        make: Any = info.default_factory
+        if info.default is not msgspec.NODEFAULT:
+            make = partial(_same, info.default)
+        yield Field(info.name, key, kind, marks, None if info.required else make)
 
 
-def _parameters(cls: type) -> Iterable[Field]:
+def _of_class(cls: type) -> Iterator[Field]:
     try:
         hints = get_type_hints(cls, include_extras=True)
     except Exception as error:  # a name in an annotation may lead to anything
@@ -186,15 +181,15 @@ def _parameters(cls: type) -> Iterable[Field]:
     for name, hint in hints.items():
         if not (name.startswith("_") or get_origin(hint) is ClassVar or hint is ClassVar):
             kind, marks = _apart(hint)
-            yield Field(name, name, kind, marks, _constant(getattr(cls, name)) if hasattr(cls, name) else None)
+            yield Field(name, name, kind, marks, partial(_same, getattr(cls, name)) if hasattr(cls, name) else None)
 
 
 def _apart(hint: Any) -> tuple[Any, tuple[Any, ...]]:
     return (get_args(hint)[0], get_args(hint)[1:]) if get_origin(hint) is Annotated else (hint, ())
 
 
-def _constant(value: Any) -> Callable[[], Any]:
-    return lambda: value
+def _same(value: Any) -> Any:
+    return value
 
 
 def named(cls: type, name: str) -> Field:
@@ -216,16 +211,13 @@ class Relation:
     """Name of a field without which, or with 0 in which, the relation does not hold."""
 
     def objection(self, value: float, other: float, key: str) -> str:
-        """Return why a number does not stand so to the one at `key`, "" if it does."""
+        """Return why a number contradicts the one at `key`, "" if it does not."""
         raise NotImplementedError
 
 
 @dataclass(frozen=True)
 class Below(Relation):
-    """A number that must be less than that of another field."""
-
     or_equal: bool = False
-    """Whether both may be equal."""
 
     def objection(self, value: float, other: float, key: str) -> str:
         if value <= other if self.or_equal else value < other:
@@ -234,7 +226,6 @@ class Below(Relation):
         return f"{value:g} must {rule} {key} = {other:g}; swap them or set both"
 
 
-@dataclass(frozen=True)
 class After(Relation):
     """An end (s) that must come after the beginning of another field."""
 
@@ -244,7 +235,6 @@ class After(Relation):
         return f"{value:g} s is not after {key} = {other:g} s, so that the entry never holds"
 
 
-@dataclass(frozen=True)
 class MultipleOf(Relation):
     """A time (s) that must be a whole multiple of the step (s) of another field."""
 
@@ -255,7 +245,6 @@ class MultipleOf(Relation):
         return f"{value:g} s is not a multiple of {key} = {other:g} s{rule and f', {rule}'}; the nearest is {near}"
 
 
-@dataclass(frozen=True)
 class Divides(Relation):
     """A step (s) that must divide the time (s) of another field."""
 
@@ -267,6 +256,11 @@ class Divides(Relation):
         whole = [n for n in range(1, 2 * round(ratio) + 2) if abs(round(other / n, 6) * n - other) < 1e-12]
         near = other / min(whole, key=lambda n: abs(n - ratio), default=1)
         return f"{value:g} s does not divide {key} = {other:g} s; the nearest that does is {near:g}"
+
+
+def _whole(ratio: float) -> bool:
+    """Return whether a ratio is 1, 2, 3, ...; the tolerance is that of decimal fractions in binary."""
+    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6
 
 
 def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lambda field: True) -> list[Problem]:
@@ -287,8 +281,7 @@ def contradictions(cls: type, values: Any, known: Callable[[Field], bool] = lamb
 def problems_of(struct: msgspec.Struct) -> list[Problem]:
     """Return the numbers of a struct, and of the structs below it, that are out of range.
 
-    Without one, return where its values contradict each other: by its annotations, and by its method `relations` if it
-    has one.
+    If there are none, return where its values contradict each other, by its annotations and its method `relations`.
     """
     found: list[Problem] = []
     for field in fields_of(type(struct)):
@@ -298,8 +291,3 @@ def problems_of(struct: msgspec.Struct) -> list[Problem]:
         elif isinstance(value, (int, float)) and not isinstance(value, bool) and (text := field.objection(value)):
             found.append(Problem(field.key, text))
     return found or [*contradictions(type(struct), struct), *getattr(struct, "relations", list)()]
-
-
-def _whole(ratio: float) -> bool:
-    """Return whether a ratio is 1, 2, 3, ...; the tolerance is that of decimal fractions in binary."""
-    return round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-6
