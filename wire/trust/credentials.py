@@ -13,8 +13,9 @@ links, messages of all writers pass.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import Any, Literal, NamedTuple, Protocol
+from collections.abc import Iterable
+from datetime import datetime
+from typing import Any, Literal, NamedTuple
 
 import msgspec
 
@@ -31,26 +32,16 @@ LONGEST_COMMON_NAME = 64
 
 class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     name: str
-    """Name; of an agent that of its inverter."""
+    """Of an agent that of its inverter."""
     role: Role
-    """What it may do."""
     generation: int = 1
     """Number of the certificate: how many of this name have been revoked before, and one."""
     revoked: bool = False
-    """Whether the certificate of this generation was revoked."""
     expires: str = ""
-    """When the certificate ends, to the minute, e.g. "2027-11-23 12:00 UTC"; empty if none was issued. Lists of old
-    sites have the day alone."""
+    """When the certificate ends, to the minute, e.g. "2027-11-23 12:00 UTC"; empty if none was issued."""
 
     @property
     def common_name(self) -> str:
-        """Common name of its certificate.
-
-        Examples
-        --------
-        >>> Member(name="inv4", role="agent").common_name, Member(name="inv4", role="agent", generation=2).common_name
-        ('agent:inv4', 'agent:inv4:2')
-        """
         return self._in_generation(self.generation)
 
     @property
@@ -62,6 +53,13 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         """
         following = self._in_generation(self.generation + 1)
         return (following,) if self.revoked else (self.common_name, following)
+
+    def validity(self, now: datetime) -> str:
+        """Return "revoked", or until when its certificate is or was valid, by the site's list."""
+        if self.revoked:
+            return "revoked"
+        expired = self.expires < f"{now:{DATE_AND_TIME}}"
+        return f"expired  {self.expires}" if expired else f"valid    until {self.expires}"
 
     def _in_generation(self, number: int) -> str:
         return f"{self.role}:{self.name}" if number == 1 else f"{self.role}:{self.name}:{number}"
@@ -90,27 +88,26 @@ class Rule(NamedTuple):
 def access_control(own: Member, members: Iterable[Member], *, star: bool = False) -> dict[str, Any]:
     """Return Zenoh's ``access_control`` for a process among all members of its site, in any order.
 
-    A name that stands in it twice counts once, revoked if one entry says so. In a star the plant relays all messages.
+    In a star the plant relays all messages.
     """
     rules: list[dict[str, Any]] = []
     subjects: list[dict[str, Any]] = []
     policies: list[dict[str, Any]] = []
-    for member in _each_once(members):
+    for member in sorted(members, key=lambda member: (member.role, member.name)):
         subject = f"{member.role}:{member.name}"
-        ids = []
-        for number, rule in enumerate(rules_between(own, member, star=star)):
-            ids.append(f"{subject} {number}")
-            rules.append(
-                {
-                    "id": ids[-1],
-                    "permission": "allow",
-                    "flows": [rule.flow],
-                    "messages": list(rule.messages),
-                    "key_exprs": [rule.key],
-                }
-            )
+        allowed = [
+            {
+                "id": f"{subject} {number}",
+                "permission": "allow",
+                "flows": [rule.flow],
+                "messages": list(rule.messages),
+                "key_exprs": [rule.key],
+            }
+            for number, rule in enumerate(rules_between(own, member, star=star))
+        ]
+        rules += allowed
         subjects.append({"id": subject, "cert_common_names": list(member.accepted)})
-        policies.append({"id": subject, "rules": ids, "subjects": [subject]})
+        policies.append({"id": subject, "rules": [rule["id"] for rule in allowed], "subjects": [subject]})
     return {
         "enabled": True,
         "default_permission": "deny",
@@ -120,21 +117,17 @@ def access_control(own: Member, members: Iterable[Member], *, star: bool = False
     }
 
 
-def rules_between(own: Member, other: Member, *, star: bool = False) -> tuple[Rule, ...]:
+def rules_between(own: Member, other: Member, *, star: bool = False) -> list[Rule]:
     """Return what a process allows on a link whose other end has the certificate of a member."""
-    return tuple(_rules(own, other, star=star))
-
-
-def _rules(own: Member, other: Member, *, star: bool) -> Iterator[Rule]:
+    rules = []
     for spec in KEY_SPECS:
         ways: tuple[tuple[Flow, Member, Member], ...] = (("ingress", other, own), ("egress", own, other))
         for flow, sender, receiver in ways:
             if key := _key(spec, sender, receiver, star=star):
-                yield Rule(flow, _FORWARD[spec.kind], key)
+                rules.append(Rule(flow, _FORWARD[spec.kind], key))
             if (key := _key(spec, receiver, sender, star=star)) and (back := _BACK.get(spec.kind)):
-                yield Rule(flow, back, key)
-    yield Rule("ingress", _WATCH, ANY_TOKEN)
-    yield Rule("egress", _WATCH, ANY_TOKEN)
+                rules.append(Rule(flow, back, key))
+    return [*rules, Rule("ingress", _WATCH, ANY_TOKEN), Rule("egress", _WATCH, ANY_TOKEN)]
 
 
 def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
@@ -142,35 +135,19 @@ def _key(spec: KeySpec, writer: Member, reader: Member, *, star: bool) -> str:
     relayed = star and writer.role == "plant"  # what it relays it may read itself, so the way to it needs no more
     if not ((relayed or writer.role in spec.writers) and reader.role in spec.readers):
         return ""
-    inverter = "*"
     if "agent" in spec.writers and not relayed:
-        inverter = writer.name
-    elif spec.to_one_agent and reader.role == "agent":
-        inverter = reader.name
-    return spec.pattern(inverter)
-
-
-def _each_once(members: Iterable[Member]) -> list[Member]:
-    """Return the members in the order of role and name; of two entries of a name the later generation counts."""
-    kept: dict[tuple[str, str], Member] = {}
-    for member in members:
-        place = member.role, member.name
-        if place not in kept or (kept[place].generation, kept[place].revoked) < (member.generation, member.revoked):
-            kept[place] = member
-    return [kept[place] for place in sorted(kept)]
+        return spec.pattern(writer.name)
+    return spec.pattern(reader.name if spec.to_one_agent and reader.role == "agent" else "*")
 
 
 class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Certificate of a process, and the members of its site."""
 
     own: Member
-    """Whom the certificate names."""
     ca: str
-    """Path of the certificate of the site's authority (PEM)."""
+    """Path of the certificate of the site's authority (PEM); the next two are paths of the own files."""
     certificate: str
-    """Path of the own certificate (PEM)."""
     key: str
-    """Path of its private key (PEM)."""
     members: tuple[Member, ...]
     """Everybody with a certificate of the site, revoked ones included."""
 
@@ -191,6 +168,7 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         )
 
     def stranger(self, common_name: str) -> str:
+        """Return why the other end of a link is believed nothing, "" if it is a member."""
         if any(common_name in member.accepted for member in self.members):
             return ""
         shown = printable(common_name, 64) or "nobody"
@@ -217,26 +195,16 @@ class Credentials(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         return {"protocols": ["tls"], "tls": tls}, access_control(self.own, self.members, star=star)
 
 
-class Link(Protocol):
-    @property
-    def auth_identifier(self) -> str | None:
-        """Common name of the certificate of its other end; None without one."""
-
-    @property
-    def dst(self) -> object:
-        """Address of its other end."""
-
-
 class LinkCertificates:
     """Note the certificates of a session's links."""
 
     def __init__(self, credentials: Credentials, *, relayed: bool) -> None:
         self._credentials, self._relayed = credentials, relayed
         self._names: set[str] = set()
-        """Common names of the certificates of all links so far."""
         self._lines: list[str] = []
 
-    def note(self, links: Iterable[Link]) -> None:
+    def note(self, links: Iterable[Any]) -> None:
+        """Note Zenoh's links; `auth_identifier` is the common name of the other end's certificate."""
         for link in links:
             name = link.auth_identifier or ""
             if name not in self._names:

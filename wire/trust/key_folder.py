@@ -10,6 +10,7 @@ The package cryptography is imported where it is used: a run without certificate
 from __future__ import annotations
 
 import base64
+import os
 import socket
 import ssl
 import stat
@@ -36,7 +37,7 @@ COMMANDING: tuple[Role, ...] = ("operator",)
 """Roles that may command a run."""
 
 SOON = timedelta(days=30)
-"""Time before its end at which a certificate is said to end soon."""
+"""Time before its end from which on a certificate ends soon."""
 
 
 class KeysError(ValueError):
@@ -47,7 +48,6 @@ class MemberList(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
     """All members of a site, revoked ones included."""
 
     site: str
-    """Name of the site."""
     version: int
     """Number of changes so far; of two lists the greater is the later."""
     members: tuple[Member, ...] = ()
@@ -68,19 +68,8 @@ def read_list(folder: Path) -> MemberList:
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec
 
-    try:
-        if not stat.S_ISDIR(folder.stat().st_mode):
-            raise KeysError(f"{folder}: is no folder; say the folder that gridpeers keys init has made")
-    except FileNotFoundError:
-        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one") from None
-    except OSError as error:
-        raise KeysError(f"{folder}: cannot be read: {error.strerror}") from None
-    if not (folder / CA).exists() and not (folder / LIST).exists():
-        here = "the present folder" if folder == Path() else str(folder)
-        raise KeysError(
-            f"{here} has no certificates: neither {CA} nor {LIST} is there; name by --keys DIR the folder that "
-            "gridpeers keys init has made"
-        )
+    if not os.path.isdir(folder):  # noqa: PTH112  a folder that nobody may enter is none either
+        raise KeysError(f"{folder}: there is no such folder of keys; gridpeers keys init {folder} makes one")
     public = read_certificate(folder / CA).public_key()
     try:
         signed = decode_foreign(msgspec.json.Decoder(SignedList).decode, _read(folder / LIST))
@@ -111,25 +100,25 @@ def open_credentials(
     if anything about the files is wrong.
     """
     now = now or datetime.now(UTC)
-    known = read_list(folder)
-    member = known.of(name) if name else _present(folder, known, roles)
-    either = " or ".join(roles)
-    viewer = member or (None if name else _present(folder, known, ("viewer",)))
-    if tuple(roles) == COMMANDING and viewer is not None and viewer.role == "viewer":
-        raise KeysError(_viewer_refusal(folder, known, viewer))
-    if member is None and name:
+    known, either = read_list(folder), " or ".join(roles)
+    there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
+    member = known.of(name) or next((each for role in roles for each in there if each.role == role), None)
+    if name and (member is None or member.name != name):
         have = ", ".join(each.name for each in known.members if each.role in roles) or "none"
         raise KeysError(
             f'{folder}: no certificate was issued to "{printable(name)}"; those of role {either}: {have}; '
             f"gridpeers keys issue {printable(name)} --role {roles[0]} --keys {folder} issues one"
         )
-    if member is None:
-        raise KeysError(
-            f"{folder}: has no key of a member with role {either}; copy NAME.pem and NAME.key of one, or issue one "
-            "with gridpeers keys issue"
-        )
-    if member.role not in roles:
-        raise KeysError(f"{folder}: {member.name} has the role {member.role}; this needs one with role {either}")
+    if member is None or member.role not in roles:
+        meant = member or next((each for each in there if each.role == "viewer"), None)
+        what = f"{member.name} has the role {member.role}; this needs" if member else "has no key of a member with"
+        what = f"{what} the role {either}"
+        if meant and meant.role == "viewer" and tuple(roles) == COMMANDING:
+            what = f"{meant.name} has the role viewer, which may look at a run (status, watch, view) and not command it"
+            what += f"; an {either} may"
+        have = " or ".join(each.name for each in known.members if each.role in roles and not each.revoked)
+        way = f"--as {have} takes the certificate of one" if have else f"gridpeers keys issue NAME --role {roles[0]}"
+        raise KeysError(f"{folder}: {what}: {way}")
     if member.revoked:
         raise KeysError(
             f"{folder}/{member.name}.pem: was revoked; gridpeers keys issue {member.name} gives {member.name} a new one"
@@ -151,60 +140,34 @@ def open_credentials(
     ), soon if ends - now < SOON else ""
 
 
-def _present(folder: Path, known: MemberList, roles: Sequence[Role]) -> Member | None:
-    there = [member for member in known.members if not member.revoked and (folder / f"{member.name}.key").is_file()]
-    return next((member for role in roles for member in there if member.role == role), None)
-
-
-def _viewer_refusal(folder: Path, known: MemberList, viewer: Member) -> str:
-    who = [each for each in known.members if each.role in COMMANDING and not each.revoked]
-    here = next((each.name for each in who if (folder / f"{each.name}.key").is_file()), "")
-    names = " or ".join(each.name for each in who)
-    way = f"give the command where the certificate of {names} is, or copy its files to {folder}"
-    if here:
-        way = f"--as {here} takes the certificate of one"
-    elif not who:
-        way = f"gridpeers keys issue NAME --role {COMMANDING[0]} makes one, where the site was made"
-    return (
-        f"{folder}: {viewer.name} has the role viewer, which may look at a run (status, watch, view) and not command "
-        f"it; an {COMMANDING[0]} may: {way}"
-    )
-
-
 def _end_of(own: x509.Certificate, path: Path, folder: Path, member: Member, now: datetime) -> datetime:
     """Return the end of a member's certificate, or of the authority's if that is earlier, if both are valid."""
-    from cryptography.exceptions import InvalidSignature, UnsupportedAlgorithm
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.x509.oid import NameOID
 
     ca = read_certificate(folder / CA)
     try:
         own.verify_directly_issued_by(ca)
-    except (InvalidSignature, UnsupportedAlgorithm, ValueError, TypeError):
+    except (InvalidSignature, ValueError, TypeError):
         raise KeysError(
             f"{path}: is not signed by {folder / CA}: it is of another site; copy both from the same one"
         ) from None
-    if (common_name := _common_name(own)) != member.common_name:
+    common_name = "".join(str(it.value) for it in own.subject.get_attributes_for_oid(NameOID.COMMON_NAME))
+    if common_name != member.common_name:
         raise KeysError(
             f'{path}: is the certificate of "{printable(common_name)}", not of "{member.common_name}"; copy that of '
             f"{member.name}, or issue it anew"
         )
-    for certificate, what in ((own, path), (ca, folder / CA)):
+    for certificate, what, renewal in ((own, path, f"issue {member.name}"), (ca, folder / CA, "init")):
         begins, ends = certificate.not_valid_before_utc, certificate.not_valid_after_utc
         if now > ends:
-            renewal = f"gridpeers keys issue {member.name}" if certificate is own else "gridpeers keys init"
-            raise KeysError(f"{what}: expired on {ends:{DATE_AND_TIME}}; {renewal} makes a new one")
+            raise KeysError(f"{what}: expired on {ends:{DATE_AND_TIME}}; gridpeers keys {renewal} makes a new one")
         if now < begins:
             raise KeysError(
                 f"{what}: is valid from {begins:{DATE_AND_TIME}}, and the clock of this host shows "
                 f"{now:%Y-%m-%d %H:%M}; set the clock"
             )
     return min(own.not_valid_after_utc, ca.not_valid_after_utc)
-
-
-def _common_name(certificate: x509.Certificate) -> str:
-    from cryptography.x509.oid import NameOID
-
-    named = certificate.subject.get_attributes_for_oid(NameOID.COMMON_NAME)
-    return str(named[0].value) if named else ""
 
 
 def read_certificate(path: Path) -> x509.Certificate:
@@ -237,11 +200,12 @@ def load_key(path: Path) -> Any:
 
 def _read(path: Path) -> bytes:
     try:
-        if path.is_fifo():  # to read it would take for ever
-            raise KeysError(f"{path}: is no file; copy it anew from the site")
         return path.read_bytes()
     except FileNotFoundError:
-        raise KeysError(f"{path}: is missing; copy it from the folder where the site issues certificates") from None
+        raise KeysError(
+            f"{path}: is missing; copy it from the folder where the site issues certificates, or name by --keys DIR "
+            "the folder that has it"
+        ) from None
     except OSError as error:
         raise KeysError(f"{path}: cannot be read: {error.strerror}") from None
 
@@ -260,38 +224,8 @@ def key_warnings(folder: Path) -> dict[str, str]:
     return found
 
 
-def validity(folder: Path, member: Member, now: datetime) -> str:
-    """Return the state of a member's certificate, such as "valid" or "expired", with its times (UTC) or what is wrong.
-
-    The times are those of the certificate in the folder, as that is the one which a process here shows. Where it is not
-    there, or is of an earlier generation, the end is that of the list of members.
-    """
-    if member.revoked:
-        return "revoked"
-    path = folder / f"{member.name}.pem"
-    try:
-        own = read_certificate(path) if path.exists() else None
-    except KeysError as error:
-        return f"damaged  {error}"
-    if own is None or _common_name(own) != member.common_name:
-        gone = member.expires < f"{now:{DATE_AND_TIME}}"[: len(member.expires)]
-        return f"expired  {member.expires}" if gone else f"valid    until {member.expires}"
-    begins, ends = own.not_valid_before_utc, own.not_valid_after_utc
-    state = "expired" if ends < now else "not yet" if now < begins else "valid"
-    return f"{state:8} {begins:%Y-%m-%d %H:%M} to {ends:{DATE_AND_TIME}}"
-
-
 _EXPIRED = 10
 """OpenSSL's X509_V_ERR_CERT_HAS_EXPIRED, of either certificate; no member's outlives its authority's."""
-
-_ALERTS = {
-    "CERTIFICATE_REQUIRED": "",
-    "UNKNOWN_CA": "by the ca.pem there it is of another site",
-    "DECRYPT_ERROR": "by the ca.pem there it is of another site",  # of the same name, with another key
-    "BAD_CERTIFICATE": "by the ca.pem there it is of another site",
-    "CERTIFICATE_EXPIRED": "it has expired by the clock there",
-}
-"""How OpenSSL's names of alerts end, and what they say of the own certificate; empty if they ask for one."""
 
 
 def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: float) -> str:
@@ -322,11 +256,16 @@ def tls_refusal(host: str, port: int, credentials: Credentials | None, timeout: 
         )
     except ssl.SSLError as error:
         _, alert, name = (error.reason or "").partition("ALERT_")
-        meaning = _ALERTS.get(name, f"TLS alert {printable(name, 60)}")
-        if not meaning or (alert and credentials is None and name == "HANDSHAKE_FAILURE"):  # the latter is of TLS 1.2
+        if alert and credentials is None:
             return "asks for a certificate"
         if alert and credentials is not None:
-            return f"does not accept the certificate of {credentials.own.name}: {meaning}"
+            expired = name == "CERTIFICATE_EXPIRED"
+            why = (
+                "it has expired by the clock there"
+                if expired
+                else f"by the ca.pem there it is of another site ({name})"
+            )
+            return f"does not accept the certificate of {credentials.own.name}: {why}"
     except OSError:  # nobody is there, or files of ours have gone
         pass
     return ""

@@ -5,7 +5,6 @@ from __future__ import annotations
 import base64
 import fcntl
 import os
-import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -45,7 +44,7 @@ SKEW = timedelta(minutes=5)
 """A certificate is valid from so long before its issue: clocks of hosts differ."""
 
 RESERVED = {text for file in (CA, CA_KEY, LIST) for text in (file, Path(file).stem)}
-"""No names of members: those of the site's own files, with and without their suffix."""
+"""Names that no member has, as the site's own files have them."""
 
 FIRST: tuple[tuple[str, Role], ...] = (("plant", "plant"), ("operator", "operator"), ("viewer", "viewer"))
 """Members of every new site."""
@@ -59,30 +58,24 @@ def make_site(folder: Path, *, days: float = LIFE_DAYS, now: datetime | None = N
     site = folder.absolute().name
     if not is_name(site):
         raise KeysError(f'{folder}: "{printable(site)}" cannot name a site; use letters, digits, "_", "-", "."')
+    if folder.exists() or folder.is_symlink():
+        raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
     try:
-        if folder.exists() or folder.is_symlink():
-            raise KeysError(f"{folder}: is there already; gridpeers keys show --keys {folder} shows it")
         folder.parent.mkdir(parents=True, exist_ok=True)
-        new = Path(tempfile.mkdtemp(prefix=f".{site}-", dir=folder.absolute().parent))  # mode 0700
+        with tempfile.TemporaryDirectory(prefix=f".{site}-", dir=folder.absolute().parent) as made:
+            new = Path(made) / site
+            new.mkdir(0o700)
+            key = ec.generate_private_key(ec.SECP256R1())
+            _write_key(new / CA_KEY, key)
+            _write_pem(new / CA, _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA))
+            (new / ".gitignore").write_text("*\n", encoding="utf-8")  # no key gets into a repository by `git add`
+            _write_list(new, MemberList(site=site, version=0), key)
+            for name, role in FIRST:
+                issue(new, name, role, days=days, now=now)
+            known = read_list(new)
+            new.rename(folder)
     except OSError as error:
         raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
-    try:
-        key = ec.generate_private_key(ec.SECP256R1())
-        ca = _certificate(f"gridpeers site {site}", key, key, None, now, LIFE_OF_CA)
-        _write_key(new / CA_KEY, key)
-        _write_pem(new / CA, ca)
-        (new / ".gitignore").write_text("*\n", encoding="utf-8")  # no key gets into a repository by `git add`
-        _write_list(new, MemberList(site=site, version=0), key)
-        for name, role in FIRST:
-            issue(new, name, role, days=days, now=now)
-        known = read_list(new)
-        try:
-            new.rename(folder)
-        except OSError as error:
-            raise KeysError(f"{folder}: cannot be made: {error.strerror}") from None
-    except BaseException:
-        shutil.rmtree(new, ignore_errors=True)
-        raise
     return known
 
 
@@ -148,22 +141,18 @@ def revoke(folder: Path, name: str) -> Member:
             raise KeysError(f"{name}: its certificate is revoked already")
         revoked = msgspec.structs.replace(member, revoked=True)
         _write_list(folder, _with(known, revoked), ca_key)
-        key = folder / f"{name}.key"
         try:
-            key.unlink(missing_ok=True)
+            (folder / f"{name}.key").unlink(missing_ok=True)
         except OSError as error:
-            raise KeysError(f"{name}: is revoked, but {key} cannot be removed: {error.strerror}; remove it") from None
+            raise KeysError(f"{name}: is revoked; remove its key from {folder}: {error.strerror}") from None
     return revoked
 
 
 @contextmanager
 def _changing(folder: Path) -> Iterator[None]:
     """Keep other commands from changing a site meanwhile: the list of one would lack the members of another."""
-    try:
-        handle = os.open(folder, os.O_RDONLY)
-    except OSError:  # the reading of the list says what is wrong with the folder
-        yield
-        return
+    read_list(folder)  # says what is wrong with the folder
+    handle = os.open(folder, os.O_RDONLY)
     try:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield

@@ -96,14 +96,14 @@ def revoke(name: _Name, keys: _Keys = Path()) -> None:
 
 @app.command()
 def show(keys: _Keys = Path()) -> None:
-    """Show the members of a site: role, whether the certificate is valid, from when to when, whether its key is here.
+    """Show the members of a site: role, until when its certificate is valid, whether its key is here.
 
     A private key that others may read, or that is not that of the certificate beside it, is warned of.
 
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
-        from gridpeers.wire.trust.key_folder import CA_KEY, LIST, key_warnings, read_list, validity
+        from gridpeers.wire.trust.key_folder import CA_KEY, LIST, key_warnings, read_list
 
         known, now = read_list(keys), datetime.now(UTC)
         warnings = key_warnings(keys)
@@ -113,7 +113,7 @@ def show(keys: _Keys = Path()) -> None:
         typer.echo(f"site {known.site}, {LIST} is version {known.version}{authority}")
         width = max(len(member.name) for member in known.members)
         for member in sorted(known.members, key=lambda member: (member.role, member.name)):
-            state = validity(keys, member, now)
+            state = member.validity(now)
             here = "" if member.revoked or not (keys / f"{member.name}.key").is_file() else ", key here"
             if here and f"{member.name}.key" in warnings:
                 here += ", but see below"

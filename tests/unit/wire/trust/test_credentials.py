@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import random
-from itertools import combinations, product
+from itertools import combinations, permutations
 from typing import NamedTuple
 
 import msgspec
@@ -39,7 +38,7 @@ CONCRETE = tuple(
 zenoh = pytest.importorskip("zenoh")
 
 
-def allowed(rules: tuple[Rule, ...], flow: str, message: str, key: str) -> int:
+def allowed(rules: list[Rule], flow: str, message: str, key: str) -> int:
     """How many rules let a message pass, as Zenoh matches keys."""
     expression = zenoh.KeyExpr(key)
     return sum(
@@ -55,41 +54,23 @@ def puts(sender: Member, receiver: Member, *, star: bool = False) -> set[str]:
 
 
 @pytest.mark.parametrize("star", [False, True])
-@pytest.mark.parametrize(("own", "other"), [(a, b) for a, b in product(ALL, ALL) if a != b])
-def test_no_two_rules_can_apply_to_one_message(own: Member, other: Member, star: bool) -> None:
-    """The keys of any two rules for one flow and one message have nothing in common."""
-    rules = rules_between(own, other, star=star)
+def test_both_ends_of_a_link_allow_the_same_and_no_two_rules_can_apply_to_one_message(star: bool) -> None:
+    """What one end lets out the other lets in; the keys of two rules for one message have nothing in common."""
+    for own, other in permutations(ALL, 2):
+        here, there = rules_between(own, other, star=star), rules_between(other, own, star=star)
 
-    for a, b in combinations(rules, 2):
-        if a.flow == b.flow and {*a.messages} & {*b.messages}:
-            assert not zenoh.KeyExpr(a.key).intersects(zenoh.KeyExpr(b.key)), (a, b)
-
-
-@pytest.mark.parametrize("star", [False, True])
-@pytest.mark.parametrize(("own", "other"), [(a, b) for a, b in product(ALL, ALL) if a != b])
-def test_both_ends_of_a_link_allow_the_same(own: Member, other: Member, star: bool) -> None:
-    """What one end lets out the other lets in, and the other way round."""
-    here, there = rules_between(own, other, star=star), rules_between(other, own, star=star)
-
-    assert {(rule.messages, rule.key) for rule in here if rule.flow == "egress"} == {
-        (rule.messages, rule.key) for rule in there if rule.flow == "ingress"
-    }
+        assert {(rule.messages, rule.key) for rule in here if rule.flow == "egress"} == {
+            (rule.messages, rule.key) for rule in there if rule.flow == "ingress"
+        }
+        for a, b in combinations(here, 2):
+            if a.flow == b.flow and {*a.messages} & {*b.messages}:
+                assert not zenoh.KeyExpr(a.key).intersects(zenoh.KeyExpr(b.key)), (a, b)
 
 
 @given(st.permutations(ALL), st.sampled_from(ALL), st.booleans())
 def test_the_order_of_members_decides_nothing(members: list[Member], own: Member, star: bool) -> None:
     """Any order gives the same bytes."""
     assert json.dumps(access_control(own, members, star=star)) == json.dumps(access_control(own, ALL, star=star))
-
-
-@given(st.randoms(use_true_random=False))
-def test_the_order_of_rules_decides_nothing(rng: random.Random) -> None:
-    """In any order each message is allowed by one rule or by none."""
-    rules = list(rules_between(PLANT, INV1))
-    rng.shuffle(rules)
-
-    for flow, message, key in product(("ingress", "egress"), MESSAGES, CONCRETE):
-        assert allowed(tuple(rules), flow, message, key) <= 1
 
 
 def test_each_role_publishes_only_what_is_its_own() -> None:
@@ -171,7 +152,7 @@ def test_a_revoked_name_has_no_rule_until_its_next_certificate() -> None:
         return [subject["cert_common_names"] for subject in access_control(PLANT, members)["subjects"]]
 
     assert names(INV1) == [["agent:inv1", "agent:inv1:2"]]
-    assert names(revoked) == names(revoked, INV1) == names(INV1, revoked) == [["agent:inv1:2"]]
+    assert names(revoked) == [["agent:inv1:2"]]
     assert names(again) == [["agent:inv1:2", "agent:inv1:3"]]
 
 
@@ -185,16 +166,6 @@ def test_an_agent_whose_certificate_comes_later_has_its_rules_now() -> None:
     assert subjects == ["agent:inv1", "plant:plant", "viewer:inv2"]
 
 
-def test_zenoh_reads_the_rules() -> None:
-    """Its configuration takes them as they are."""
-    rules = access_control(PLANT, ALL)
-
-    config = zenoh.Config.from_json5(json.dumps({"access_control": rules}))
-
-    assert len(json.loads(config.get_json("access_control/rules"))) == len(rules["rules"])
-
-
-INV1 = Member(name="inv1", role="agent")
 REVOKED = Member(name="eve", role="operator", revoked=True)
 PLANTS = (Member(name="plant", role="plant"), Member(name="second", role="plant", generation=3))
 SHOWN = Credentials(
