@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 
 from gridpeers.wire.plugins.registry import ANYTHING, PluginError, Registry, named
-from gridpeers.wire.schema.table_reading import in_words, parameter_values, read_parameters, shown
+from gridpeers.wire.schema.table_reading import parameter_values, read_parameters
 from gridpeers.wire.schema.table_schema import Problem, fields_of
 from gridpeers.wire.wording import printable
 
@@ -106,30 +106,32 @@ def class_objection(it: Any, base: type, method: str, arguments: tuple[str, ...]
     call = f"{method}({', '.join(('self', *arguments))})"
     if getattr(it, method) is getattr(base, method):
         return f"it has no method {call}"
-    try:
-        inspect.signature(getattr(it, method)).bind(None, *arguments)
-    except TypeError as error:
-        return f"write its method {call}: {error}"
-    return _parameter_objection(it, keys)
+    wrong = _call_objection(getattr(it, method), 1 + len(arguments))
+    return f"write its method {call}: {wrong}" if wrong else _parameter_objection(it, keys)
 
 
 def callable_objection(it: Any, argument: str, keys: tuple[str, ...] = KEYS) -> str:
     """Return why something is neither a function of one argument nor a class of such functions; "" if it is."""
-    function, said = it, f"it is called with one argument, the {argument}"
     if isinstance(it, type):
-        function = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
-        if function is None:
+        method = next((vars(base)["__call__"] for base in it.__mro__ if "__call__" in vars(base)), None)
+        if method is None:
             return f"the class needs a method __call__(self, {argument})"
-        said = f"write its method __call__(self, {argument})"
-    elif not callable(it):
+        wrong = _call_objection(method, 2)
+        return f"write its method __call__(self, {argument}): {wrong}" if wrong else _parameter_objection(it, keys)
+    if not callable(it):
         return f"write a function of the {argument}, or a class with a method __call__(self, {argument})"
+    wrong = _call_objection(it, 1)
+    return f"it is called with one argument, the {argument}: {wrong}" if wrong else ""
+
+
+def _call_objection(function: Any, arguments: int) -> str:
     try:
-        inspect.signature(function).bind(*[None] * (1 + isinstance(it, type)))
+        inspect.signature(function).bind(*[None] * arguments)
     except TypeError as error:
-        return f"{said}: {error}"
+        return str(error)
     except ValueError:  # a function of C tells no signature
-        return ""
-    return _parameter_objection(it, keys) if isinstance(it, type) else ""
+        pass
+    return ""
 
 
 def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
@@ -144,12 +146,6 @@ def _parameter_objection(cls: type, taken: tuple[str, ...]) -> str:
                 f"its parameter {field.name} cannot be given, as a scenario has the key {field.name} for something "
                 "else; give it another name"
             )
-        if field.required:
-            continue
-        try:
-            wrong = field.objection(msgspec.convert(field.default, field.type))
-        except msgspec.ValidationError:
-            wrong = f"must be {in_words(field.type)}, got {shown(field.default)}"
-        if wrong:
-            return f"{cls.__name__}.{field.name}: its default {wrong}"
-    return ""
+    defaults = {field.name: field.default for field in fields if not field.required}
+    wrong = [problem for problem in read_parameters(cls, defaults)[1] if problem.path in defaults]
+    return f"{cls.__name__}.{wrong[0].path}: its default {wrong[0].text}" if wrong else ""

@@ -11,8 +11,9 @@ import importlib
 import sys
 from collections.abc import Callable, Collection
 from functools import cache
-from importlib.machinery import ModuleSpec, PathFinder
+from importlib.machinery import PathFinder
 from importlib.util import find_spec
+from traceback import walk_tb
 from types import ModuleType
 from typing import Any, Generic, TypeVar
 
@@ -20,21 +21,14 @@ from gridpeers.wire.wording import is_no_path, printable, suggestion
 
 T = TypeVar("T")
 
-_folders: set[str] = set()
-"""Folders of scenarios that registries have put on the Python path of this process."""
-
-_changed: dict[str, int] = {}
-"""When the file of each module from there was changed last (ns), as of its import."""
-
 NOTEBOOK = "__main__"
 """Module of what is defined in a notebook or in the script that runs: no other process can import it."""
-
 
 ANYTHING = (Exception, SystemExit, GeneratorExit)
 """Exceptions of foreign code; only Ctrl+C and a request to stop end the run."""
 
 LONGEST_NAME = 100
-"""Characters of the name of a file that a message shows, from its end."""
+"""Characters of the name of a file that a message shows."""
 
 
 def named(error: BaseException) -> str:
@@ -57,13 +51,10 @@ def line_of(function: Callable[..., Any], error: BaseException, folder: str = ""
     if code is None:
         return ""
     file, line, home = code.co_filename, code.co_firstlineno, code.co_filename.rpartition("/")[0]
-    step = (error.__cause__ or error).__traceback__
-    while step is not None:
-        if step.tb_frame.f_code.co_filename.rpartition("/")[0] == home:
-            file, line = step.tb_frame.f_code.co_filename, step.tb_lineno
-        step = step.tb_next
-    name = printable(file.removeprefix(f"{folder or home}/"))
-    return f" ({name if len(name) <= LONGEST_NAME else '...' + name[-LONGEST_NAME:]}:{line})"
+    for frame, number in walk_tb((error.__cause__ or error).__traceback__):
+        if frame.f_code.co_filename.rpartition("/")[0] == home:
+            file, line = frame.f_code.co_filename, number
+    return f" ({printable(file.removeprefix(f'{folder or home}/'), LONGEST_NAME)}:{line})"
 
 
 class PluginError(ValueError):
@@ -120,9 +111,8 @@ class Registry(Generic[T]):
             )
 
         def add(it: T) -> T:
-            before = self._added.get(name)
-            same = before is not None and _home(before) == _home(it)  # a cell of a notebook that is run again
-            if name in self.own or name in self._reserved or (before is not None and not same):
+            before = self._added.get(name, it)  # the same again: a cell of a notebook that is run again
+            if name in self.own or name in self._reserved or _home(before) != _home(it):
                 raise PluginError(f'there is a {self.kind} "{name}" already; choose another name')
             self._check(it, name)
             self._added[name] = it
@@ -170,11 +160,8 @@ class Registry(Generic[T]):
 
     def _imported(self, reference: str, folder: str) -> T:
         module_name, _, name = reference.partition(":")
-        if module_name == NOTEBOOK:
-            module: Any = sys.modules[NOTEBOOK]
-        else:
-            module = self._module(module_name, reference, folder)
-        found = module
+        module = sys.modules[NOTEBOOK] if module_name == NOTEBOOK else _module(module_name, reference, folder)
+        found: Any = module
         for part in filter(None, name.split(".")):  # a module alone, where a registry takes modules
             try:
                 found = getattr(found, part)
@@ -187,58 +174,36 @@ class Registry(Generic[T]):
         self._check(found, reference)
         return found  # type: ignore[no-any-return]
 
-    def _module(self, name: str, reference: str, folder: str) -> Any:
-        top = name.partition(".")[0]
-        meant = PathFinder.find_spec(top, [folder]) if folder else None
-        if meant is not None and folder not in sys.path and not _finds(meant):
-            sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
-            _folders.add(folder)
-        try:
-            known = sys.modules.get(name)
-            spec = find_spec(name) if known is None else known.__spec__
-            if (known is None and spec is None) or (meant is None and _is_of_another(spec, folder)):
-                place = f" in {folder} or" if folder else ""
-                text = f'there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
-                raise PluginError(f"{reference}: {text}")
-            module = importlib.import_module(name)
-            found = getattr(sys.modules[top], "__spec__", None)
-            if meant is not None and found is not None and meant.origin != found.origin:
-                raise PluginError(
-                    f"{reference}: Python has another module {top}, from {found.origin}, than that in {folder}; give "
-                    "one of the two another name"
-                )
-            return _as_it_is_now(module)
-        except PluginError:
-            raise
-        except ANYTHING as error:  # whatever a user's module does while it is imported
-            raise PluginError(f"{reference}: importing {name} failed: {named(error)}") from error
-
     def _check(self, it: Any, reference: str) -> None:
         if why := self._objection(it):
             raise PluginError(f"{reference} is no {self.kind}: {why}")
 
 
-def _finds(meant: ModuleSpec) -> bool:
-    """Return whether Python's path leads to this module: a session has the folder where it runs there, as ""."""
-    there = PathFinder.find_spec(meant.name)
-    return there is not None and there.origin == meant.origin
-
-
-def _is_of_another(spec: ModuleSpec | None, folder: str) -> bool:
-    """Whether a module stands in the folder of another scenario: only this process would find it there."""
-    return spec is not None and bool(spec.origin) and str(spec.origin).rpartition("/")[0] in _folders - {folder}
-
-
-def _as_it_is_now(module: ModuleType) -> ModuleType:
-    """Return a module from the folder of a scenario, imported again if its file has changed since."""
-    spec, name = module.__spec__, module.__name__
-    if spec is None or not spec.origin or spec.origin.rpartition("/")[0] not in _folders:
-        return module
-    loader: Any = spec.loader
-    when = int(loader.path_stats(spec.origin)["mtime"] * 1e9)
-    if _changed.setdefault(name, when) != when:
-        _changed[name] = when
-        return importlib.reload(module)
+def _module(name: str, reference: str, folder: str) -> ModuleType:
+    """Import a module from the Python path, or else from a folder, which the path then has at its end."""
+    top = name.partition(".")[0]
+    meant = PathFinder.find_spec(top, [folder]) if folder else None
+    if meant is not None and folder not in sys.path:
+        there = PathFinder.find_spec(top)
+        if there is None or there.origin != meant.origin:  # a session has the folder where it runs there, as ""
+            sys.path.append(folder)  # at the end: a module of the user's never hides one of gridpeers or of Python
+    try:
+        if name not in sys.modules and find_spec(name) is None:
+            place = f" in {folder} or" if folder else ""
+            raise PluginError(
+                f'{reference}: there is no module "{name}"{place} on the Python path; write module:Name, e.g. mine:Mine'
+            )
+        module = importlib.import_module(name)
+        found = getattr(sys.modules[top], "__spec__", None)
+    except PluginError:
+        raise
+    except ANYTHING as error:  # whatever a user's module does while it is imported
+        raise PluginError(f"{reference}: importing {name} failed: {named(error)}") from error
+    if meant is not None and found is not None and meant.origin != found.origin:
+        raise PluginError(
+            f"{reference}: Python has another module {top}, from {found.origin}, than that in {folder}; give one of "
+            "them another name"
+        )
     return module
 
 
@@ -264,7 +229,7 @@ def folder_of(reference: str, folder: str) -> str:
         spec = find_spec(top)
     except ValueError:  # a module without a specification, as of an embedded interpreter
         return folder
-    if spec is None or spec.origin is None or spec.origin == "frozen" or _is_of_another(spec, folder):
+    if spec is None or spec.origin is None or spec.origin == "frozen":
         return folder
     place = spec.origin.rpartition("/")[0]
     return place.rpartition("/")[0] if spec.submodule_search_locations else place
