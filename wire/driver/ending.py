@@ -34,16 +34,17 @@ ends all processes of a run signals those that their parent ends too. An end mus
 
 
 class StopSignal:
-    """Handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name."""
+    """Handler of signals: SIGINT raises KeyboardInterrupt, any other an error that is made from its name.
+
+    None raises less than `SAME_REQUEST_TIME` after another.
+    """
 
     def __init__(self, error: Callable[[str], BaseException], clock: Callable[[], float] = monotonic) -> None:
         self._error, self._clock = error, clock
         self._at = -inf
         self.requests = 0
-        """Number of requests so far."""
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        """Raise the error, unless it was raised less than `SAME_REQUEST_TIME` ago."""
         now = self._clock()
         if now - self._at >= SAME_REQUEST_TIME:
             self._at = now
@@ -92,30 +93,24 @@ class _Watched(io.FileIO):
         super().__init__(stream.fileno(), "w", closefd=False)
         self.name = stream.name
         self.quits = quits
-        self._lost: OutputLostError | None = None
-        self._raised = False
+        self._reader_gone = self._raised = False
 
     def write(self, data: ReadableBuffer, /) -> int:
+        lost = OutputLostError(READER_GONE, "nobody reads its output any more")
         if not (self._raised or self._reader_gone):
             try:
                 return super().write(data)
             except BrokenPipeError:
-                self._lost = OutputLostError(READER_GONE, "nobody reads its output any more")
+                self._reader_gone = True
             except OSError as error:
-                text = f"standard output cannot be written: {error.strerror or error}"
-                self._lost = OutputLostError(UNWRITABLE, text)
+                lost = OutputLostError(UNWRITABLE, f"standard output cannot be written: {error.strerror or error}")
         # A command that cannot write its error message still has its exit status.
         ends = self.quits and (self._reader_gone or self.name != "<stderr>")
         # Raise once: the rest of the output is dropped. In another thread the error would end only that thread.
         if ends and not self._raised and threading.current_thread() is threading.main_thread():
             self._raised = True
-            assert self._lost is not None
-            raise self._lost
+            raise lost
         return memoryview(data).nbytes
-
-    @property
-    def _reader_gone(self) -> bool:
-        return self._lost is not None and self._lost.code == READER_GONE
 
 
 @contextmanager

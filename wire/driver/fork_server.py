@@ -17,7 +17,6 @@ the server checks that it is alone.
 
 from __future__ import annotations
 
-import array
 import ctypes
 import gc
 import json
@@ -30,7 +29,6 @@ from pathlib import Path
 
 LONGEST = 65_536
 """Longest request (bytes)."""
-
 
 _Job = tuple[list[str], list[int]]
 """Module and its arguments; standard input, output and error."""
@@ -63,11 +61,9 @@ def _serve(control: socket.socket) -> _Job | None:
         data, files, _, _ = socket.recv_fds(control, LONGEST, 3)
         if not data:
             return None
-        threads = sum(1 for _ in Path("/proc/self/task").iterdir())
-        if threads > 1:
-            answer: dict[str, object] = {
-                "error": f"the fork server has {threads} threads: what was imported has started some"
-            }
+        answer: dict[str, object]
+        if (threads := len([*Path("/proc/self/task").iterdir()])) > 1:
+            answer = {"error": f"the fork server has {threads} threads: what was imported has started some"}
         else:
             forked = _fork_twice()
             if forked is None:
@@ -83,17 +79,16 @@ def _fork_twice() -> int | None:
     reading, writing = os.pipe()
     between = os.fork()
     if between == 0:
-        pid = os.fork()
-        if pid:
-            os.write(writing, array.array("q", [pid]).tobytes())
+        if pid := os.fork():
+            os.write(writing, str(pid).encode())
             os._exit(0)
         os.close(reading)
         os.close(writing)
         return None
-    os.close(writing)
-    pid = array.array("q", os.read(reading, 8))[0]
-    os.close(reading)
     os.waitpid(between, 0)  # from now on the new process has its new parent
+    os.close(writing)
+    pid = int(os.read(reading, 20))
+    os.close(reading)
     return pid
 
 
@@ -104,14 +99,10 @@ def _become(words: list[str], files: list[int]) -> None:
         os.dup2(file, number)
         os.close(file)
     sys.argv = [sys.argv[0], *words[1:]]  # runpy sets the first
-    _show(f"{sys.executable} -P -m {' '.join(words)}")
-
-
-def _show(line: str) -> None:
-    """Have `ps` show a command line: write it where the kernel reads it. The last byte says that it is one text."""
+    # `ps` shows what is where the kernel reads a command line; the last byte says that it is one text
     fields = Path("/proc/self/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
     start, end = int(fields[45]), int(fields[46])
-    text = line.encode()[: end - start - 2]
+    text = f"{sys.executable} -P -m {' '.join(words)}".encode()[: end - start - 2]
     ctypes.memmove(start, text.ljust(end - start - 1, b"\0") + b".", end - start)
 
 

@@ -75,7 +75,7 @@ class Inbox:
         self._guard = allocate_lock()
         """Held while any of the following is read or changed, and while what it admits is put in."""
         self._counted = False
-        """Whether any of these counts is to be set to zero once nothing waits."""
+        """Whether any of the next three is to be set to zero once nothing waits."""
         self._beyond: Counter[str] = Counter()
         """Messages that wait beyond `ROOM`, by key."""
         self._bytes = 0

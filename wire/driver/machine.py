@@ -5,12 +5,8 @@ from __future__ import annotations
 import ctypes
 import errno
 import os
+import resource
 from contextlib import suppress
-
-try:
-    import resource
-except ImportError:  # a system without limits
-    resource = None  # type: ignore[assignment]
 
 
 def usable_cores() -> int:
@@ -21,10 +17,8 @@ def usable_cores() -> int:
 def schedule_as_batch() -> None:
     """Have this thread, and those that it starts from now on, not interrupt others as they wake.
 
-    In simulated time nothing is due at an instant, but every message wakes several threads. Where these take a core
-    from a thread that computes, all wait for it: about a tenth of a tick with three agents a process on two cores,
-    nothing that could be measured with one. Nothing is done where the system knows no such policy, nor where the user
-    has chosen one (`chrt`).
+    In simulated time nothing is due at an instant, but every message wakes several threads; where these take a core
+    from a thread that computes, all wait for it. A policy that the user has chosen (`chrt`) stays.
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         os.sched_setscheduler(0, os.SCHED_BATCH, os.sched_param(0))
@@ -43,19 +37,15 @@ class OpenFilesError(RuntimeError):
 
 def limit() -> int:
     """Return the number of files that this process may have open; `MOST_FILES` where there is no limit."""
-    if resource is None:
-        return MOST_FILES
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return MOST_FILES if soft == resource.RLIM_INFINITY else soft
 
 
 def raise_limit() -> None:
     """Raise the limit of this process, and of those that it starts, as far as the system lets everybody do it."""
-    if resource is None:
-        return
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = MOST_FILES if hard == resource.RLIM_INFINITY else min(hard, MOST_FILES)
-    if soft != resource.RLIM_INFINITY and soft < wanted:
+    if limit() < wanted:
         with suppress(OSError, ValueError):  # some systems allow less than they say; then the limit stays
             resource.setrlimit(resource.RLIMIT_NOFILE, (wanted, hard))
 
@@ -80,9 +70,6 @@ def too_few_files(error: BaseException) -> str:
     )
 
 
-_M_MMAP_THRESHOLD = -3
-"""Option of mallopt(3)."""
-
 LARGE = 128 * 1024
 """Bytes from which on a block comes from the system, and goes back to it at once."""
 
@@ -90,9 +77,9 @@ LARGE = 128 * 1024
 def keep_out_of_the_heap() -> None:
     """Have every block from `LARGE` on come from the system, for good; nothing where the C library is not glibc.
 
-    That is glibc's rule at first, but it takes the size of each such block that is freed as its new bound, up to
-    32 MB. Large messages then come and go in the heap, between small ones that stay: a recorder grew by a tenth in an
-    hour with nothing more in use.
+    glibc raises its bound to the size of each such block that is freed. Large messages then come and go between small
+    ones that stay: a recorder grew by a tenth in an hour.
     """
+    M_MMAP_THRESHOLD = -3  # of mallopt(3)
     with suppress(OSError, AttributeError, TypeError):  # no libc by this name, or another one
-        ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, LARGE)
+        ctypes.CDLL(None).mallopt(M_MMAP_THRESHOLD, LARGE)

@@ -47,8 +47,7 @@ With {leash} it must be on one line, and the process ends when standard input do
 def new_epoch() -> int:
     """Return an epoch for this process, which no other process of its name has.
 
-    It is the time, in ms since 1970, and ten random bits: so two processes differ also on a host whose clock stands
-    still, or has gone back. No clock decides anything but this.
+    It is the time, in ms since 1970, and ten random bits, should a clock stand still or go back.
     """
     return (time.time_ns() // 1_000_000 % 2**43) << 10 | int.from_bytes(os.urandom(2), "little") >> 6
 

@@ -23,7 +23,6 @@ from gridpeers.wire.driver.zenoh_settings import (
     PROFILES,
     RUNTIME,
     Clock,
-    as_client,
     zenoh_settings,
 )
 from gridpeers.wire.keys import LATEST_ONLY, is_token
@@ -37,8 +36,7 @@ FIRST_LINK = 0.5
 """Longest wait (s) for the first link, to find out whether a router or a peer answers; on one host it takes 20 ms."""
 
 _REFUSED_LINKS = "zenoh_link_tls::unicast=warn"
-"""What of Zenoh's log the rendezvous prints on standard output where links have certificates: each handshake that has
-failed, with its reason. There are ten a second at the most, as Zenoh waits 0.1 s after each."""
+"""Part of Zenoh's log: each TLS handshake that has failed, with its reason; ten a second at the most."""
 
 ADDRESSES_EVERY = 0.5
 """Time (s) between two looks at the host's addresses."""
@@ -50,7 +48,7 @@ _open_sessions: WeakSet[Session] = WeakSet()
 """Sessions of this process that are not closed."""
 
 _clearing = threading.Lock()
-"""Held while the links that a closed session left are ended: those of one that another thread opens look the same."""
+"""Held while the links that a closed session left are ended."""
 
 
 def load_zenoh(*, one_thread: bool = False) -> None:
@@ -68,17 +66,16 @@ class Session:
     """A peer of a run; raises SessionError if Zenoh is not installed, or an endpoint cannot be listened on.
 
     `who` names the process in errors. `listen` and `connect` are endpoints, e.g. "tcp/127.0.0.1:7447"; those to connect
-    to are tried again until they answer. With `gossip` it learns of other peers from the connected ones. With
-    `meets_all` it connects to every peer, instead of the one with the greater id of each pair: for a peer that does not
-    listen. `inbox` is that of a former session, which this one replaces.
+    to are tried again until they answer. With `gossip` it learns of other peers from the connected ones. A peer that
+    does not listen `meets_all`: it connects to every peer, not only to those of lower id. `inbox` is that of a former
+    session, which this one replaces.
 
     A `rendezvous` is the peer to which others connect by its address. In wall-clock time any other peer becomes the
     client of a router that answers: between two peers that know each other both directly and through a router, Zenoh
     changes the way of their declarations under way, and loses some. In a `star` the rendezvous relays all messages, as
     a router: then every other session is its client, with one link.
 
-    With `credentials` links are mutual TLS, and Zenoh lets each member send and receive what its role may, and nothing
-    else. Without them anybody who reaches an endpoint takes part.
+    With `credentials` links are mutual TLS, and Zenoh lets each member send and receive what its role may.
     """
 
     def __init__(
@@ -115,62 +112,57 @@ class Session:
             self._certificates = LinkCertificates(credentials, relayed=star and not rendezvous)
         self._addresses = LinkAddresses(listen, host_addresses())
         self._next_look = monotonic() + ADDRESSES_EVERY
-        config = zenoh_settings(
-            self._addresses.endpoints,
-            connect,
-            gossip=gossip,
-            clock=clock,
-            rendezvous=rendezvous,
-            meets_all=meets_all,
-            star=star,
-            credentials=credentials,
-        )
+        listening = () if star and not rendezvous else self._addresses.endpoints
+        config = zenoh_settings(listening, connect, gossip=gossip, clock=clock, meets_all=meets_all)
+        if star:
+            config["scouting"]["gossip"]["enabled"] &= rendezvous
+        if star and rendezvous:
+            config["mode"] = "router"
+            config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
+        if credentials is not None:
+            link, config["access_control"] = credentials.zenoh_settings(star=star)
+            config["transport"]["link"] |= link
         with _clearing:
             _open_sessions.add(self)
         self._session = self._open(who, config)
         self._changeable = clock == "wall" and gossip and bool(connect) and not rendezvous
-        if star and not rendezvous:
-            self._await_router()
-            self._become_client(who, config)
-        elif self._changeable and self._meets_router():
-            self._become_client(who, config)
+        in_star = star and not rendezvous
+        try:
+            while in_star and not self._meets_router():
+                pass  # a signal ends this wait, as it would not end the opening of a client
+        except BaseException:
+            self.close()
+            raise
+        if in_star or (self._changeable and self._meets_router()):
+            self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
+            self._session = self._open(who, config | {"mode": "client", "listen": {"endpoints": []}})
+            self._changeable = False
         self._links: Any = None
-        if (
-            clock == "wall" or credentials is not None
-        ):  # no callback: one during the end of Python would abort the process
+        if clock == "wall" or credentials is not None:
+            # no callback: one during the end of Python would abort the process
             channel: Any = zenoh.handlers.RingChannel(1)
             self._links = self._session.info.declare_link_events_listener(channel, history=True)
         self.id = str(self._session.zid())
-        """Unique id of this session: the instance of its process."""
+        """The instance of its process."""
 
     def _open(self, who: str, config: dict[str, Any]) -> zenoh.Session:
         try:
             self._config = self._zenoh.Config.from_json5(json.dumps(config))
             return self._zenoh.open(self._config)
         except self._zenoh.ZError as error:
-            raise SessionError(_explain(who, config["listen"]["endpoints"], str(error))) from None
+            text = re.sub(r" at /\S+\.rs:\d+\.?", "", str(error))  # without the places in Zenoh's own source
+            listen = ", ".join(config["listen"]["endpoints"])
+            if "in use" in text:
+                text = f"cannot listen on {listen}: the port is in use; choose another, or 0 for any free one"
+            else:
+                text = f"cannot open a Zenoh session (listening on {listen or 'nothing'}): {text}"
+            raise SessionError(f"{who}: {text}") from None
         except BaseException as error:
             if type(error).__name__ != "PanicException":  # of Rust: Zenoh's threads have not come up
                 raise
             raise SessionError(
-                f"{who}: Zenoh cannot start its threads ({error}); this process may have {limit()} files open: raise "
-                "that limit (ulimit -n), if it is low, or end other programs"
+                f"{who}: Zenoh cannot start its threads ({error}); see ulimit -n, which is {limit()} open files"
             ) from None
-
-    def _await_router(self) -> None:
-        """Wait until the router is there; a signal ends the wait, as it would not end the opening of a client."""
-        try:
-            while not self._meets_router():
-                pass
-        except BaseException:
-            self.close()
-            raise
-
-    def _become_client(self, who: str, config: dict[str, Any]) -> None:
-        """Open the session again as the client of the router that it has met."""
-        self._session.close()  # type: ignore[no-untyped-call]  # as zenoh declares it
-        self._session = self._open(who, as_client(config))
-        self._changeable = False
 
     def _meets_router(self) -> bool:
         linked = threading.Event()
@@ -244,10 +236,7 @@ class Session:
         self._session.get(key, handler, target=target, consolidation=consolidation, timeout=_QUERY_TIMEOUT)
 
     def watch(self, key: str) -> None:
-        """Put appearing and vanishing tokens into the inbox, those already present included.
-
-        A token of any other form than a run's is left out: its text may be as long as its holder likes.
-        """
+        """Put appearing and vanishing tokens of a run's form into the inbox, those already present included."""
         enqueue, gone = self.inbox.put, self._zenoh.SampleKind.DELETE
 
         def on_token(sample: zenoh.Sample) -> None:
@@ -305,8 +294,8 @@ class Session:
     def close(self, *, replaced: bool = False) -> None:
         """Undeclare the tokens and close.
 
-        If it is `replaced` by another session of this process, what Zenoh leaves of it is cleared away, which takes
-        50 ms; not while a further session is open, whose links look the same.
+        If another session of this process replaces it, clear away what Zenoh leaves, which takes 50 ms; not while a
+        further session is open, whose links look the same.
         """
         # close() may raise when a peer has just gone; nothing can be done about it
         with contextlib.suppress(self._zenoh.ZError):
@@ -318,12 +307,3 @@ class Session:
 
     def _direct(self, callback: Callable[[Any], None]) -> Any:
         return self._zenoh.handlers.Callback(callback, indirect=False)
-
-
-def _explain(who: str, listen: tuple[str, ...], error: str) -> str:
-    """Return why no session could be opened, without the places in Zenoh's own source."""
-    error = re.sub(r" at /\S+\.rs:\d+\.?", "", error)
-    endpoints = ", ".join(listen)
-    if "in use" in error:
-        return f"{who}: cannot listen on {endpoints}: the port is in use; choose another, or 0 for any free one"
-    return f"{who}: cannot open a Zenoh session (listening on {endpoints or 'nothing'}): {error}"

@@ -23,39 +23,21 @@ from ipaddress import IPv6Address, ip_address
 from pathlib import Path
 from time import monotonic, sleep
 
-_OF_IPV4 = Path("/proc/net/fib_trie")
-_OF_IPV6 = Path("/proc/net/if_inet6")
-
 _UNUSABLE = 0x48
 """Flags of an IPv6 address that is not used yet, or is another host's: tentative, and dadfailed."""
 
 
 def host_addresses() -> frozenset[str]:
     """Return the addresses at which other hosts can reach this one; none where the system does not list them."""
-    ipv4 = ipv6 = ""
+    found: list[str] = []
     with suppress(OSError):
-        ipv4 = _OF_IPV4.read_text()
+        found += re.findall(r"\|-- (\S+)(?:\n\s+/\d+ .*)*?\n\s+/32 host LOCAL", Path("/proc/net/fib_trie").read_text())
     with suppress(OSError):
-        ipv6 = _OF_IPV6.read_text()
-    return listed_addresses(ipv4, ipv6)
-
-
-def listed_addresses(ipv4: str, ipv6: str) -> frozenset[str]:
-    r"""Return the addresses in Linux's two lists, without loopback and link-local ones.
-
-    Examples
-    --------
-    >>> ipv4 = "|-- 10.9.0.2\n /32 host LOCAL\n|-- 10.9.0.255\n /32 link BROADCAST\n|-- 127.0.0.1\n /32 host LOCAL\n"
-    >>> ipv6 = "fd000000000000000000000000000002 04 40 00 80 eth0\nfe800000000000000000000000000002 04 40 20 80 eth0\n"
-    >>> sorted(listed_addresses(ipv4, ipv6))
-    ['10.9.0.2', 'fd00::2']
-    """
-    found = {match[1] for match in re.finditer(r"\|-- (\S+)(?:\n\s+/\d+ .*)*?\n\s+/32 host LOCAL", ipv4)}
-    for line in ipv6.splitlines():
-        address, *_, flags, _ = line.split()
-        if not int(flags, 16) & _UNUSABLE:
-            found.add(str(IPv6Address(int(address, 16))))
-    return frozenset(text for text in found if _reaches_others(text))
+        for line in Path("/proc/net/if_inet6").read_text().splitlines():
+            address, *_, flags, _ = line.split()
+            if not int(flags, 16) & _UNUSABLE:
+                found.append(str(IPv6Address(int(address, 16))))
+    return frozenset(filter(_reaches_others, found))
 
 
 def at_addresses(listen: Collection[str], addresses: Collection[str]) -> tuple[str, ...]:
@@ -67,19 +49,13 @@ def at_addresses(listen: Collection[str], addresses: Collection[str]) -> tuple[s
     --------
     >>> at_addresses(("tcp/0.0.0.0:0", "tcp/[::]:0", "tcp/0.0.0.0:7447"), ("10.9.0.2", "fd00::2"))
     ('tcp/10.9.0.2:0', 'tcp/[fd00::2]:0', 'tcp/0.0.0.0:7447')
-    >>> at_addresses(("tcp/0.0.0.0:0", "tcp/127.0.0.1:0"), ())
-    ('tcp/0.0.0.0:0', 'tcp/127.0.0.1:0')
     """
     found: list[str] = []
     for endpoint in listen:
         protocol, _, rest = endpoint.partition("/")
-        if rest == "0.0.0.0:0":
-            at = [f"{protocol}/{text}:0" for text in sorted(addresses) if ":" not in text]
-        elif rest == "[::]:0":
-            at = [f"{protocol}/[{text}]:0" for text in sorted(addresses) if ":" in text]
-        else:
-            at = []
-        found += at or [endpoint]
+        here = sorted(text for text in addresses if (":" in text) == (rest == "[::]:0"))
+        at = [f"{protocol}/[{text}]:0" if ":" in text else f"{protocol}/{text}:0" for text in here]
+        found += at if at and rest in ("0.0.0.0:0", "[::]:0") else [endpoint]
     return tuple(found)
 
 
@@ -91,9 +67,8 @@ def address_in(locator: str) -> str:
     >>> [*map(address_in, ("tcp/10.9.0.2:4711", "tls/[fd00::2]:1", "tcp/127.0.0.1:5", "tcp/[::ffff:10.9.0.2]:1"))]
     ['10.9.0.2', 'fd00::2', '', '10.9.0.2']
     """
-    host = locator.partition("/")[2].rpartition(":")[0].strip("[]")
     with suppress(ValueError):
-        address = ip_address(host)
+        address = ip_address(locator.partition("/")[2].rpartition(":")[0].strip("[]"))
         text = str(getattr(address, "ipv4_mapped", None) or address)
         return text if _reaches_others(text) else ""
     return ""
@@ -157,9 +132,6 @@ def tcp_sockets() -> Iterator[socket.socket]:
                         yield same
 
 
-EVERY = 0.01
-"""Time (s) between two looks for such links."""
-
 QUIET = 0.05
 """Time (s) without such a link after which none comes any more; on a busy machine the longest was 20 ms."""
 
@@ -175,17 +147,9 @@ def end_left_links() -> None:
     end = monotonic() + LONGEST
     quiet = monotonic() + QUIET
     while monotonic() < min(quiet, end):
-        if _end_links():
-            quiet = monotonic() + QUIET
-        sleep(EVERY)
-
-
-def _end_links() -> bool:
-    ended = False
-    for same in tcp_sockets():
-        with suppress(OSError):  # ended by the other side
-            _, seconds = linger(same)
-            if seconds == ZENOH_LINGERS:
-                same.shutdown(socket.SHUT_RDWR)
-                ended = True
-    return ended
+        for same in tcp_sockets():
+            with suppress(OSError):  # ended by the other side
+                if linger(same)[1] == ZENOH_LINGERS:
+                    same.shutdown(socket.SHUT_RDWR)
+                    quiet = monotonic() + QUIET
+        sleep(0.01)

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
-from gridpeers.wire.trust.credentials import Credentials
-
 RUNTIME = "(rx: (worker_threads: 1), acc: (handover: app), net: (handover: app), tx: (handover: app))"
 """Few threads: one that receives, and one pool for the rest. Receiving in that pool too is a tenth faster, but then a
 flood of messages can stall it."""
@@ -45,42 +43,15 @@ PROFILES: dict[Clock, Profile] = {
 }
 
 MOST_BYTES = 8_000_000
-"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. Ours have
-`gridpeers.wire.bounds.LONGEST_MESSAGE` at most, a configuration or a feeder's diagram more. After a longer one it
-passes nothing more of that sender on that link."""
+"""Longest message that Zenoh puts together, in bytes; its default is 1 GiB for each link. After a longer one it passes
+nothing more of that sender on that link."""
 
 
 def zenoh_settings(
-    listen: tuple[str, ...],
-    connect: tuple[str, ...],
-    *,
-    gossip: bool,
-    clock: Clock,
-    rendezvous: bool,
-    meets_all: bool,
-    star: bool,
-    credentials: Credentials | None,
+    listen: tuple[str, ...], connect: tuple[str, ...], *, gossip: bool, clock: Clock, meets_all: bool
 ) -> dict[str, Any]:
-    """Return Zenoh's configuration of a session; parameters are those of `gridpeers.wire.driver.session.Session`."""
-    in_star = star and not rendezvous
-    config = _peer(() if in_star else listen, connect, gossip and not in_star, meets_all, PROFILES[clock])
-    if star and rendezvous:
-        config["mode"] = "router"
-        config["scouting"]["delay"] = 0  # else it waits 0.5 s for others
-    if credentials is not None:
-        link, rules = credentials.zenoh_settings(star=star)
-        config["transport"]["link"] |= link
-        config["access_control"] = rules
-    return config
-
-
-def as_client(config: dict[str, Any]) -> dict[str, Any]:
-    return config | {"mode": "client", "listen": {"endpoints": []}}
-
-
-def _peer(
-    listen: tuple[str, ...], connect: tuple[str, ...], gossip: bool, meets_all: bool, profile: Profile
-) -> dict[str, Any]:
+    """Return Zenoh's configuration of a peer; parameters are those of `gridpeers.wire.driver.session.Session`."""
+    profile = PROFILES[clock]
     first, longest, growth = profile.retry
     return {
         "mode": "peer",

@@ -1,10 +1,8 @@
-"""How the kernel schedules a process, and what memory it gives back."""
+"""How the kernel schedules a process."""
 
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import threading
 
 import pytest
@@ -42,33 +40,3 @@ def test_a_thread_and_those_it_starts_become_batch_work() -> None:
 def test_a_policy_that_the_user_has_chosen_stays() -> None:
     """A run under `chrt --idle` stays in the background."""
     assert policies(os.SCHED_IDLE) == (os.SCHED_IDLE, os.SCHED_IDLE)
-
-
-_GROWN = """
-import sys
-from gridpeers.wire.driver.machine import LARGE, keep_out_of_the_heap
-
-def resident():
-    with open("/proc/self/status") as file:
-        return next(int(line.split()[1]) for line in file if line.startswith("RssAnon"))
-
-if sys.argv[1] == "out":
-    keep_out_of_the_heap()
-first = b"1" * (200 * LARGE)
-del first  # from now on glibc takes blocks of up to so many bytes from the heap
-before = resident()
-large, stays = b"2" * (160 * LARGE), b"3" * (LARGE // 2)
-del large
-print(resident() - before)
-"""
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc tells the size of a process")
-def test_a_large_block_leaves_no_hole() -> None:
-    """A block of 20 MB goes back to the system though a small one that stays was made after it."""
-    words = [sys.executable, "-c", _GROWN]
-    heap, out = (
-        int(subprocess.run([*words, how], capture_output=True, text=True, check=True).stdout) for how in ("heap", "out")
-    )
-
-    assert out < 1000, f"{out} kB stay, and {heap} kB without"
