@@ -44,7 +44,6 @@ KINDS = {
     "unexpected": "well-formed, but not for this receiver at this time",
     "failed": "it raised an error of ours, see the traceback",
 }
-"""The kinds of rejects and their meanings."""
 
 _encoder = msgspec.msgpack.Encoder()
 _latest: tuple[bytes | None, AnyMessage] = (None, None)  # type: ignore[assignment]
@@ -136,8 +135,6 @@ def _is_finite(value: Any) -> bool:
 
 
 class RejectedMessages:
-    """Count dropped messages by kind, and keep one log line per kind."""
-
     def __init__(self, who: str) -> None:
         self.counts: Counter[str] = Counter()
         self._who = who

@@ -59,7 +59,6 @@ class Exchange(Entry, frozen=True, array_like=True, tag="exchange"):
     """Measurements that the plant sent and states that it heard in one tick of simulated time, as bytes."""
 
     tick: int
-    """k."""
     measurements: list[Any]
     """Payloads of `Measurement`, in the order in which they were sent. Where plant and agents share a process and send
     none: the values of each in the order of the fields, which the record names."""
@@ -71,16 +70,13 @@ class SentMessage(KeyEntry, frozen=True, array_like=True, tag="sent"):
     """A message that the node sent."""
 
     payload: bytes
-    """Its bytes."""
 
 
 class MessageReference(KeyEntry, frozen=True, array_like=True, tag="heard"):
     """A sound message off the wire whose bytes are in its sender's journal."""
 
     epoch: int
-    """Epoch of the sender."""
     seq: int
-    """Number of the message."""
     rejected: str = ""
     """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
@@ -89,7 +85,6 @@ class ReceivedMessage(KeyEntry, frozen=True, array_like=True, tag="received"):
     """A message off the wire, with its bytes: nobody else has noted them, or they are not sound."""
 
     payload: bytes
-    """Its bytes."""
     rejected: str = ""
     """Kind of its rejection (`gridpeers.wire.codec.KINDS`); empty if it was used."""
 
@@ -100,21 +95,18 @@ class RejectedCount(KeyEntry, frozen=True, array_like=True, tag="rejected"):
     kind: str
     """Kind of their rejection (`gridpeers.wire.codec.KINDS`)."""
     count: Count
-    """Number of them."""
 
 
 class Token(KeyEntry, frozen=True, array_like=True, tag="token"):
     """A liveliness token that appeared or vanished."""
 
     appeared: bool
-    """Whether it appeared."""
 
 
 class WakeUp(Entry, frozen=True, array_like=True, tag="woken"):
     """The node acted because its clock said so, after all entries before this one and before those that follow."""
 
     at: float
-    """Time on the own clock (s, monotonic)."""
     work: bool = False
     """Whether it did its piece of work (`Node.work`: the plant advances), not what was due (`Node.expire`)."""
 
@@ -182,10 +174,8 @@ AnyEntry = (
     | ProcessEvent
     | Decision
 )
-"""An entry of any kind."""
 
 ENTRIES: tuple[type[Entry], ...] = AnyEntry.__args__
-"""All kinds of entries."""
 
 _encode_into = msgspec.msgpack.Encoder().encode_into
 
@@ -196,13 +186,9 @@ class JournalBuffer:
     def __init__(self) -> None:
         self._bytes = bytearray()
         self._lost = 0
-        """Entries that found no room."""
         self._ends: list[int] = []
-        """Ends of the entries that a part may end with."""
         self._rejected = 0
-        """Rejected messages that are noted."""
         self._counts: dict[tuple[str, str], RejectedCount] = {}
-        """Messages that are only counted, by key and kind."""
 
     def __len__(self) -> int:
         return len(self._bytes)
@@ -275,7 +261,6 @@ def name_of(key: str) -> str:
 
 
 def sender_of(key: str) -> str:
-    """Return who sends measurements or states on a key."""
     return PLANT if kind_of(key) == "measurement" else name_of(key)
 
 

@@ -38,21 +38,14 @@ class KeySpec(msgspec.Struct, frozen=True):
     """One kind of key, for the protocol's documentation and for access rules (`gridpeers.wire.trust.credentials`)."""
 
     path: str
-    """The key after ``gridpeers/<run>/``, with its parts in angle brackets."""
     kind: Literal["publication", "queryable", "token"]
-    """publication, queryable or token (of liveliness)."""
     message: str
-    """Type of the message, or "-" for a token."""
     sender: str
-    """The participant that publishes, answers or holds it."""
     listener: str
-    """The participants that subscribe, query or watch."""
     when: str
-    """Time at which it is sent or held."""
     writers: tuple[Role, ...]
     """Roles of members of a site that may publish, answer or hold it; an agent only with its own name in the key."""
     readers: tuple[Role, ...]
-    """Roles that may subscribe, query or watch."""
 
     @property
     def expression(self) -> str:
@@ -132,7 +125,6 @@ class Keys:
 
 @lru_cache(maxsize=8192)
 def _parts(prefix: str, key: str) -> tuple[str, ...]:
-    """Split a key; cached, because in one process every node sees the same tokens."""
     parts = tuple(key[len(prefix) :].split("/")) if key.startswith(prefix) else ()
     return parts if all(map(is_name, parts)) else ()
 
@@ -155,7 +147,6 @@ def epoch_of(part: str) -> int | None:
 
 
 def is_token(key: str) -> bool:
-    """Whether a key can be that of a process's token, as long as those are."""
     parts = key.split("/", MOST_PARTS)
     return len(parts) <= MOST_PARTS and all(map(is_name, parts))
 

@@ -17,11 +17,9 @@ class Arrival(NamedTuple):
     """A message that a link has let through."""
 
     src: str
-    """The sender."""
     payload: bytes
     """Its bytes, with a flipped bit if the link has corrupted it."""
     delay: float
-    """The delay that the link added (s)."""
     message: AnyMessage | None = None
     """The message as it was offered; None if the link has corrupted it."""
 
@@ -46,8 +44,7 @@ class Links(Protocol):
         """Senders whose messages `offer` never takes; an attribute, because every message reads it."""
 
     @property
-    def dropped(self) -> int:
-        """Number of messages that the links have lost, of all senders."""
+    def dropped(self) -> int: ...
 
     def offer(self, message: State | Measurement, payload: bytes, at: float) -> bool:
         """Take a message off the wire at this time (s) and return True; return False if no fault ever acts on its link.
@@ -59,8 +56,7 @@ class Links(Protocol):
     def due(self, now: float) -> Sequence[Arrival]:
         """Take out the messages that have arrived by now, in the order of arrival."""
 
-    def stalled(self, t: float) -> bool:
-        """Return whether the receiver itself is paused at t (s of run time)."""
+    def stalled(self, t: float) -> bool: ...
 
     def command(self, tree: Mapping[str, Any], t: float) -> CommandEffect:
         """Apply a link command to messages sent at t (s of run time) or later.
@@ -71,14 +67,11 @@ class Links(Protocol):
     def node_events(self, t: float) -> Sequence[tuple[str, str]]:
         """Take out what nodes with faults began or ended by t (s of run time): the agent and a sentence each."""
 
-    def impaired(self, t: float) -> tuple[str, ...]:
-        """Return the senders whose links have a fault at t (s of run time)."""
+    def impaired(self, t: float) -> tuple[str, ...]: ...
 
-    def status(self, t: float) -> bytes:
-        """Return the status of all links at t (s of run time), encoded for the client that asked."""
+    def status(self, t: float) -> bytes: ...
 
-    def restart(self) -> None:
-        """Forget all commands and all messages on their way: the run's time starts from 0 again."""
+    def restart(self) -> None: ...
 
     def report(self, *, last: bool = False) -> tuple[bytes, ...]:
         """Take out the links' account since the last report, for the record; the last report is never empty."""

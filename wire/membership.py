@@ -43,7 +43,6 @@ class Admission:
     def __init__(self, rate: float = inf) -> None:
         self._rate = rate
         self.epochs: dict[str, int] = {}
-        """Valid epoch of each name."""
         self._numbered: dict[str, int] = {}
         """Epoch of the numbers below; it outlasts a token that vanishes and reappears."""
         self._arrived: dict[str, tuple[int, float]] = {}
@@ -51,7 +50,6 @@ class Admission:
         self._behind: dict[str, tuple[int, int]] = {}
         """Number of the last message that arrived after a later one, and the count of such messages in a row."""
         self._passed: dict[str, int] = {}
-        """Number of the last usable message."""
 
     def bind(self, name: str, epoch: int) -> None:
         """Set the valid epoch of a name; in a new one the numbers start anew."""
@@ -108,7 +106,6 @@ class Admission:
         return count >= PERSISTENT
 
     def passes(self, message: AnyMessage) -> bool:
-        """Whether a delivered message is usable: of the valid epoch, and later than all usable ones before."""
         name, seq = message.sender, message.seq
         if self.epochs.get(name) != message.epoch or seq <= self._passed.get(name, -1):
             return False
@@ -124,20 +121,14 @@ ASKED_AT_ONCE = 20
 
 
 class Membership:
-    """Tokens and nameplates of the agents."""
-
     def __init__(self, admission: Admission) -> None:
         self._admission = admission
         self._instances: dict[str, list[str]] = {}
-        """Present processes of each name; the first one counts."""
         self._preferred: dict[str, str] = {}
-        """Processes that count whenever their tokens are there, by name."""
         self._dismissed: dict[str, str] = {}
         """Processes that count no more although their tokens are there, by name."""
         self._answers: dict[tuple[str, str], Nameplate] = {}
-        """Nameplate of each process that has answered."""
         self.nameplates: dict[str, Nameplate] = {}
-        """Nameplates of the processes that count."""
         self.changes = 0
         """Number of changes so far of the processes that count, or of their nameplates."""
         self._asked = 0

@@ -75,7 +75,6 @@ class Loss(NamedTuple):
     kind: str
     """One of `gridpeers.wire.codec.KINDS`."""
     text: str
-    """The problem of the first of them."""
     number: int
 
 
@@ -83,28 +82,24 @@ class Core(Protocol):
     """The part of a node that a driver uses; it asks `is_known` and `is_noted` in any thread."""
 
     @property
-    def tokens(self) -> tuple[str, ...]:
-        """Keys of the own tokens."""
+    def tokens(self) -> tuple[str, ...]: ...
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
         """Keys to subscribe to before the tokens are declared."""
 
     @property
-    def watched(self) -> str:
-        """Key expression of the tokens to watch."""
+    def watched(self) -> str: ...
 
     @property
-    def finished(self) -> bool:
-        """Whether the driver should close."""
+    def finished(self) -> bool: ...
 
     @property
     def messages_needed(self) -> int:
         """Number of messages that it needs to continue before its deadline."""
 
     @property
-    def deadline(self) -> float | None:
-        """Time of the deadline (s); None if there is none."""
+    def deadline(self) -> float | None: ...
 
     def start(self, now: float) -> None: ...
     def take_actions(self) -> Sequence[Action | Log]: ...
@@ -135,15 +130,12 @@ class Route(NamedTuple):
     sender: str
     """The only valid sender, or `ANYBODY`."""
     types: tuple[type[Message], ...]
-    """Types of its messages."""
     handle: Handler
     early: bool = False
     """Whether a message may arrive before its sender's epoch is known, as a nameplate does: its handler checks it."""
 
 
 class Node:
-    """The common part of an agent, the plant and a recorder."""
-
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         self.keys = Keys(run)
         self.rejects = RejectedMessages(name)
@@ -154,7 +146,6 @@ class Node:
         self.vouches: Callable[[str], bool] | None = None
         """Says whether a link of this process has the certificate of a sender; None if links have no certificates."""
         self.journal: JournalBuffer | None = None
-        """Entries for the record since the last part; None if this node keeps no journal."""
         self.traffic: Traffic | None = None
         """Notes messages and tokens in the journal; None if nobody records them here."""
         self._journal_parts = 0
@@ -166,7 +157,6 @@ class Node:
 
     @property
     def token(self) -> str:
-        """Key of the own liveliness token."""
         raise NotImplementedError
 
     @property
@@ -260,8 +250,7 @@ class Node:
         if self.members.meet(instance, nameplate):
             self._met(nameplate, now)
 
-    def _met(self, nameplate: Nameplate, now: float) -> None:
-        """Note the nameplate of an agent that counts from now on."""
+    def _met(self, nameplate: Nameplate, now: float) -> None: ...
 
     def _forget_process(self, name: str, instance: str) -> bool:
         self.routes.pop(self.keys.nameplate(name, instance), None)
@@ -287,11 +276,9 @@ class Node:
         if self.vouches is not None and not self.vouches(name):
             raise RejectedError("impostor", f"{name} says who it is, but no link has the certificate of {name}")
 
-    def _misled(self, expected: str, message: AnyMessage, now: float) -> None:
-        """Note a message under another sender's key."""
+    def _misled(self, expected: str, message: AnyMessage, now: float) -> None: ...
 
-    def _used(self, message: AnyMessage, now: float) -> None:
-        """Note a message that was used."""
+    def _used(self, message: AnyMessage, now: float) -> None: ...
 
     def _publish(self, key: str, payload: bytes) -> None:
         if self.traffic is not None:
@@ -339,7 +326,6 @@ class PlantFollower(Node):
     def __init__(self, name: str, run: str, rate: float = inf) -> None:
         super().__init__(name, run, rate)
         self._plants: set[int] = set()
-        """Epochs of the present plants."""
 
     def _plant_appeared(self, part: str) -> bool:
         """Note a plant's token by its last part; return False if that is no epoch, or one of too many."""
@@ -385,5 +371,4 @@ class PlantFollower(Node):
             self._follow(epoch)
         super()._admit(route, message, now)
 
-    def _follow(self, epoch: int) -> None:
-        """Note the epoch of the plant that this node follows from now on."""
+    def _follow(self, epoch: int) -> None: ...

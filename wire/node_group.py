@@ -34,18 +34,14 @@ class _Query(NamedTuple):
     """The last query of a key."""
 
     declared: int
-    """Subscriptions that the group had declared by then."""
     askers: list[GroupedNode]
-    """Nodes that wait for its answer."""
     answer: list[bytes]
-    """The answer, once it is there."""
 
 
 class NodeGroup:
     def __init__(self, nodes: Sequence[GroupedNode]) -> None:
         self.nodes = tuple(nodes)
         self.nameplates = dict(node.nameplate for node in nodes)
-        """Keys of the own queryables, and their answers."""
         names = frozenset(node.name for node in nodes)
         for node in nodes:
             node.note_siblings(names)
@@ -55,11 +51,8 @@ class NodeGroup:
     def _start_anew(self) -> None:
         self._active = list(self.nodes)
         self._declared: set[str] = set()
-        """Keys that the session has subscribed to."""
         self._listeners: dict[str, list[GroupedNode]] = {}
-        """Nodes that listen to each key."""
         self._queries: dict[str, _Query] = {}
-        """Last query of each key."""
         self._open: dict[str, _Query] = {}
         """Queries without an answer, by the key under which it will arrive."""
         self._asked = 0
@@ -94,12 +87,10 @@ class NodeGroup:
 
     @property
     def session_broken(self) -> bool:
-        """Whether the group closes only to begin again with a new session."""
         return any(node.session_broken for node in self.nodes)
 
     @property
     def messages_needed(self) -> int:
-        """Number of messages from outside that the first of the nodes to continue needs."""
         return min(node.messages_needed for node in self._active)
 
     @property

@@ -33,11 +33,6 @@ def rounded_up(t: float, T_c: float) -> float:
 
 
 class Timer:
-    """Due times of a periodic task, the first one now, a period apart (s of wall time).
-
-    When it wakes too late, it skips the past due times and keeps its schedule.
-    """
-
     def __init__(self, period: float, now: float) -> None:
         self.period = period
         self._start = now
@@ -64,7 +59,6 @@ class Awaited(NamedTuple):
     message: str
     """E.g. "State(41)"."""
     sender: str
-    """Name of its sender."""
 
 
 class TickBarrier:
@@ -73,15 +67,12 @@ class TickBarrier:
     def __init__(self, name: str, timeout: float) -> None:
         self._name, self._timeout = name, timeout
         self._awaited: dict[str, str] = {}
-        """Missing message of each sender."""
         self.siblings: frozenset[str] = frozenset()
         """Senders in the same process, whose messages do not come from outside."""
         self._from_outside = 0
-        """Number of missing messages of the others."""
         self.last_heard: dict[str, tuple[int, float]] = {}
         """Number and time (s) of each sender's last message, its last sign of life; the node notes them."""
         self.deadline: float | None = None
-        """End of the present wait (s); None if it has none."""
 
     @property
     def is_open(self) -> bool:
@@ -127,7 +118,6 @@ class TickBarrier:
         self.deadline = None
 
     def complaint(self, missing: tuple[Awaited, ...], now: float) -> str:
-        """Return the error of a passed deadline: each missing sender with its last tick and last sign of life."""
         parts = []
         for message, sender in missing:
             if sender in self.last_heard:
@@ -152,7 +142,6 @@ class SessionDeadline:
 
     def __init__(self, patience: float = PATIENCE) -> None:
         self.whole = False
-        """Whether no sender was silent at some time of this session."""
         self._patience = patience
         self._since: dict[str, float] = {}
 
@@ -192,7 +181,6 @@ class RateLimit:
         self._allowed: dict[str, tuple[float, float]] = {}
         """Number of lines of each kind that may come, and the time (s) of that number."""
         self._left: dict[str, tuple[int, str]] = {}
-        """Number of omitted lines of each kind since the last one passed, and the latest of them."""
 
     def admit(self, text: str, now: float) -> str | None:
         """Return a line as it is, or with the number of omitted ones before it, or None to omit it."""

@@ -34,20 +34,15 @@ SHOWN_PAYLOAD = 1_000
 class Traffic(Protocol):
     """Takes all messages and tokens of a node; `at` is the driver's clock (s)."""
 
-    def sent(self, key: str, payload: bytes) -> None:
-        """Note a message that the node sends."""
+    def sent(self, key: str, payload: bytes) -> None: ...
 
-    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None:
-        """Note a message off the wire, and the kind of its rejection, if it was rejected."""
+    def received(self, key: str, payload: bytes, at: float, rejected: str) -> None: ...
 
-    def lost(self, key: str, kind: str, count: int, at: float) -> None:
-        """Count messages or tokens on a key of which nothing else is noted, and the kind of their rejection."""
+    def lost(self, key: str, kind: str, count: int, at: float) -> None: ...
 
-    def token(self, key: str, at: float, *, appeared: bool) -> None:
-        """Note a liveliness token that appeared or vanished."""
+    def token(self, key: str, at: float, *, appeared: bool) -> None: ...
 
-    def line(self, text: str) -> None:
-        """Note a line of the log."""
+    def line(self, text: str) -> None: ...
 
 
 class TickTraffic:
@@ -177,4 +172,3 @@ class TimedTraffic:
 
 
 _NOT_NOTED = IN_TELEMETRY + CONDITION
-"""Kinds of keys of which a sender notes nothing."""
