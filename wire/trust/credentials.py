@@ -14,7 +14,6 @@ links, messages of all writers pass.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from datetime import datetime
 from typing import Any, Literal, NamedTuple
 
 import msgspec
@@ -54,12 +53,11 @@ class Member(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
         following = self._in_generation(self.generation + 1)
         return (following,) if self.revoked else (self.common_name, following)
 
-    def validity(self, now: datetime) -> str:
-        """Return "revoked", or until when its certificate is or was valid, by the site's list."""
+    def validity(self, now: str) -> str:
+        """Return "revoked", or until when its certificate is or was valid, by the site's list and the time now."""
         if self.revoked:
             return "revoked"
-        expired = self.expires < f"{now:{DATE_AND_TIME}}"
-        return f"expired  {self.expires}" if expired else f"valid    until {self.expires}"
+        return f"expired  {self.expires}" if self.expires < now else f"valid    until {self.expires}"
 
     def _in_generation(self, number: int) -> str:
         return f"{self.role}:{self.name}" if number == 1 else f"{self.role}:{self.name}:{number}"

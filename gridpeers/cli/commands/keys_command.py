@@ -103,9 +103,10 @@ def show(keys: _Keys = Path()) -> None:
     Example:  gridpeers keys show --keys lab
     """
     with _errors():
+        from gridpeers.wire.trust.credentials import DATE_AND_TIME
         from gridpeers.wire.trust.key_folder import CA_KEY, LIST, key_warnings, read_list
 
-        known, now = read_list(keys), datetime.now(UTC)
+        known, now = read_list(keys), f"{datetime.now(UTC):{DATE_AND_TIME}}"
         warnings = key_warnings(keys)
         authority = f"; {CA_KEY} is here: certificates are issued in this folder" if (keys / CA_KEY).is_file() else ""
         if CA_KEY in warnings:
