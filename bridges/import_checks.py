@@ -1,4 +1,4 @@
-"""Checks that all imports of feeders share: elements left out by name, nodes whose voltage nothing determines."""
+"""What all imports of feeders share: problems with their places, what nothing feeds, names that tables can hold."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from gridpeers.plant.equipment import NODES, PHASES, Feeder
-from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus
-from gridpeers.plant.equipment.imported_equipment import BEHIND, LoadPart, bus_behind
+from gridpeers.plant.equipment.connectivity import Connectivity, Node, by_bus, connected
+from gridpeers.plant.equipment.imported_equipment import BEHIND, LinearElement, LoadPart, bus_behind
 from gridpeers.plant.tables.feeder_columns import PART_CURRENT, power_of
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import first_of
@@ -22,20 +23,24 @@ from gridpeers.wire.wording import first_of
 BEYOND = 100.0
 """Voltage (pu) that only a singular matrix gives."""
 
-SHOWN_NAMES = 5
-"""How many buses of a section, or loads, a sentence names."""
+SHOWN_NAMES, SHOWN_BUSES = 5, 8
+"""So many buses of a section, or loads, a sentence names; so many buses a note of other names."""
 
 MOST_UNFED = 0.5
 """Part of a feeder's load that may be without a path to the source; more of it is a mistake in the file."""
 
 
 def number_of(letter: str) -> str:
-    """Return the number of a bus's node, which stands for its letter in OpenDSS: 1 for A."""
+    """Return the number of a bus's node in OpenDSS, 1 for A."""
     return str(NODES.index(letter) + 1)
 
 
+def element_of(name: str, nodes: Sequence[Node], Y: Any) -> LinearElement:
+    """Return a linear element between nodes, by its admittance matrix (S)."""
+    return LinearElement(name=name, nodes=tuple(nodes), Y=tuple(map(tuple, np.asarray(Y, complex).tolist())))
+
+
 def path_problems(path: Path) -> list[str]:
-    """Return what is wrong with the path of a file to import, if it is none."""
     if path.is_file():
         return []
     return [f"{path}: is a folder; name the file in it" if path.is_dir() else f"{path}: there is no such file"]
@@ -50,8 +55,6 @@ def refuse_if(path: Path, problems: Collection[str], places: Mapping[str, str] |
 def placed(problem: str, places: Mapping[str, str]) -> str:
     """Return a problem behind the file and line of what it begins with, the first of several, if they are known.
 
-    Examples
-    --------
     >>> places = {"load.a": "x.dss:7", "bus n 1": "x.dss:3"}
     >>> placed("load.a, load.b: constant power to ground", places), placed("buses n 1, n2 (first n 1.A): apart", places)
     ('x.dss:7: load.a, load.b: constant power to ground', 'x.dss:3: buses n 1, n2 (first n 1.A): apart')
@@ -104,126 +107,29 @@ def left_out_by(names: Sequence[str], patterns: Sequence[str], problems: list[st
 
 def report_powers(parts: Sequence[LoadPart], problems: list[str]) -> None:
     """Add a problem for each load whose power only a lost unit explains."""
-    told: set[str] = set()
+    told: dict[str, str] = {}
     for part in parts:
         most = power_of("a load", part.V_nom, PART_CURRENT, 1)
         for power, unit in ((part.S.real / 1e3, "kW"), (part.S.imag / 1e3, "kvar")):
             text = most.objection(power, unit) if isfinite(power) else f"its power must be a number, got {power} {unit}"
-            if text and part.name not in told:
-                told.add(part.name)
-                problems.append(f"{part.name}: {text}")
+            if text:
+                told.setdefault(part.name, text)
+    problems += [f"{name}: {text}" for name, text in told.items()]
 
 
-def without_unfed(feeder: Feeder, notes: list[str], name_node: Callable[[str], str] = number_of) -> Feeder:
-    """Return a feeder without the sections and loads that nothing can feed, each of which becomes a note.
-
-    They are sections without a path to the source with all switches closed, and loads at a node to which nothing else
-    leads. Nothing flows there, so that the rest is what it was. If they have most of the load, the feeder stays as it
-    is, and `refuse_unsolvable` names them.
-    """
-    supported, sections = _nodes_of_elements(feeder), _unfed_sections(feeder)
-    gone = frozenset[Node]().union(*sections)
-    idle = _idle_parts(feeder, supported)
-    parts = [part for k, part in enumerate(feeder.load_parts) if k in idle or (part.bus, part.ends[0]) in gone]
-    unserved = sum(part.S.real for part in parts)
-    if not (gone or parts) or unserved > MOST_UNFED * sum(part.S.real for part in feeder.load_parts):
-        return feeder
-    for section in sections:
-        load = sum(part.S.real for part in parts if (part.bus, part.ends[0]) in section)
-        with_load = f", with {load / 1e3:.3g} kW of load" if load else ""
-        notes.append(f"{_named(feeder, section, name_node)}: no path to the source; left out{with_load}")
-    names = list(dict.fromkeys(part.name for k, part in enumerate(feeder.load_parts) if k in idle))
-    if names:
-        notes.append(f"{first_of(names, SHOWN_NAMES)}: at a node to which nothing else leads; left out")
-    kept = tuple(part for part in feeder.load_parts if part not in parts)
-    used = supported | {(part.bus, letter) for part in kept for letter in part.ends}
-    used |= {(bus, letter) for row in feeder.switches for bus in (row.from_bus, row.to_bus) for letter in row.phases}
-    buses = [
-        msgspec.structs.replace(bus, phases="".join(p for p in bus.phases if (bus.name, p) in used - gone))
-        for bus in feeder.buses
-    ]
-    switches = [
-        msgspec.structs.replace(row, phases="".join(p for p in row.phases if (row.from_bus, p) not in gone))
-        for row in feeder.switches
-    ]
-    return msgspec.structs.replace(
-        feeder,
-        buses=tuple(bus for bus in buses if bus.phases),
-        switches=tuple(row for row in switches if row.phases),
-        elements=tuple(row for row in feeder.elements if not set(row.nodes) & gone),
-        load_parts=kept,
-    )
-
-
-def _nodes_of_elements(feeder: Feeder) -> set[Node]:
-    """Return the nodes to which an element or the source leads, and not loads alone."""
-    assert feeder.source is not None
-    supported = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
-    return supported | {(feeder.source.bus, letter) for letter in PHASES}
-
-
-def _unfed_sections(feeder: Feeder) -> list[frozenset[Node]]:
-    """Return the sections that have no path to the source, not even through loads, with all switches closed."""
-    assert feeder.source is not None
-    through_loads = [
-        ((part.bus, one), (part.bus, other)) for part in feeder.load_parts for one, other in [part.ends] if other
-    ]
-    source, supported = feeder.source.bus, _nodes_of_elements(feeder)
-    parts = Connectivity(feeder).parts(whole=[source], tied=through_loads)
-    return by_bus(part for part in parts if (source, "A") not in part and part & supported)
-
-
-def _idle_parts(feeder: Feeder, supported: Collection[Node]) -> set[int]:
-    """Return the places of the load parts through which no current can flow.
-
-    Nodes that only loads lead to, and their loads, form groups; a group that touches one other node, or ground alone,
-    has no second way for a current.
-    """
-    group: dict[Node, Node] = {}
-
-    def root(node: Node) -> Node:
-        while group.setdefault(node, node) != node:
-            node = group[node]
-        return node
-
-    ends = [[(part.bus, letter) for letter in part.ends] for part in feeder.load_parts]
-    loose = [[node for node in pair if node[1] and node not in supported] for pair in ends]
-    for nodes in loose:
-        for node in nodes[1:]:
-            group[root(node)] = root(nodes[0])
-    touched: dict[Node, set[Node]] = {}
-    for pair, nodes in zip(ends, loose, strict=True):
-        for node in nodes[:1]:
-            ground = {("", "") if not other[1] else other for other in pair if other not in nodes}
-            touched.setdefault(root(node), set()).update(ground)
-    return {k for k, nodes in enumerate(loose) if nodes and len(touched[root(nodes[0])]) <= 1}
-
-
-def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str], str]) -> str:
-    """Return the first buses of a section, and the nodes that it has of the first."""
-    nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
-    buses = list(dict.fromkeys(bus for bus, _ in nodes))
-    first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
-    return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN_NAMES)} (first {first})"
-
-
-def refuse_unsolvable(
+def checked(
     path: Path, feeder: Feeder, problems: list[str], remedy: str, name_node: Callable[[str], str] = number_of
-) -> None:
-    """Raise a FeederError if an import has problems, or if its feeder has nodes without a determined voltage.
+) -> Feeder:
+    """Return an imported feeder without what nothing can feed; FeederError if it has problems.
 
-    `remedy` says what to do where nothing determines a voltage to ground; `name_node` names a node by its letter as the
-    imported program does.
+    Left out, with a note each, are sections without a path to the source with all switches closed, and loads at a node
+    to which nothing else leads: nothing flows there, so that the rest is what it was. If they have most of the load,
+    they are problems. `remedy` says what to do where nothing determines a voltage to ground; `name_node` names a node
+    by its letter as the imported program does.
     """
-    _report_unconnected(feeder, problems, name_node)
-    refuse_if(path, problems, feeder.places)
-    _report_undetermined(path, feeder, problems, remedy)
-    refuse_if(path, problems, feeder.places)
-
-
-def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable[[str], str]) -> None:
-    """Add a problem for each node that loads alone lead to, and each section without the source, switches closed."""
-    supported = _nodes_of_elements(feeder)
+    if not problems:
+        feeder = _without_unfed(feeder, name_node)
+    supported, sections = _supported(feeder), _unfed_sections(feeder)
     alone: dict[tuple[str, str], set[str]] = {}
     for part in feeder.load_parts:
         for letter in part.ends:
@@ -235,89 +141,149 @@ def _report_unconnected(feeder: Feeder, problems: list[str], name_node: Callable
             f"{name}: node {which} of bus {bus} is connected to nothing but loads: a "
             "phase that does not come there, or an open neutral; connect or ground it"
         )
-    for section in _unfed_sections(feeder):
+    for section in sections:
         problems.append(
             f"{_named(feeder, section & supported, name_node)}: no path to the source, even with all switches closed; "
             "connect or leave out what is there"
         )
-
-
-def _report_undetermined(path: Path, feeder: Feeder, problems: list[str], remedy: str) -> None:
-    """Add a problem for each bus whose voltage to ground nothing determines: without load it is beyond all bounds."""
+    refuse_if(path, problems, feeder.places)
     from gridpeers.plant.network import Network  # a process that only reads loads no compiler of the plant's steps
 
     try:
         network = Network(feeder)
     except RuntimeError:  # of the factorisation
         problems.append(f"{path.name}: nothing determines some bus's voltage to ground; {remedy}")
-        return
-    far = np.flatnonzero(np.abs(network.nominal) > BEYOND * network.V_nom)
-    for bus in dict.fromkeys(network.nodes[i][0] for i in far):
-        problems.append(f"bus {bus}: nothing determines its voltage to ground; {remedy}")
+    else:  # without load, such a voltage is beyond all bounds
+        far = np.flatnonzero(np.abs(network.nominal) > BEYOND * network.V_nom)
+        buses = dict.fromkeys(network.nodes[i][0] for i in far)
+        problems += [f"bus {bus}: nothing determines its voltage to ground; {remedy}" for bus in buses]
+    refuse_if(path, problems, feeder.places)
+    return feeder
 
 
-SHOWN = 8
-"""How many buses the note names."""
+def _without_unfed(feeder: Feeder, name_node: Callable[[str], str]) -> Feeder:
+    """Return a feeder without its unfed sections and idle loads, unless these have most of the load."""
+    supported, sections = _supported(feeder), _unfed_sections(feeder)
+    gone = frozenset[Node]().union(*sections)
+    idle = _idle_parts(feeder, supported)
+    parts = [part for part in feeder.load_parts if part in idle or (part.bus, part.ends[0]) in gone]
+    unserved = sum(part.S.real for part in parts)
+    if not (gone or parts) or unserved > MOST_UNFED * sum(part.S.real for part in feeder.load_parts):
+        return feeder
+    notes = list(feeder.notes)
+    for section in sections:
+        load = sum(part.S.real for part in parts if (part.bus, part.ends[0]) in section)
+        with_load = f", with {load / 1e3:.3g} kW of load" if load else ""
+        notes.append(f"{_named(feeder, section, name_node)}: no path to the source; left out{with_load}")
+    if names := list(dict.fromkeys(part.name for part in idle)):
+        notes.append(f"{first_of(names, SHOWN_NAMES)}: at a node to which nothing else leads; left out")
+    kept = tuple(part for part in feeder.load_parts if part not in parts)
+    used = supported | {(part.bus, letter) for part in kept for letter in part.ends}
+    used |= {(bus, letter) for row in feeder.switches for bus in (row.from_bus, row.to_bus) for letter in row.phases}
+    replace = msgspec.structs.replace
+    buses = [
+        replace(bus, phases="".join(p for p in bus.phases if (bus.name, p) in used - gone)) for bus in feeder.buses
+    ]
+    switches = [
+        replace(row, phases="".join(p for p in row.phases if (row.from_bus, p) not in gone)) for row in feeder.switches
+    ]
+    return replace(
+        feeder,
+        buses=tuple(bus for bus in buses if bus.phases),
+        switches=tuple(row for row in switches if row.phases),
+        elements=tuple(row for row in feeder.elements if not set(row.nodes) & gone),
+        load_parts=kept,
+        notes=tuple(notes),
+    )
+
+
+def _supported(feeder: Feeder) -> set[Node]:
+    """Return the nodes to which an element or the source leads, and not loads alone."""
+    assert feeder.source is not None
+    nodes = {node for row in feeder.elements for node, values in zip(row.nodes, row.Y, strict=True) if any(values)}
+    return nodes | {(feeder.source.bus, letter) for letter in PHASES}
+
+
+def _unfed_sections(feeder: Feeder) -> list[frozenset[Node]]:
+    """Return the sections that have no path to the source, not even through loads, with all switches closed."""
+    assert feeder.source is not None
+    through_loads = [
+        ((part.bus, one), (part.bus, other)) for part in feeder.load_parts for one, other in [part.ends] if other
+    ]
+    source, supported = feeder.source.bus, _supported(feeder)
+    parts = Connectivity(feeder).parts(whole=[source], tied=through_loads)
+    return by_bus(part for part in parts if (source, "A") not in part and part & supported)
+
+
+def _idle_parts(feeder: Feeder, supported: Collection[Node]) -> list[LoadPart]:
+    """Return the load parts through which no current can flow.
+
+    Nodes that only loads lead to, and their loads, form groups; a group that touches one other node, or ground alone,
+    has no second way for a current.
+    """
+    ends = [[(part.bus, letter) if letter else ("", "") for letter in part.ends] for part in feeder.load_parts]
+    loose = dict.fromkeys(node for pair in ends for node in pair if node[1] and node not in supported)
+    groups = connected(loose, [(one, other) for one, other in ends if one in loose and other in loose])
+    group_of = {node: group for group in groups for node in group}
+    touched: dict[frozenset[Node], set[Node]] = {group: set() for group in groups}
+    for one, other in ends:
+        for node, opposite in ((one, other), (other, one)):
+            if node in loose and opposite not in loose:
+                touched[group_of[node]].add(opposite)
+    return [
+        part
+        for part, pair in zip(feeder.load_parts, ends, strict=True)
+        if any(node in loose and len(touched[group_of[node]]) <= 1 for node in pair)
+    ]
+
+
+def _named(feeder: Feeder, section: Collection[Node], name_node: Callable[[str], str]) -> str:
+    """Return the first buses of a section, and the nodes that it has of the first."""
+    nodes = [(bus.name, letter) for bus in feeder.buses for letter in bus.phases if (bus.name, letter) in section]
+    buses = list(dict.fromkeys(bus for bus, _ in nodes))
+    first = ", ".join(f"{bus}.{name_node(letter)}" for bus, letter in nodes if bus == buses[0])
+    return f"bus{'es' if len(buses) > 1 else ''} {first_of(buses, SHOWN_NAMES)} (first {first})"
 
 
 def with_plain_names(feeder: Feeder, added: Mapping[str, str]) -> Feeder:
-    """Return a feeder in which "_" stands for what a name cannot have; its notes name the buses.
+    """Return a feeder in which "_" stands for what a bus's name cannot have; its notes name these buses.
 
-    A bus has no blanks and no "~", and no name has characters that cannot be printed. Where two buses would have the
-    same name, the later one ends with "_2". `added` has the buses that the import has added, and the bus before each.
+    That is blanks, "~", and characters that cannot be printed. Where two buses would have the same name, the later one
+    ends with "_2". `added` has the buses that the import has added, and the bus before each.
     """
-    before = dict.fromkeys([*(bus.name for bus in feeder.buses if bus.name not in added), *added.values()])
-    buses = _distinct(before, _plain_bus)
-    renamed = [f'"{old}" is {new}' for old, new in buses.items() if old != new]
+    names = dict.fromkeys([*(bus.name for bus in feeder.buses if bus.name not in added), *added.values()])
+    buses = {name: name for name in names if _plain(name) == name}
+    for name in names:
+        if name not in buses:
+            new, number = _plain(name), 2
+            while new in buses.values():
+                new, number = f"{_plain(name)}_{number}", number + 1
+            buses[name] = new
+    renamed = [f'"{old}" is {buses[old]}' for old in names if old != buses[old]]
     for name, like in added.items():
-        buses[name] = bus_behind(buses[like], _plain_bus(name.removeprefix(bus_behind(like, ""))))
-    elements = _distinct([*(row.name for row in feeder.elements), *(part.name for part in feeder.load_parts)], _plain)
-    aliases = _distinct([row.alias for row in feeder.switches], _plain)
-    if not renamed and all(old == new for names in (buses, elements, aliases) for old, new in names.items()):
+        buses[name] = bus_behind(buses[like], _plain(name.removeprefix(bus_behind(like, ""))))
+    if all(old == new for old, new in buses.items()):
         return feeder
     replace = msgspec.structs.replace
-    note = f"buses have other names here, without blanks: {first_of(renamed, SHOWN)}"
+    note = f"buses have other names here, without blanks: {first_of(renamed, SHOWN_BUSES)}"
     ends = [(buses[row.from_bus], buses[row.to_bus]) for row in feeder.switches]
+    places = {f"bus {old}": f"bus {new}" for old, new in buses.items()}
     return replace(
         feeder,
         buses=tuple(replace(bus, name=buses[bus.name]) for bus in feeder.buses),
         elements=tuple(
-            replace(row, name=elements[row.name], nodes=tuple((buses[bus], letter) for bus, letter in row.nodes))
-            for row in feeder.elements
+            replace(row, nodes=tuple((buses[bus], letter) for bus, letter in row.nodes)) for row in feeder.elements
         ),
-        load_parts=tuple(replace(part, name=elements[part.name], bus=buses[part.bus]) for part in feeder.load_parts),
+        load_parts=tuple(replace(part, bus=buses[part.bus]) for part in feeder.load_parts),
         switches=tuple(
-            replace(row, name=f"{one}-{other}", alias=aliases[row.alias], from_bus=one, to_bus=other)
+            replace(row, name=f"{one}-{other}", from_bus=one, to_bus=other)
             for row, (one, other) in zip(feeder.switches, ends, strict=True)
         ),
         source=feeder.source and replace(feeder.source, bus=buses[feeder.source.bus]),
         notes=(*feeder.notes, *([note] if renamed else [])),
-        places={
-            f"bus {buses[name.removeprefix('bus ')]}"
-            if name.removeprefix("bus ") in buses
-            else elements.get(name, name): place
-            for name, place in feeder.places.items()
-        },
+        places={places.get(name, name): place for name, place in feeder.places.items()},
     )
 
 
-def _distinct(names: Collection[str], plain: Callable[[str], str]) -> dict[str, str]:
-    """Return a plain name for each name, the same for no two."""
-    found = {name: name for name in names if plain(name) == name}
-    taken = set(found)
-    for name in names:
-        if name not in found:
-            new, number = plain(name), 2
-            while new in taken:
-                new, number = f"{plain(name)}_{number}", number + 1
-            taken.add(new)
-            found[name] = new
-    return found
-
-
 def _plain(name: str) -> str:
-    return "".join(letter if letter.isprintable() else "_" for letter in name)
-
-
-def _plain_bus(name: str) -> str:
-    return "".join("_" if letter.isspace() or letter == BEHIND else letter for letter in _plain(name))
+    return "".join(letter if letter.isprintable() and letter not in {" ", BEHIND} else "_" for letter in name)

@@ -6,10 +6,10 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from gridpeers.bridges.gridlabd.glm import START, read_table, write_glm
+from gridpeers.bridges.gridlabd.glm import START, read_tables, write_glm
 from gridpeers.bridges.gridlabd.glm_network import TableRow, network_blocks
 from gridpeers.bridges.gridlabd.gridlabd_simulator import beyond_gridlabd, unrepresentable
-from gridpeers.plant.equipment import Feeder, Regulator
+from gridpeers.plant.equipment import Feeder
 from gridpeers.plant.feeder import Plant
 from gridpeers.plant.network import Network
 from gridpeers.plant.plant_config import PlantSettings
@@ -47,34 +47,27 @@ def export_glm(feeder: Feeder, settings: PlantSettings, seconds: int, voltages: 
         folder = Path(name)
         write_tables(feeder, folder)
         if feeder.inverters:
-            text = _in_delta_mode(feeder, settings, seconds, folder)
+            parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
+            plant = Plant(Network(feeder), settings, settings.h, settings.h)
+            start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
+            text = write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
         else:
-            table = {path.stem: read_table(path) for path in sorted(folder.glob("*.csv"))}
             V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
-            text = "\n".join((POWER_FLOW_HEADER, *network_blocks(table, feeder.load_set, V_nom, ())))
+            text = "\n".join((POWER_FLOW_HEADER, *network_blocks(read_tables(folder), feeder.load_set, V_nom, ())))
     head = f"// {feeder.name}, load set {feeder.load_set}, by gridpeers. Bus 13 is node n13.\n"
     return f'{head}{text}\nobject voltdump {{\n\tfilename "{voltages}";\n\tmode RECT;\n}}\n'
 
 
 def write_tables(feeder: Feeder, folder: Path) -> None:
-    """Write the tables of a feeder, with its regulators' ratios as whole taps, for `write_glm`."""
+    """Write the tables of a feeder, for `write_glm`.
+
+    Regulators have whole taps: of the usual step, or one tap of a step of their own.
+    """
     write_feeder(feeder, folder)
-    _write_regulators(feeder.regulators, folder)
-
-
-def _in_delta_mode(feeder: Feeder, settings: PlantSettings, seconds: int, folder: Path) -> str:
-    parameters = {row.name: feeder.parameters_of(row, settings.gfm, settings.gfl) for row in feeder.inverters}
-    plant = Plant(Network(feeder), settings, settings.h, settings.h)
-    start = {name: complex(reading.P, reading.Q) for name, reading in plant.measure().items()}
-    return write_glm(folder, feeder.load_set, start, parameters, settings.h, seconds)
-
-
-def _write_regulators(regulators: tuple[Regulator, ...], folder: Path) -> None:
-    """Write the regulators with whole taps: of the usual step, or one tap of a step of their own."""
-    if not regulators:
+    if not feeder.regulators:
         return
     rows: list[TableRow] = []
-    for each in regulators:
+    for each in feeder.regulators:
         tap, step = (each.ratio - 1.0) / TAP_STEP, TAP_STEP
         if abs(tap - round(tap)) > 1e-9 or abs(tap) > 16:
             tap, step = (1, each.ratio - 1.0) if each.ratio > 1.0 else (-1, 1.0 - each.ratio)

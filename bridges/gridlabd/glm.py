@@ -1,14 +1,9 @@
-"""Write a feeder of `plant/data` as a GridLAB-D model (GLM).
-
-This file and its two helpers read the tables by themselves and share no code with `gridpeers.plant.tables` and
-`gridpeers.plant.network`, so that a problem there shows as a difference. Only the inverters' parameters come as
-`gridpeers.plant.plant_config` has them.
-"""
+"""A feeder of our tables as a GridLAB-D model (GLM) that steps its inverters in delta mode."""
 
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from math import pi, sqrt
 from pathlib import Path
 
@@ -19,28 +14,14 @@ from gridpeers.plant.equipment.inverter_parameters import GflParameters, GfmPara
 def node_of(bus: str, phases: str) -> str:
     """Return the node of an inverter: that of its bus, or one of its own at a single phase (empty phases are all).
 
-    Examples
-    --------
     >>> node_of("13", ""), node_of("13", "B")
     ('n13', 'n13_B')
     """
     return f"n{bus}" if phases in ("", "ABC") else f"n{bus}_{phases}"
 
 
-def node_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
-    """Return the nodes of single-phase inverters, from the buses' nominal voltages (V).
-
-    An inverter of GridLAB-D has the phases of its node, so it gets a child of its bus with its own phase alone.
-    """
-    return [
-        block("node", name=node, parent=bus, phases=f"{row['phases']}N", nominal_voltage=V_nom[row["bus"]])
-        for row in rows
-        if (node := node_of(row["bus"], row.get("phases", ""))) != (bus := f"n{row['bus']}")
-    ]
-
-
 def inverter_blocks(
-    rows: Iterable[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
+    rows: Sequence[TableRow], start: Mapping[str, complex], parameters: Mapping[str, InverterParameters]
 ) -> list[str]:
     """Return the objects of inverters, with the powers (VA) that they deliver at the start."""
     blocks = []
@@ -151,24 +132,27 @@ def write_glm(
     Node `n13` is bus 13, `s13-152` the switch between 13 and 152; inverters keep their names. `start` has the power
     (VA) of each at the start; `h` is the step (s), `seconds` the length of the run.
     """
-    table = {path.stem: read_table(path) for path in sorted(folder.glob("*.csv"))}
+    table = read_tables(folder)
     V_nom = {row["bus"]: float(row["V_nom_kV_LL"]) * 1e3 / sqrt(3) for row in table["buses"]}
     inverters = [row for row in table["inverters"] if row.get("spare") != "yes"]
     leaders = {row["bus"] for row in inverters if row["kind"] == "GFM" and row.get("phases", "") in ("", "ABC")}
-    return "\n".join(
-        (
-            _header(h, seconds, table["buses"][0]["bus"]),
-            *network_blocks(table, load_set, V_nom, leaders),
-            *node_blocks(inverters, V_nom),
-            *inverter_blocks(inverters, start, parameters),
-        )
-    )
+    nodes = [  # an inverter of GridLAB-D has the phases of its node: a single-phase one gets a child of its bus
+        block("node", name=node, parent=bus, phases=f"{row['phases']}N", nominal_voltage=V_nom[row["bus"]])
+        for row in inverters
+        if (node := node_of(row["bus"], row.get("phases", ""))) != (bus := f"n{row['bus']}")
+    ]
+    network = network_blocks(table, load_set, V_nom, leaders)
+    head = _header(h, seconds, table["buses"][0]["bus"])
+    return "\n".join((head, *network, *nodes, *inverter_blocks(inverters, start, parameters)))
 
 
-def read_table(path: Path) -> list[dict[str, str]]:
-    """Return the rows of a table."""
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+def read_tables(folder: Path) -> dict[str, list[dict[str, str]]]:
+    """Return the rows of each table of a folder, by the file's name without its end."""
+    found = {}
+    for path in sorted(folder.glob("*.csv")):
+        with path.open(newline="", encoding="utf-8") as file:
+            found[path.stem] = list(csv.DictReader(file))
+    return found
 
 
 def _header(h: float, seconds: int, bus: str) -> str:
@@ -178,8 +162,8 @@ def _header(h: float, seconds: int, bus: str) -> str:
     islands anew when a switch has moved. The recorder of any bus, into nowhere, keeps the clock going: without anything
     that wants to be called again GridLAB-D stops at once.
     """
-    step = round(h * 1e9)
-    year, month = START[:4], START[5:7]
+    step, stop = round(h * 1e9), seconds + 2
+    clock = f"{stop // 3600:02d}:{stop // 60 % 60:02d}:{stop % 60:02d}"
     return f"""#set show_progress=false
 #set deltamode_forced_always=true
 #set deltamode_timestep={step}
@@ -188,7 +172,7 @@ def _header(h: float, seconds: int, bus: str) -> str:
 clock {{
 	timezone UTC0;
 	starttime '{START}';
-	stoptime '{year}-{month}-01 {_clock(seconds + 2)}';
+	stoptime '{START[:10]} {clock}';
 }}
 module tape;
 module powerflow {{
@@ -224,14 +208,3 @@ object recorder {{
 	interval 1;
 	file "/dev/null";
 }}"""
-
-
-def _clock(seconds: int) -> str:
-    """Return the time of day after midnight.
-
-    Examples
-    --------
-    >>> _clock(3725)
-    '01:02:05'
-    """
-    return f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"

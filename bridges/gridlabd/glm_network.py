@@ -1,4 +1,8 @@
-"""A feeder's network as GridLAB-D objects: nodes, lines, switches, regulators, loads and capacitors."""
+"""A feeder's network as GridLAB-D objects, from rows of its tables: nodes, lines, switches, regulators, loads.
+
+This file and `glm` read the tables by themselves and share no code with `gridpeers.plant.tables` and
+`gridpeers.plant.network`, so that a problem there shows as a difference.
+"""
 
 from __future__ import annotations
 
@@ -9,31 +13,27 @@ from math import pi, sqrt
 TableRow = Mapping[str, str]
 """A row of a table, by its columns."""
 
-
-def block(kind: str, **properties: str | int | float | complex) -> str:
-    """Write an object; names end in an underscore where Python has a keyword."""
-    lines = [
-        f"\t{name.removesuffix('_')} {value if isinstance(value, str) else _number(value)};"
-        for name, value in properties.items()
-    ]
-    return "\n".join((f"object {kind} {{", *lines, "}"))
-
-
-def _number(value: complex | float) -> str:
-    """Write a number so that reading gives the same bits."""
-    if isinstance(value, complex):
-        return f"{value.real!r}{value.imag:+.17g}j"
-    return repr(value)
-
-
 F_NOM = 60.0
 """Nominal frequency (Hz)."""
 
-FOOT, MILE = 0.3048e-3, 1.609344
-"""Length (km): GridLAB-D takes lines in feet and impedances per mile."""
+FOOT, MILE, FEET_PER_MILE = 0.3048e-3, 1.609344, 5280.0
+"""Lengths (km): GridLAB-D takes lines in feet and impedances per mile."""
 
 NOMINAL_ANGLE = {"A": 0.0, "B": -2 * pi / 3, "C": 2 * pi / 3, "AB": pi / 6, "BC": -pi / 2, "CA": 5 * pi / 6}
 """Of a load branch (rad): phase to ground, or phase to phase."""
+
+Z_SWITCH, R_REGULATOR = complex(2**-10, 2**-10), 2**-10
+"""Impedance of each phase of a closed switch and of a regulator (ohm): powers of two, so that it cancels to the bit."""
+
+
+def block(kind: str, **properties: str | int | float | complex) -> str:
+    """Write an object; names end in an underscore where Python has a keyword. Reading a number gives the same bits."""
+    lines = []
+    for name, value in properties.items():
+        if isinstance(value, complex):
+            value = f"{value.real!r}{value.imag:+.17g}j"
+        lines.append(f"\t{name.removesuffix('_')} {value if isinstance(value, str) else repr(value)};")
+    return "\n".join((f"object {kind} {{", *lines, "}"))
 
 
 def network_blocks(
@@ -52,9 +52,9 @@ def network_blocks(
     return [
         *_buses(table["buses"], V_nom, table["source"][0], leaders),
         *_lines(table["lines"], table["line_configs"]),
-        *(compensations() if ideal else ()),
-        *switch_blocks(table.get("switches", ()), V_nom, ideal=ideal),
-        *regulator_blocks(table.get("regulators", ()), V_nom, ideal=ideal),
+        *(_compensations() if ideal else ()),
+        *_switches(table.get("switches", ()), V_nom, ideal=ideal),
+        *_regulators(table.get("regulators", ()), V_nom, ideal=ideal),
         *_transformers(table.get("transformers", ()), V_nom),
         *_loads(table[f"loads_{load_set}"], V_nom),
         *_capacitors(table.get("capacitors", ()), V_nom),
@@ -64,17 +64,15 @@ def network_blocks(
 def _buses(
     rows: Iterable[TableRow], V_nom: Mapping[str, float], source: TableRow, leaders: Collection[str]
 ) -> list[str]:
-    """Nodes; only a SWING, or a SWING_PQ where there is none, lets GridLAB-D keep an island alive."""
+    """Only a SWING, or a SWING_PQ where there is none, lets GridLAB-D keep an island alive."""
     blocks = []
     for row in rows:
         name, V = row["bus"], V_nom[row["bus"]]
-        swing: dict[str, str | complex] = {}
+        swing: dict[str, str | complex] = {"bustype": "SWING_PQ"} if name in leaders else {}
         if name == source["bus"]:
             turned = cmath.rect(float(source["V_pu"]) * V, float(source["angle_deg"]) * pi / 180)
             swing = {f"voltage_{phase}": turned * cmath.rect(1.0, NOMINAL_ANGLE[phase]) for phase in "ABC"}
             swing["bustype"] = "SWING"
-        elif name in leaders:
-            swing["bustype"] = "SWING_PQ"
         blocks.append(block("node", name=f"n{name}", phases=row["phases"] + "N", nominal_voltage=V, **swing))
     return blocks
 
@@ -90,111 +88,22 @@ def _lines(rows: Iterable[TableRow], configs: Iterable[TableRow]) -> list[str]:
         kind |= {f"z{i}{j}": per_mile, f"z{j}{i}": per_mile, f"c{i}{j}": nF, f"c{j}{i}": nF}
     blocks = [block("line_configuration", name=f"c{config}", **kind) for config, kind in kinds.items()]
     for row in rows:
-        blocks.append(
-            block(
-                "overhead_line",
-                name=f"l{row['line']}",
-                from_=f"n{row['from_bus']}",
-                to=f"n{row['to_bus']}",
-                phases=row["phases"] + "N",
-                length=float(row["length_m"]) / 1e3 / FOOT,
-                configuration=f"c{row['config']}",
-            )
-        )
+        start, end, feet = f"n{row['from_bus']}", f"n{row['to_bus']}", float(row["length_m"]) / 1e3 / FOOT
+        blocks.append(_line(f"l{row['line']}", start, end, row["phases"] + "N", feet, f"c{row['config']}"))
     return blocks
 
 
-def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
-    """Three-phase transformers of equal connections on both sides, at the nominal voltages of their buses."""
-    kinds = {"D-D": ("DELTA_DELTA", "ABCD"), "Yg-Yg": ("WYE_WYE", "ABCN")}
-    blocks = []
-    for row in rows:
-        connection, phases = kinds[row["connection"]]
-        name, start, end = (row[key] for key in ("transformer", "from_bus", "to_bus"))
-        blocks.append(
-            block(
-                "transformer_configuration",
-                name=f"ct{name}",
-                connect_type=connection,
-                power_rating=float(row["S_rated_kVA"]),
-                primary_voltage=V_nom[start] * sqrt(3),
-                secondary_voltage=V_nom[end] * sqrt(3),
-                impedance=complex(float(row["R_percent"]), float(row["X_percent"])) / 100,
-            )
-        )
-        blocks.append(
-            block(
-                "transformer",
-                name=f"t{name}",
-                from_=f"n{start}",
-                to=f"n{end}",
-                phases=phases,
-                configuration=f"ct{name}",
-            )
-        )
-    return blocks
+def _line(name: str, start: str, end: str, phases: str, feet: float, config: str) -> str:
+    return block("overhead_line", name=name, from_=start, to=end, phases=phases, length=feet, configuration=config)
 
 
-def _loads(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
-    """Spot loads, each at a load object of its own below its bus."""
-    blocks = []
-    for number, row in enumerate(rows):
-        ends = ("AB", "BC", "CA") if row["connection"] == "D" else ("A", "B", "C")
-        V = V_nom[row["bus"]] * (sqrt(3) if row["connection"] == "D" else 1.0)
-        values: dict[str, complex] = {}
-        for end, letter in zip(ends, "abc", strict=True):
-            S = complex(float(row[f"P_{letter}_kW"]), float(row[f"Q_{letter}_kvar"])) * 1e3
-            if not S:
-                continue
-            if row["model"] == "P":
-                values[f"constant_power_{end}"] = S
-            elif row["model"] == "I":
-                values[f"constant_current_{end}"] = (S / cmath.rect(V, NOMINAL_ANGLE[end])).conjugate()
-            else:
-                values[f"constant_impedance_{end}"] = V**2 / S.conjugate()
-        phases = "".join(sorted({phase for name in values for phase in name.rpartition("_")[2]}))
-        blocks.append(_load(f"load{number}", row["bus"], V_nom, phases, values))
-    return blocks
-
-
-def _capacitors(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
-    """Capacitor banks, as the constant impedances that they are."""
-    blocks = []
-    for number, row in enumerate(rows):
-        V = float(row["V_rated_kV_LN"]) * 1e3
-        Q = {phase: float(row[f"Q_{phase.lower()}_kvar"]) * 1e3 for phase in "ABC"}
-        Z = {f"constant_impedance_{phase}": complex(0.0, -(V**2) / var) for phase, var in Q.items() if var}
-        phases = "".join(name[-1] for name in Z)
-        blocks.append(_load(f"bank{number}", row["bus"], V_nom, phases, Z))
-    return blocks
-
-
-def _load(name: str, bus: str, V_nom: Mapping[str, float], phases: str, values: Mapping[str, complex]) -> str:
-    """One load object at a bus: its phases, and its powers, currents or impedances by GridLAB-D's names."""
-    return block(
-        "load", name=f"{name}_{bus}", parent=f"n{bus}", phases=phases + "N", nominal_voltage=V_nom[bus], **values
-    )
-
-
-FEET_PER_MILE = 5280.0
-
-Z_SWITCH, R_REGULATOR = complex(2**-10, 2**-10), 2**-10
-"""Impedance of each phase of a closed switch and of a regulator (ohm): powers of two, so that it cancels to the bit."""
-
-
-def compensations() -> list[str]:
+def _compensations() -> list[str]:
     """Two kinds of line, which have the negative impedance of each phase of a switch and of a regulator per mile."""
-    return [
-        "// switches and regulators are ideal: behind each, a line has the negative of its impedance",
-        *(
-            block(
-                "line_configuration",
-                name=f"minus_{device}",
-                **{f"z{i}{j}": -Z if i == j else 0j for i in (1, 2, 3) for j in (1, 2, 3)},
-            )
-            for device, Z in (("switch", Z_SWITCH), ("regulator", complex(R_REGULATOR)))
-        ),
-    ]
+    found = ["// switches and regulators are ideal: behind each, a line has the negative of its impedance"]
+    for device, Z in (("switch", Z_SWITCH), ("regulator", complex(R_REGULATOR))):
+        rows = {f"z{i}{j}": -Z if i == j else 0j for i in (1, 2, 3) for j in (1, 2, 3)}
+        found.append(block("line_configuration", name=f"minus_{device}", **rows))
+    return found
 
 
 def _made_ideal(device: str, name: str, end: str, phases: str, V_nom: float) -> list[str]:
@@ -207,20 +116,11 @@ def _made_ideal(device: str, name: str, end: str, phases: str, V_nom: float) -> 
     """
     return [
         block("node", name=f"m{name}", phases=phases, nominal_voltage=V_nom),
-        block(
-            "overhead_line",
-            name=f"z{name}",
-            from_=f"m{name}",
-            to=f"n{end}",
-            phases=phases,
-            length=FEET_PER_MILE,
-            configuration=f"minus_{device}",
-        ),
+        _line(f"z{name}", f"m{name}", f"n{end}", phases, FEET_PER_MILE, f"minus_{device}"),
     ]
 
 
-def switch_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, ideal: bool) -> list[str]:
-    """Return the switches of a feeder, ideal or with GridLAB-D's default impedance."""
+def _switches(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, ideal: bool) -> list[str]:
     blocks = []
     Z = {"switch_resistance": Z_SWITCH.real, "switch_reactance": Z_SWITCH.imag} if ideal else {}
     for row in rows:
@@ -243,7 +143,7 @@ def switch_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, ideal
     return blocks
 
 
-def regulator_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, ideal: bool) -> list[str]:
+def _regulators(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, ideal: bool) -> list[str]:
     """Regulators at fixed taps, GridLAB-D's type A: V_to = (1 + tap tap_step) V_from."""
     R = {"regulator_resistance": R_REGULATOR} if ideal else {}
     taps: dict[tuple[str, str, str, float], dict[str, int]] = {}
@@ -252,6 +152,8 @@ def regulator_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, id
         taps.setdefault(key, {}).update(dict.fromkeys(row["phases"], int(row["tap"])))
     blocks = []
     for (name, start, end, step), tap in taps.items():
+        phases, behind = "".join(sorted(tap)) + "N", f"m{name}" if ideal else f"n{end}"
+        positions = {f"tap_pos_{phase}": at for phase, at in tap.items()}
         blocks.append(
             block(
                 "regulator_configuration",
@@ -262,21 +164,70 @@ def regulator_blocks(rows: Iterable[TableRow], V_nom: Mapping[str, float], *, id
                 raise_taps=16,
                 lower_taps=16,
                 regulation=16 * step,
-                **{f"tap_pos_{phase}": at for phase, at in tap.items()},
+                **positions,
             )
         )
-        phases = "".join(sorted(tap)) + "N"
-        blocks.append(
-            block(
-                "regulator",
-                name=name,
-                from_=f"n{start}",
-                to=f"m{name}" if ideal else f"n{end}",
-                phases=phases,
-                configuration=f"c{name}",
-                **R,
-            )
-        )
+        ends = {"from_": f"n{start}", "to": behind}
+        blocks.append(block("regulator", name=name, **ends, phases=phases, configuration=f"c{name}", **R))
         if ideal:
             blocks += _made_ideal("regulator", name, end, phases, V_nom[end])
     return blocks
+
+
+def _transformers(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Three-phase transformers of equal connections on both sides, at the nominal voltages of their buses."""
+    kinds = {"D-D": ("DELTA_DELTA", "ABCD"), "Yg-Yg": ("WYE_WYE", "ABCN")}
+    blocks = []
+    for row in rows:
+        connection, phases = kinds[row["connection"]]
+        name, start, end = (row[key] for key in ("transformer", "from_bus", "to_bus"))
+        blocks.append(
+            block(
+                "transformer_configuration",
+                name=f"ct{name}",
+                connect_type=connection,
+                power_rating=float(row["S_rated_kVA"]),
+                primary_voltage=V_nom[start] * sqrt(3),
+                secondary_voltage=V_nom[end] * sqrt(3),
+                impedance=complex(float(row["R_percent"]), float(row["X_percent"])) / 100,
+            )
+        )
+        ends = {"from_": f"n{start}", "to": f"n{end}"}
+        blocks.append(block("transformer", name=f"t{name}", **ends, phases=phases, configuration=f"ct{name}"))
+    return blocks
+
+
+def _loads(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Spot loads, each at a load object of its own below its bus."""
+    blocks = []
+    for number, row in enumerate(rows):
+        ends = ("AB", "BC", "CA") if row["connection"] == "D" else ("A", "B", "C")
+        V = V_nom[row["bus"]] * (sqrt(3) if row["connection"] == "D" else 1.0)
+        values: dict[str, complex] = {}
+        for end, letter in zip(ends, "abc", strict=True):
+            S = complex(float(row[f"P_{letter}_kW"]), float(row[f"Q_{letter}_kvar"])) * 1e3
+            if S and row["model"] == "P":
+                values[f"constant_power_{end}"] = S
+            elif S and row["model"] == "I":
+                values[f"constant_current_{end}"] = (S / cmath.rect(V, NOMINAL_ANGLE[end])).conjugate()
+            elif S:
+                values[f"constant_impedance_{end}"] = V**2 / S.conjugate()
+        blocks.append(_load(f"load{number}", row["bus"], V_nom, values))
+    return blocks
+
+
+def _capacitors(rows: Iterable[TableRow], V_nom: Mapping[str, float]) -> list[str]:
+    """Capacitor banks, as the constant impedances that they are."""
+    blocks = []
+    for number, row in enumerate(rows):
+        V = float(row["V_rated_kV_LN"]) * 1e3
+        Q = {phase: float(row[f"Q_{phase.lower()}_kvar"]) * 1e3 for phase in "ABC"}
+        Z = {f"constant_impedance_{phase}": complex(0.0, -(V**2) / var) for phase, var in Q.items() if var}
+        blocks.append(_load(f"bank{number}", row["bus"], V_nom, Z))
+    return blocks
+
+
+def _load(name: str, bus: str, V_nom: Mapping[str, float], values: Mapping[str, complex]) -> str:
+    """One load object at a bus, with its powers, currents or impedances by GridLAB-D's names."""
+    phases = "".join(sorted({phase for key in values for phase in key.rpartition("_")[2]})) + "N"
+    return block("load", name=f"{name}_{bus}", parent=f"n{bus}", phases=phases, nominal_voltage=V_nom[bus], **values)

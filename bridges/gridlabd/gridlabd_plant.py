@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gridpeers.bridges.gridlabd.delta_mode_process import DeltaModeProcess, GridlabdError
 from gridpeers.bridges.gridlabd.glm import write_glm
+from gridpeers.bridges.gridlabd.gridlabd_process import DeltaModeProcess, GridlabdError
 from gridpeers.plant.dynamics.switch_state import SwitchState
 from gridpeers.plant.equipment.inverter_parameters import GflParameters, InverterParameters
 from gridpeers.plant.feeder import Plant

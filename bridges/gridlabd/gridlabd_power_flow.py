@@ -1,10 +1,10 @@
 """GridLAB-D's own power flow of a model: a program for a process of its own, as GridLAB-D's state is global.
 
 It loads the model and solves the power flow by Newton's method at the model's first moment. Where regulators or
-capacitors have a control, GridLAB-D goes on until they rest. Then it writes what the solver holds, as one JSON object:
-buses, branches with their admittance matrices as the solver uses them, and the powers, currents and admittances that
-every node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its
-tables of the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
+capacitors have a control, GridLAB-D goes on until they rest. Then it writes what the solver holds, pickled: buses,
+branches with their admittance matrices as the solver uses them, and the powers, currents and admittances that every
+node, meter, load and capacitor takes itself. GridLAB-D publishes no admittances, so they are read from its tables of
+the solver, `NR_busdata` and `NR_branchdata`, whose layout is that of version 6.0.0.
 
 Usage: `python -m gridpeers.bridges.gridlabd.gridlabd_power_flow MODEL RESULT PARENT [first]`; `first`: not
 beyond the first moment.
@@ -13,12 +13,14 @@ beyond the first moment.
 from __future__ import annotations
 
 import ctypes
-import json
 import math
 import os
+import pickle
 import sys
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from gridpeers.bridges.gridlabd.delta_mode import GridlabdCore, NotImportableError, end_with, gridlabd_package
 from gridpeers.bridges.gridlabd.glm_text import CHILD_OF_BUS, WATCHING
@@ -132,13 +134,17 @@ class ModelCore(GridlabdCore):
         """Return a property that is a set of flags, or one of a list."""
         return ctypes.c_uint32.from_address(self._address(name, key)).value
 
+    def complex(self, name: str, key: str) -> complex:
+        """Return a complex property."""
+        return complex(*self.doubles(name, key, 2))
 
-def complexes(address: int | None, count: int) -> list[list[float]]:
-    """Return an array of GridLAB-D's complex numbers as pairs; no address is zeros."""
+
+def complexes(address: int | None, count: int) -> np.ndarray[Any, np.dtype[np.complex128]]:
+    """Return an array of GridLAB-D's complex numbers; no address is zeros."""
     if not address:
-        return [[0.0, 0.0]] * count
-    values = (_double * (STRIDE * count)).from_address(address)
-    return [[values[STRIDE * k], values[STRIDE * k + 1]] for k in range(count)]
+        return np.zeros(count, complex)
+    values = np.array((_double * (STRIDE * count)).from_address(address)).reshape(count, STRIDE)
+    return values[:, 0] + 1j * values[:, 1]
 
 
 TOLERANCE = "1e-10"
@@ -187,14 +193,12 @@ class PowerFlowModel:
 
     def solve(self) -> dict[str, Any]:
         """Solve the power flow at the model's first moment, or when its regulators and capacitors rest."""
-        result: dict[str, Any] = {
-            "objects": self._objects(),
-            "has_powerflow": self._gridlabd.get_global("powerflow::nominal_frequency") != "",
-        }
+        frequency = self._gridlabd.get_global("powerflow::nominal_frequency")
+        result: dict[str, Any] = {"objects": self._objects(), "has_powerflow": frequency != ""}
         if not result["has_powerflow"]:
             return result
         result["method"] = self._gridlabd.get_global("powerflow::solver_method")
-        result["f_nom"] = float(self._gridlabd.get_global("powerflow::nominal_frequency").split()[0])
+        result["f_nom"] = float(frequency.split()[0])
         for name, value in (
             ("powerflow::solver_method", "NR"),
             ("powerflow::NR_solver_algorithm", "TCIM"),
@@ -223,21 +227,55 @@ class PowerFlowModel:
             result["solved"] = self._gridlabd.run() == self._module.GLDErrorCode.SUCCESS
         if result["solved"]:
             result |= self._solver_tables()
-            result["takes"] = [self._takes(name, kind) for name, kind in self._classes.items() if kind in CHILD_OF_BUS]
+            result["takes"] = {name: self._takes(name) for name, kind in self._classes.items() if kind in CHILD_OF_BUS}
         return result
+
+    def _objects(self) -> list[dict[str, Any]]:
+        found = []
+        for name, kind in self._classes.items():
+            head = self._core.head(name)
+            parent = ObjectHead.from_address(head.parent).name.decode() if head.parent else ""
+            place = (head.longitude, head.latitude)
+            known = all(map(math.isfinite, place))
+            found.append({"name": name, "class": kind, "parent": parent, "place": place if known else (0.0, 0.0)})
+        return found
+
+    def _keep_quiet(self) -> None:
+        """Let nothing be written beside the model, nothing be asserted, no node be content with a coarser tolerance."""
+        for name, kind in self._classes.items():
+            for key in self._gridlabd.get_object_properties(name):
+                if key in WRITTEN and kind != "player":
+                    self._gridlabd.set_property(name, key, os.devnull)
+                elif key == "interval" and kind in WATCHING:  # each of their moments would be a step
+                    self._gridlabd.set_property(name, key, str(LONGEST_SETTLING))
+            if kind.endswith("assert"):
+                self._gridlabd.set_property(name, "status", "ASSERT_NONE")
+            if kind in CHILD_OF_BUS and self._core.has(name, "maximum_voltage_error"):
+                self._core.doubles(name, "maximum_voltage_error")[0] = 0.0
+
+    def _give_a_swing(self) -> None:
+        """Make the only bus to which no branch leads the substation, as it is one in a forward-backward sweep."""
+        buses = [name for name in self._classes if self._core.has(name, "bustype")]
+        if any(self._core.bits(name, "bustype") == SWING for name in buses):
+            return
+        branches = [name for name in self._classes if self._core.has(name, "from") and self._core.has(name, "to")]
+        first, last = ({self._core.object_of(name, key) for name in branches} for key in ("from", "to"))
+        if len(roots := first - last) == 1:
+            self._gridlabd.set_property(roots.pop(), "bustype", "SWING")
 
     def _controlled(self) -> list[str]:
         """Return the regulators and capacitors that a control of their own, or one of the model, may move."""
         found = [name for name, kind in self._classes.items() if kind in POSITIONS]
         if "volt_var_control" in self._classes.values():
             return found
-        return [name for name in found if self._control_of(name) not in ("MANUAL", "")]
 
-    def _control_of(self, name: str) -> str:
-        if self._classes[name] == "capacitor":
-            return str(self._gridlabd.get_object_properties(name)["control"])
-        configuration = self._core.object_of(name, "configuration")
-        return str(self._gridlabd.get_object_properties(configuration)["Control"]) if configuration else ""
+        def control_of(name: str) -> str:
+            if self._classes[name] == "capacitor":
+                return str(self._gridlabd.get_object_properties(name)["control"])
+            configuration = self._core.object_of(name, "configuration")
+            return str(self._gridlabd.get_object_properties(configuration)["Control"]) if configuration else ""
+
+        return [name for name in found if control_of(name) not in ("MANUAL", "")]
 
     def _settle(self, moved: list[str]) -> dict[str, Any]:
         """Go on until the positions have been the same for longer than any control waits, or for an hour.
@@ -271,120 +309,79 @@ class PowerFlowModel:
             found[name] = [str(own[f"{POSITIONS[self._classes[name]]}{phase}"]) for phase in WYE]
         return found
 
-    def _objects(self) -> list[dict[str, Any]]:
-        found = []
-        for name, kind in self._classes.items():
-            head = self._core.head(name)
-            parent = ObjectHead.from_address(head.parent).name.decode() if head.parent else ""
-            place = (head.longitude, head.latitude)
-            known = all(map(math.isfinite, place))
-            found.append({"name": name, "class": kind, "parent": parent, "place": place if known else None})
-        return found
-
-    def _keep_quiet(self) -> None:
-        """Let nothing be written beside the model, nothing be asserted, no node be content with a coarser tolerance."""
-        for name, kind in self._classes.items():
-            for key in self._gridlabd.get_object_properties(name):
-                if key in WRITTEN and kind != "player":
-                    self._gridlabd.set_property(name, key, os.devnull)
-                elif key == "interval" and kind in WATCHING:  # each of their moments would be a step
-                    self._gridlabd.set_property(name, key, str(LONGEST_SETTLING))
-            if kind.endswith("assert"):
-                self._gridlabd.set_property(name, "status", "ASSERT_NONE")
-            if kind in CHILD_OF_BUS and self._core.has(name, "maximum_voltage_error"):
-                self._core.doubles(name, "maximum_voltage_error")[0] = 0.0
-
-    def _give_a_swing(self) -> None:
-        """Make the only bus to which no branch leads the substation, as it is one in a forward-backward sweep."""
-        buses = [name for name in self._classes if self._core.has(name, "bustype")]
-        if any(self._core.bits(name, "bustype") == SWING for name in buses):
-            return
-        branches = [name for name in self._classes if self._core.has(name, "from") and self._core.has(name, "to")]
-        first, last = ({self._core.object_of(name, key) for name in branches} for key in ("from", "to"))
-        roots = first - last
-        if len(roots) == 1:
-            self._gridlabd.set_property(roots.pop(), "bustype", "SWING")
-
     def _solver_tables(self) -> dict[str, Any]:
-        package = Path(str(self._module.__file__)).parent
-        powerflow = ctypes.CDLL(str(package / "lib" / "powerflow.so"))
-        counts = [ctypes.c_uint.in_dll(powerflow, f"NR_{table}_count").value for table in ("bus", "branch")]
-        addresses = [ctypes.c_void_p.in_dll(powerflow, f"NR_{table}data").value for table in ("bus", "branch")]
-        buses = (SolverBus * counts[0]).from_address(addresses[0]) if addresses[0] else ()
-        branches = (SolverBranch * counts[1]).from_address(addresses[1]) if addresses[1] else ()
-        return {"buses": [self._bus(bus) for bus in buses], "branches": [self._branch(branch) for branch in branches]}
+        """Return `buses` and `branches`, whose ends are places of buses."""
+        powerflow = ctypes.CDLL(str(Path(str(self._module.__file__)).parent / "lib" / "powerflow.so"))
 
-    def _bus(self, bus: Any) -> dict[str, Any]:
-        name = bus.name.decode()
-        if self._core.find(bus.name) != bus.object:
-            raise RuntimeError("buses are not laid out as in GridLAB-D 6.0.0; install gridlabd==6.0.0")
-        return {
-            "name": name,
-            "class": self._classes[name],
-            "type": bus.type,
-            "phases": bus.original_phases | bus.phases,
-            "V_nom": bus.V_nom,
-            "V": complexes(bus.V, 3),
-        }
+        def table(name: str, row: type[ctypes.Structure]) -> Any:
+            count = ctypes.c_uint.in_dll(powerflow, f"NR_{name}_count").value
+            address = ctypes.c_void_p.in_dll(powerflow, f"NR_{name}data").value
+            return (row * count).from_address(address) if address else ()
 
-    def _branch(self, branch: Any) -> dict[str, Any]:
-        name = branch.name.decode()
-        kind = self._classes[name]
-        row = {
-            "name": name,
-            "class": kind,
-            "from": branch.from_,
-            "to": branch.to,
-            "phases": branch.original_phases | branch.phases,
-            "open": bool(branch.status) and ctypes.c_uint.from_address(branch.status).value == 0,
-        }
-        for key in ("Y_from", "Y_to", "YS_from", "YS_to"):
-            row[key] = complexes(getattr(branch, key), 9)
-        for key, count in (("switch_impedance", 2), ("fuse_resistance", 1)):
-            if self._core.has(name, key):
-                row["Z"] = (list(self._core.doubles(name, key, count)) * 2)[:2]
-        return row
+        buses, branches = [], []
+        for bus in table("bus", SolverBus):
+            if self._core.find(bus.name) != bus.object:
+                raise RuntimeError("buses are not laid out as in GridLAB-D 6.0.0; install gridlabd==6.0.0")
+            buses.append(
+                {
+                    "name": bus.name.decode(),
+                    "class": self._classes[bus.name.decode()],
+                    "type": bus.type,
+                    "phases": bus.original_phases | bus.phases,
+                    "V_nom": bus.V_nom,
+                    "V": complexes(bus.V, 3),
+                }
+            )
+        for branch in table("branch", SolverBranch):
+            name = branch.name.decode()
+            row = {
+                "name": name,
+                "class": self._classes[name],
+                "from": branch.from_,
+                "to": branch.to,
+                "phases": branch.original_phases | branch.phases,
+                "open": bool(branch.status) and ctypes.c_uint.from_address(branch.status).value == 0,
+            }
+            for key in ("Y_from", "Y_to", "YS_from", "YS_to"):
+                row[key] = complexes(getattr(branch, key), 9).reshape(3, 3)
+            if self._core.has(name, "switch_impedance"):
+                row["Z"] = self._core.complex(name, "switch_impedance")
+            elif self._core.has(name, "fuse_resistance"):  # the solver has the admittance (1 + j) / R
+                row["Z"] = self._core.doubles(name, "fuse_resistance")[0] / (1.0 + 1.0j)
+            branches.append(row)
+        return {"buses": buses, "branches": branches}
 
-    def _takes(self, name: str, kind: str) -> dict[str, Any]:
-        """Return the powers, currents and admittances of one object itself."""
-        delta = bool(self._core.bits(name, "phases") & PHASE_D)
-        takes: dict[str, dict[str, list[list[float]]]] = {}
+    def _takes(self, name: str) -> dict[tuple[str, str], complex]:
+        """Return the powers, currents and admittances of one object itself, by kind and branch."""
+        core, kind = self._core, self._classes[name]
+        delta = bool(core.bits(name, "phases") & PHASE_D)
+        if kind == "capacitor" and core.bits(name, "phases_connected") & PHASE_D and not delta:
+            # at a bus of the other connection, for which GridLAB-D makes up admittances to ground
+            V, connected = core.doubles(name, "cap_nominal_voltage")[0], core.bits(name, "phases_connected")
+            return {
+                ("Y", ends): 1j * core.doubles(name, f"capacitor_{phase}")[0] / V**2
+                for k, (ends, phase) in enumerate(zip(AROUND, WYE, strict=True))
+                if connected & (1, 2, 4)[k] and core.bits(name, f"switch{phase}")
+            }
+        found: dict[tuple[str, str], complex] = {}
         for letter, word in KINDS.items():
-            takes[letter] = {}
             if kind.startswith("triplex"):
-                _put(takes[letter], LEGS, [self._complex(name, f"{word}_{leg}") for leg in LEGS])
-                continue
-            pairs = [self._complex(name, f"{word}_{phase}") for phase in WYE]
-            _put(takes[letter], AROUND if delta else WYE, pairs)
-            if letter != "Y":  # GridLAB-D's names shunt_AB etc. lead to its powers
-                _put(takes[letter], AROUND, [self._complex(name, f"{word}_{ends}") for ends in AROUND])
-                _put(takes[letter], WYE, [self._complex(name, f"{word}_{phase}N") for phase in WYE])
-            elif kind == "load":
-                _put(takes[letter], AROUND, [self._inverse(name, f"constant_impedance_{ends}") for ends in AROUND])
-                _put(takes[letter], WYE, [self._inverse(name, f"constant_impedance_{phase}N") for phase in WYE])
-        row: dict[str, Any] = {"name": name, "class": kind, "takes": takes}
-        if kind == "capacitor":
-            row["connected_delta"] = bool(self._core.bits(name, "phases_connected") & PHASE_D) and not delta
-            row["connected"] = self._core.bits(name, "phases_connected") & 0x07
-            row["closed"] = [self._core.bits(name, f"switch{phase}") for phase in WYE]
-            row["var"] = [self._core.doubles(name, f"capacitor_{phase}")[0] for phase in WYE]
-            row["V"] = self._core.doubles(name, "cap_nominal_voltage")[0]
-        return row
-
-    def _complex(self, name: str, key: str) -> list[float]:
-        return list(self._core.doubles(name, key, 2))
-
-    def _inverse(self, name: str, key: str) -> list[float]:
-        value = complex(*self._complex(name, key))
-        inverse = 1.0 / value if value else 0j
-        return [inverse.real, inverse.imag]
-
-
-def _put(takes: dict[str, list[list[float]]], keys: tuple[str, ...], pairs: list[list[float]]) -> None:
-    """Add what is not zero."""
-    for key, pair in zip(keys, pairs, strict=True):
-        if any(pair):
-            takes.setdefault(key, []).append(pair)
+                properties = [(leg, f"{word}_{leg}") for leg in LEGS]
+            else:
+                own = AROUND if delta else WYE
+                properties = [(ends, f"{word}_{phase}") for ends, phase in zip(own, WYE, strict=True)]
+                if letter != "Y":  # GridLAB-D's names shunt_AB etc. lead to its powers
+                    properties += [(ends, f"{word}_{ends}") for ends in AROUND]
+                    properties += [(phase, f"{word}_{phase}N") for phase in WYE]
+            values = [(branch, core.complex(name, key)) for branch, key in properties]
+            if letter == "Y" and kind == "load":
+                Z = [(ends, core.complex(name, f"constant_impedance_{ends}")) for ends in AROUND]
+                Z += [(phase, core.complex(name, f"constant_impedance_{phase}N")) for phase in WYE]
+                values += [(branch, 1.0 / value) for branch, value in Z if value]
+            for branch, value in values:
+                if value:
+                    found[letter, branch] = found.get((letter, branch), 0j) + value
+        return found
 
 
 def main() -> None:
@@ -399,7 +396,7 @@ def main() -> None:
         answer = {"error": f"{type(error).__name__}: {error}"}
     status = 0
     try:
-        result.write_text(json.dumps(answer), encoding="utf-8")
+        result.write_bytes(pickle.dumps(answer))
     except OSError as error:
         print(f"\n{error}")
         status = os.EX_CANTCREAT

@@ -1,32 +1,143 @@
-"""Run GridLAB-D's power flow of a model in a process of its own."""
+"""GridLAB-D's processes: one that is stepped from outside, and one that solves the power flow of a model."""
 
 from __future__ import annotations
 
 import importlib.util
-import json
 import os
+import pickle
+import re
 import subprocess
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
-from gridpeers.bridges.gridlabd.delta_mode_process import messages
-from gridpeers.bridges.gridlabd.glm_text import GlmText
-from gridpeers.plant.request_process import TransientFolder, no_room, program
+from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
 
-POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
+PLACED = re.compile(r"^(?P<file>\S[^()]*)\((?P<line>\d+)\)\s*: (?P<text>.*)$")
+"""A message of the loader: file, line, text."""
 
-MISSING = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
+LEVELLED = re.compile(r"^(?:ERROR|FATAL)\s+\[[^\]]*\]\s*: (?P<text>.*)$")
+"""A message of the simulation that ends it."""
 
-USER = "the import of .glm files"
+FOLLOWING = re.compile(
+    r"load failed at or near|unable to load '|failed to load model file|model initialization failed"
+    r"|run_preparation\(\) returned|shutdown after simulation|last (error|warning) message was repeated"
+    r"|Failed to initialize simulation|initialization failed$|dump complete to|tzinfo\.txt|environment startup failed"
+)
+"""Messages that only repeat that something failed."""
+
+
+def messages(printed: str) -> list[str]:
+    r"""Return what GridLAB-D complains of, each message once; what only repeats that something failed if nothing else.
+
+    >>> messages("x.glm(3): class 'foo' is not known\nx.glm(3): load failed at or near 'object foo'\n")
+    ["x.glm:3: class 'foo' is not known"]
+    >>> messages("ERROR    [INIT] : NR: no swing bus found\nWARNING  [INIT] : slow\n")
+    ['GridLAB-D: NR: no swing bus found']
+    """
+    found: list[str] = []
+    following: list[str] = []
+    for line in printed.replace("\r", "\n").splitlines():
+        placed, levelled = PLACED.match(line), LEVELLED.match(line)
+        if placed:
+            text = f"{Path(placed['file']).name}:{placed['line']}: {printable(placed['text'].strip())}"
+        elif levelled:
+            text = f"GridLAB-D: {printable(levelled['text'].strip())}"
+        else:
+            continue
+        (following if FOLLOWING.search(line) else found).append(text)
+    found.sort(key=lambda text: text.startswith("GridLAB-D: "))  # those with a file and a line come first
+    return list(dict.fromkeys(found or following))
+
+
+DELTA_MODE = Path(__file__).with_name("delta_mode.py")
+
+SHOWN = 2
+"""So many of GridLAB-D's own errors are in an error of ours; the first ones are the cause, the others follow."""
 
 LONGEST = 600.0
-"""Time (s) after which a model that does not end is given up."""
+"""Longest time (s) until a model is loaded and its first power flow solved."""
+
+KEPT_MEMORY = {"MALLOC_MMAP_THRESHOLD_": str(32 * 2**20), "MALLOC_TRIM_THRESHOLD_": str(2**30)}
+"""Lets glibc keep the memory of one power flow for the next: GridLAB-D's solver takes and returns its matrices in every
+iteration. Returned to the system each time, they take a quarter of the processor time. No number depends on it."""
+
+MISSING = (
+    "GridLAB-D is not there: {python} cannot import the package gridlabd ({error}); install it (Linux, x86-64): "
+    "pip install 'gridpeers[gridlabd]'"
+)
 
 
-def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
+class GridlabdError(RuntimeError):
+    """GridLAB-D is missing, refuses its model, diverges, or has ended."""
+
+
+class DeltaModeProcess:
+    """GridLAB-D in a process of its own, which ends with this one; `deadline` is the longest wait for an answer (s)."""
+
+    def __init__(self, python: str, deadline: float) -> None:
+        self._python, self._deadline = python, deadline
+        self._folder = TransientFolder("gridpeers-gridlabd-")  # GridLAB-D writes files of its own where it stands
+        try:
+            command = [python, "-P", str(DELTA_MODE), str(os.getpid())]
+            self._process = RequestProcess(command, self._folder, KEPT_MEMORY)
+        except OSError as error:
+            self._folder.close()
+            raise GridlabdError(MISSING.format(python=python, error=error.strerror)) from error
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def load(self, model: str, inverters: Sequence[tuple[str, str, str, str]]) -> None:
+        """Load the text of a model, and take its first step.
+
+        `inverters` has the name, node, kind and phases of each inverter to read.
+        """
+        path = self._folder.path / "feeder.glm"
+        path.write_text(model, encoding="utf-8")
+        self._answer({"load": str(path), "inverters": inverters}, LONGEST)
+
+    def ask(self, **request: Any) -> dict[str, Any]:
+        """Return the answer to a request (`delta_mode`); GridlabdError has GridLAB-D's own errors."""
+        return self._answer(request, self._deadline)
+
+    def close(self) -> None:
+        """End the process, at any time and as often as you like."""
+        self._process.close()
+        self._folder.close()
+
+    def _answer(self, request: dict[str, Any], deadline: float) -> dict[str, Any]:
+        self._process.send(request)
+        try:
+            answer = self._process.answer(monotonic() + deadline)
+        except ProcessEndedError as how:
+            raise GridlabdError(f"GridLAB-D's process {how}{self._complaints()}") from None
+        if answer is None:
+            raise GridlabdError(f"GridLAB-D has not answered for {deadline:g} s, so it was ended{self._complaints()}")
+        if "not_importable" in answer:
+            reason = answer["not_importable"]
+            if answer["installed"]:
+                raise GridlabdError(damaged("gridlabd", reason, "GridLAB-D as the plant"))
+            raise GridlabdError(MISSING.format(python=self._python, error=reason))
+        if "error" in answer:
+            raise GridlabdError(f"GridLAB-D: {answer['error']}{self._complaints()}")
+        return answer
+
+    def _complaints(self) -> str:
+        """Return GridLAB-D's first errors as the end of a sentence, on one line as all that goes over the wire."""
+        first = [text.removeprefix("GridLAB-D: ").rstrip(".") for text in messages(self._process.printed())[:SHOWN]]
+        return f"; its own words: {'; '.join(first)}" if first else "; it has printed no error"
+
+
+POWER_FLOW = "gridpeers.bridges.gridlabd.gridlabd_power_flow"
+
+
+def solved_model(path: Path) -> dict[str, Any]:
     """Return what GridLAB-D's solver holds of a model (`gridlabd_power_flow`).
 
     Its `settling` says how regulators and capacitors moved until they rest, if any has a control. Where GridLAB-D finds
@@ -34,11 +145,12 @@ def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
     messages, each with its file and line.
     """
     if importlib.util.find_spec("gridlabd") is None:
-        raise FeederError(path.name, (MISSING,))
-    answer, printed = _asked(path, text)
+        missing = "reading .glm files needs GridLAB-D; install it: pip install 'gridpeers[gridlabd]'"
+        raise FeederError(path.name, (missing,))
+    answer, printed = _solved(path)
     settling = answer.get("settling", {})
     if settling and not settling["solved"] and settling["seconds"]:
-        answer, printed = _asked(path, text, "first")
+        answer, printed = _solved(path, "first")
         answer["settling"] = settling
     if not answer.get("solved", True):
         said = messages(printed) or [f"{path.name}: GridLAB-D's power flow does not converge"]
@@ -50,15 +162,13 @@ def solved_model(path: Path, text: GlmText) -> dict[str, Any]:
     return answer
 
 
-def _asked(path: Path, text: GlmText, *options: str) -> tuple[dict[str, Any], str]:
+def _solved(path: Path, *options: str) -> tuple[dict[str, Any], str]:
     """Return the answer of GridLAB-D's process, and the lines that it printed."""
     with closing(TransientFolder("gridpeers-gridlabd-")) as folder:
-        result = folder.path / "result.json"
-        model = text.readable(folder.path)
-        command = program(POWER_FLOW, str(model), str(result), str(os.getpid()), *options)
+        result = folder.path / "result.pickle"
         try:
             done = subprocess.run(
-                command,
+                program(POWER_FLOW, str(path), str(result), str(os.getpid()), *options),
                 cwd=path.parent,
                 env=os.environ | {"PYTHONDONTWRITEBYTECODE": "1"},
                 stdin=subprocess.DEVNULL,
@@ -74,14 +184,11 @@ def _asked(path: Path, text: GlmText, *options: str) -> tuple[dict[str, Any], st
         if done.returncode == os.EX_CANTCREAT:
             problem = no_room("what GridLAB-D has solved", printable(printed.splitlines()[-1]))
             raise FeederError(path.name, (f"{path.name}: {problem}",))
-        if not result.is_file():
-            ended = (
-                f"GridLAB-D's process ended with code {done.returncode} and said nothing; run the model in GridLAB-D"
-            )
-            raise FeederError(path.name, tuple(messages(printed)) or (ended,))
-        answer: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
+        ended = f"GridLAB-D's process ended with code {done.returncode} and said nothing; run the model in GridLAB-D"
+        answer: dict[str, Any] = pickle.loads(result.read_bytes()) if result.is_file() else {"error": ended}
     if "not_importable" in answer:
-        raise FeederError(path.name, (damaged("gridlabd", printable(answer["not_importable"]), USER),))
+        reason = printable(answer["not_importable"])
+        raise FeederError(path.name, (damaged("gridlabd", reason, "the import of .glm files"),))
     if "error" in answer:
         raise FeederError(path.name, tuple(messages(printed)) or (f"GridLAB-D: {printable(answer['error'])}",))
     return answer, printed

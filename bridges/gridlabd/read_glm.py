@@ -8,18 +8,16 @@ take: constant power, current or impedance. What comes out is solved here, too, 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import numpy as np
 
-from gridpeers.bridges.gridlabd.glm_elements import SPLIT, BusLoads, GlmElements, letters_of
+from gridpeers.bridges.gridlabd.glm_elements import SPLIT, GlmElements, letters_of, load_parts, shunt, voltages_of
 from gridpeers.bridges.gridlabd.glm_text import (
     CHILD_OF_BUS,
-    CONTROLS,
     DATA,
     GENERATION,
     LINEAR,
@@ -32,13 +30,12 @@ from gridpeers.bridges.gridlabd.gridlabd_power_flow import PV, SWING
 from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
 from gridpeers.bridges.import_checks import (
     BEYOND,
+    checked,
     left_out_by,
     path_problems,
     refuse_if,
-    refuse_unsolvable,
     report_powers,
     with_plain_names,
-    without_unfed,
 )
 from gridpeers.bridges.import_comparison import MATCH, difference
 from gridpeers.plant.equipment import Feeder, Source
@@ -58,9 +55,6 @@ BALANCED = 1e-7
 OBJECT = re.compile(r"\(obj=\d+;([^)]+)\)")
 """An object in a message of GridLAB-D's."""
 
-UNGROUNDED = "ground a winding"
-"""Remedy where nothing determines a voltage to ground."""
-
 
 def read_glm(
     path: str | Path, f_nom: float | None = None, *, leave_out: Sequence[str] = (), switches: Sequence[str] = ()
@@ -74,9 +68,11 @@ def read_glm(
     text = GlmText(path)
     refuse_if(path, text.problems)
     try:
-        model = solved_model(path, text)
+        model = solved_model(path)
     except FeederError as error:
-        refuse_if(path, [_placed(problem, text) for problem in error.problems])
+        named = [(problem, OBJECT.search(problem)) for problem in error.problems]
+        places = [text.place(match[1]) if match else "" for _, match in named]
+        refuse_if(path, [f"{at}: {problem}" if at else problem for at, (problem, _) in zip(places, named, strict=True)])
         raise
     if not model["has_powerflow"]:
         refuse_if(path, [f"{path.name}: does not load GridLAB-D's powerflow; a feeder has a line module powerflow;"])
@@ -84,7 +80,7 @@ def read_glm(
 
 
 class _GlmReader:
-    """Makes a feeder of what GridLAB-D's solver holds of a model."""
+    """Makes a feeder of what GridLAB-D's solver holds of a model; its steps add to `notes` and `problems`."""
 
     def __init__(self, path: Path, text: GlmText, model: dict[str, Any], leave_out: Sequence[str]) -> None:
         self._path, self._model = path, model
@@ -92,15 +88,15 @@ class _GlmReader:
         self._notes: list[str] = []
         self._classes = {row["name"]: row["class"] for row in model["objects"]}
         self._parents = {row["name"]: row["parent"] for row in model["objects"]}
-        names = [f"{kind}.{name}" for name, kind in self._classes.items()]
-        self._places = {
-            each: place
-            for name, kind in self._classes.items()
-            if (place := text.place(name))
-            for each in (f"{kind}.{name}", f"bus {name}")
-        }
-        left_out = left_out_by(names, leave_out, self._problems, "house.h1")
-        self._left_out = {name.partition(".")[2] for name in left_out}
+        self._buses = {bus["name"]: bus for bus in model["buses"]}
+        places = {name: text.place(name) for name in self._classes}
+        self._places = {each: at for n, at in places.items() if at for each in (self._called(n), f"bus {n}")}
+        called = [self._called(name) for name in self._classes]
+        left_out = left_out_by(called, leave_out, self._problems, "house.h1")
+        self._left_out = {name for name in self._classes if self._called(name) in left_out}
+
+    def _called(self, name: str) -> str:
+        return f"{self._classes[name]}.{name}"
 
     def read(self, f_nom: float | None, switches: Sequence[str]) -> Feeder:
         """Return the feeder, or raise a FeederError with every problem."""
@@ -110,56 +106,73 @@ class _GlmReader:
                 f"f_nom: the model is solved at {model['f_nom']:g} Hz, got {f_nom:g}; its reactances hold there alone; "
                 f"write nominal_frequency {f_nom:g}; in its module powerflow, or leave f_nom out"
             )
-        self._refuse_classes()
-        self._tell_settling()
-        known = len(problems)
-        self._mend_nominal_voltages()
-        if len(problems) > known:
+        self._judge_classes()
+        self._note_settling()
+        if not self._mend_nominal_voltages():
             refuse_if(self._path, problems, self._places)  # all that follows is per unit
         elements = GlmElements(model["buses"], switches, problems)
         for branch in model["branches"]:
             if branch["name"] not in self._left_out and branch["class"] in LINEAR | SWITCHES:
-                elements.add(branch, self._called(branch["name"]))
-        for name in sorted(set(switches) - elements.used_switches):
-            hint = suggestion(name.rpartition(".")[2], self._names_of(LINES), "lines")
+                elements.add(branch)
+        lines = [name for name, kind in self._classes.items() if kind in LINES]
+        for name in sorted(set(switches) - elements.used):
+            hint = suggestion(name.rpartition(".")[2], lines, "lines")
             problems.append(f'switches: there is no line "{name}"; {hint}')
         shunts, parts = self._loads()
         report_powers(parts, problems)
-        self._report_no_solution()
+        lost = [(bus, p) for bus, each in self._buses.items() for p, V in voltages_of(each).items() if not _finite(V)]
+        if lost and not problems:
+            (bus, letter), more = lost[0], f", and so at {len(lost) - 1} nodes more" if len(lost) > 1 else ""
+            problems.append(
+                f"{self._called(bus)}: GridLAB-D found no solution: it has no voltage in phase {letter}{more}; "
+                "look for a value that is no number, or an impedance of 0, there or before it"
+            )
         refuse_if(self._path, problems, self._places)
         source = self._source(elements)
-        refuse_if(self._path, problems, self._places)
+        if source is None:
+            refuse_if(self._path, problems, self._places)
         assert source is not None
         rows = [*elements.rows, *shunts]
         used = {bus for row in rows for bus, _ in row.nodes} | {part.bus for part in parts} | {source.bus}
         used |= {bus for switch in elements.switches for bus in (switch.from_bus, switch.to_bus)}
-        places = {row["name"]: row["place"] for row in model["objects"] if row["place"]}
         feeder = Feeder(
             name=self._path.stem,
             load_set="main",
-            buses=elements.bus_rows(used, places),
+            buses=elements.bus_rows(used, {row["name"]: row["place"] for row in model["objects"]}),
             switches=tuple(elements.switches),
             source=source,
             f_nom=model["f_nom"],
             elements=tuple(rows),
             load_parts=tuple(parts),
+            notes=tuple(self._notes),
             places=self._places,
         )
-        feeder = without_unfed(feeder, self._notes, str)
-        feeder = msgspec.structs.replace(feeder, notes=tuple(self._notes))
-        refuse_unsolvable(self._path, feeder, problems, UNGROUNDED, str)
+        feeder = checked(self._path, feeder, problems, "ground a winding", str)
         if all(self._classes[name] == "player" for name in self._left_out):
             self._compare(feeder)
         refuse_if(self._path, problems, self._places)
-        return with_plain_names(feeder, elements.behind())
+        return with_plain_names(feeder, elements.added)
 
-    def _names_of(self, classes: Collection[str]) -> list[str]:
-        return [name for name, kind in self._classes.items() if kind in classes]
+    def _judge_classes(self) -> None:
+        """Note a problem for each object that cannot be represented, and those that stay as they are."""
+        known = DATA | WATCHING | LINEAR | SWITCHES | set(CHILD_OF_BUS)
+        for name, kind in self._classes.items():
+            if name in self._left_out:
+                continue
+            called = self._called(name)
+            hint = f'leave it out (leave_out=["{called}"])'
+            if kind in GENERATION:
+                self._problems.append(f"{called}: class {kind} is not taken over; {hint} or put an inverter there")
+            elif kind == "player":
+                self._problems.append(f"{called}: what a player changes in time is not taken over; {hint}")
+            elif kind == "volt_var_control":
+                self._notes.append(f"{called}: what it controls stays as it is")
+            elif kind == "fuse":
+                self._notes.append(f"{called}: stays as it is")
+            elif kind not in known:
+                self._problems.append(f"{called}: objects of class {kind} are not supported; {hint}")
 
-    def _called(self, name: str) -> str:
-        return f"{self._classes[name]}.{name}"
-
-    def _tell_settling(self) -> None:
+    def _note_settling(self) -> None:
         """Note how far GridLAB-D has gone on, and what its regulators and capacitors have done."""
         settling = self._model.get("settling")
         if not settling:
@@ -179,134 +192,98 @@ class _GlmReader:
         elif settling["seconds"]:
             self._notes.append(f"{file}: as GridLAB-D has it at {time}, when its regulators and capacitors rest")
         for name, positions in settling["last"].items():
-            before = settling["first"][name]
-            if positions != before:
-                self._notes.append(
-                    f"{self._classes[name]}.{name}: {', '.join(positions)} in A, B, C, and {', '.join(before)} at the "
-                    "first moment"
-                )
+            if positions != (before := settling["first"][name]):
+                then = f"{', '.join(positions)} in A, B, C, and {', '.join(before)} at the first moment"
+                self._notes.append(f"{self._called(name)}: {then}")
 
-    def _mend_nominal_voltages(self) -> None:
-        """Take the voltage that a bus has for its nominal one, where the model states another one by mistake."""
-        for bus in self._model["buses"]:
-            V = [abs(voltage_of(bus, letter)) for letter in letters_of(bus["phases"])]
-            V = [each for each in V if isfinite(each)]  # `_report_no_solution` names the others
+    def _mend_nominal_voltages(self) -> bool:
+        """Take the voltage that a bus has for its nominal one, where the model states another one by mistake.
+
+        Return whether each bus has one then.
+        """
+        mended = True
+        for name, bus in self._buses.items():
+            V = [abs(V) for V in voltages_of(bus).values() if _finite(V)]
             live = [each for each in V if each > LIVE * max(V)]
-            usual = sum(live) / max(len(live), 1)
-            stated = bus["V_nom"] > 0.0
-            if not stated and not usual > 0.0:
-                self._problems.append(
-                    f"{self._called(bus['name'])}: nominal_voltage must be above 0 V, got {bus['V_nom']:g} V"
-                )
-            elif usual and not (stated and 1.0 / FAR < usual / bus["V_nom"] < FAR):
+            usual, stated = float(sum(live) / max(len(live), 1)), bus["V_nom"]
+            if not stated > 0.0 and not usual > 0.0:
+                mended = False
+                self._problems.append(f"{self._called(name)}: nominal_voltage must be above 0 V, got {stated:g} V")
+            elif usual and not (stated > 0.0 and 1.0 / FAR < usual / stated < FAR):
                 self._notes.append(
-                    f"{bus['class']}.{bus['name']}: nominal_voltage {bus['V_nom']:g} V, and {usual:.0f} V in the power "
-                    "flow; the latter is taken"
+                    f"{self._called(name)}: nominal_voltage {stated:g} V, and {usual:.0f} V in the power flow; the "
+                    "latter is taken"
                 )
                 bus["V_nom"] = usual
-
-    def _report_no_solution(self) -> None:
-        """Note a problem if a voltage of GridLAB-D is no number, unless a value that is none explains it."""
-        nodes = [(bus, letter) for bus in self._model["buses"] for letter in letters_of(bus["phases"])]
-        lost = [(bus, letter) for bus, letter in nodes if not isfinite(abs(voltage_of(bus, letter)))]
-        if lost and not self._problems:
-            (bus, letter), more = lost[0], f", and so at {len(lost) - 1} nodes more" if len(lost) > 1 else ""
-            self._problems.append(
-                f"{self._called(bus['name'])}: GridLAB-D found no solution: it has {abs(voltage_of(bus, letter)):g} V "
-                f"in phase {letter}{more}; look for a value that is no number, or an impedance of 0, there or before it"
-            )
-
-    def _refuse_classes(self) -> None:
-        """Note a problem for each object that cannot be represented."""
-        known = DATA | WATCHING | CONTROLS | LINEAR | SWITCHES | set(CHILD_OF_BUS)
-        for name, kind in self._classes.items():
-            if name in self._left_out:
-                continue
-            hint = f'leave it out (leave_out=["{kind}.{name}"])'
-            if kind in GENERATION:
-                self._problems.append(
-                    f"{self._called(name)}: class {kind} is not taken over; {hint} or put an inverter there"
-                )
-            elif kind == "player":
-                self._problems.append(f"{self._called(name)}: what a player changes in time is not taken over; {hint}")
-            elif kind in CONTROLS:
-                self._notes.append(f"{kind}.{name}: what it controls stays as it is")
-            elif kind not in known:
-                self._problems.append(f"{self._called(name)}: objects of class {kind} are not supported; {hint}")
-            elif kind == "fuse":
-                self._notes.append(f"{kind}.{name}: stays as it is")
+        return mended
 
     def _loads(self) -> tuple[list[LinearElement], list[LoadPart]]:
-        """Return capacitors and loads, object by object."""
-        at_bus: dict[str, list[dict[str, Any]]] = {bus["name"]: [] for bus in self._model["buses"]}
-        for row in self._model["takes"]:
-            bus = self._bus_of(row["name"], at_bus)
-            if bus is not None:
-                at_bus[bus].append(row)
+        """Return capacitors and loads, bus by bus."""
+        at_bus: dict[str, list[str]] = {bus: [] for bus in self._buses}
+        for name in self._model["takes"]:
+            if bus := self._bus_of(name):
+                at_bus[bus].append(name)
         passive = {"player", *WATCHING, *CHILD_OF_BUS}
         feeding = {self._parents[name] for name in self._left_out if self._classes[name] not in passive}
-        tainted = feeding | {bus for name in feeding if (bus := self._bus_of(name, at_bus))}
+        tainted = feeding | {self._bus_of(name) for name in feeding}
         shunts: list[LinearElement] = []
         parts: list[LoadPart] = []
-        for bus in self._model["buses"]:
-            loads = BusLoads(bus, at_bus[bus["name"]])
-            for (kind, name), taken in loads.of.items():
-                if not taken or name in self._left_out:
+        for bus, names in at_bus.items():
+            for name in names:
+                takes, called = self._model["takes"][name], self._called(name)
+                if not takes or name in self._left_out:
                     continue
                 if name in tainted:
                     self._notes.append(
-                        f"{kind}.{name}: what it takes itself is not taken over; GridLAB-D adds to it what is left out"
+                        f"{called}: what it takes itself is not taken over; GridLAB-D adds to it what is left out"
                     )
-                elif kind == "capacitor":
-                    shunt = loads.shunt(f"{kind}.{name}", taken)
-                    shunts += [shunt] if shunt else []
+                elif self._classes[name] == "capacitor":
+                    shunts.append(shunt(called, bus, takes))
                 else:
-                    parts += loads.parts(f"{kind}.{name}", taken)
+                    parts += load_parts(called, self._buses[bus], takes)
         return shunts, parts
 
-    def _bus_of(self, name: str, buses: dict[str, Any]) -> str | None:
-        """Return the bus of the solver that an object is connected to: itself, or one it is a child of."""
-        while name and name not in buses:
+    def _bus_of(self, name: str) -> str:
+        """Return the bus of the solver that an object is connected to, itself or one it is a child of, or ""."""
+        while name and name not in self._buses:
             name = self._parents.get(name, "")
-        return name or None
+        return name
 
     def _source(self, elements: GlmElements) -> Source | None:
         """Return the substation: the bus whose voltage is given."""
         # a SWING_PQ takes over only where no SWING is
-        given = [bus for bus in self._model["buses"] if bus["type"] == SWING and bus["name"] not in self._left_out]
-        for bus in self._model["buses"]:
-            if bus["type"] == PV or bus in given[1:]:
-                self._problems.append(f"{self._called(bus['name'])}: a second source; make its bustype PQ")
+        given = [n for n, bus in self._buses.items() if bus["type"] == SWING and n not in self._left_out]
+        second = [n for n, bus in self._buses.items() if bus["type"] == PV or n in given[1:]]
+        self._problems += [f"{self._called(name)}: a second source; make its bustype PQ" for name in second]
         if not given:
             self._problems.append("no bus with bustype SWING: a feeder has one, its substation")
             return None
-        bus = given[0]
+        name, bus = given[0], self._buses[given[0]]
         if letters_of(bus["phases"]) != "ABC" or bus["phases"] & SPLIT:
-            self._problems.append(f"{self._called(bus['name'])}: a source has phases A, B and C")
+            self._problems.append(f"{self._called(name)}: a source has phases A, B and C")
             return None
-        V = np.array([complex(*pair) for pair in bus["V"]]) / bus["V_nom"]
+        V = bus["V"] / bus["V_nom"]
         balanced = np.exp(-2j * np.pi / 3.0 * np.arange(3))
         forward = complex(V @ balanced.conj()) / 3.0
-        source = Source(bus=bus["name"], V_pu=abs(forward), angle=float(np.angle(forward)))
-        if np.abs(V - forward * balanced).max() <= BALANCED or not abs(forward):
-            return source
-        stiff = elements.add_unbalanced(self._model["buses"].index(bus), (V / (forward * balanced)).tolist())
-        self._notes.append(f"{bus['class']}.{bus['name']}: its voltages are unbalanced; a balanced source feeds it")
-        return Source(bus=stiff, V_pu=source.V_pu, angle=source.angle)
+        stiff = name
+        if np.abs(V - forward * balanced).max() > BALANCED and abs(forward):
+            stiff = elements.add_unbalanced(name, V / (forward * balanced))
+            self._notes.append(f"{self._called(name)}: its voltages are unbalanced; a balanced source feeds it")
+        return Source(bus=stiff, V_pu=abs(forward), angle=float(np.angle(forward)))
 
     def _compare(self, feeder: Feeder) -> None:
         """Note a problem if our power flow does not have GridLAB-D's voltages: something acts that we do not know."""
         V_nom = {bus.name: bus.V_nom for bus in feeder.buses}
         nodes = {(bus.name, letter) for bus in feeder.buses for letter in bus.phases}
-        buses = {bus["name"]: bus for bus in self._model["buses"]}
-        theirs = {(name, letter): voltage_of(buses[name], letter) for name, letter in nodes if name in buses}
-        highest = max(theirs, key=lambda node: abs(theirs[node]) / V_nom[node[0]])
-        if abs(theirs[highest]) > BEYOND * V_nom[highest[0]]:
-            alone = [name for name in buses if name not in V_nom]
+        theirs = {(name, p): V for name, bus in self._buses.items() for p, V in voltages_of(bus).items()}
+        theirs = {node: V for node, V in theirs.items() if node in nodes}
+        (bus, phase), highest = max(theirs.items(), key=lambda item: abs(item[1]) / V_nom[item[0][0]])
+        if abs(highest) > BEYOND * V_nom[bus]:
+            alone = [name for name in self._buses if name not in V_nom]
             hint = f"nothing leads to bus {', '.join(alone[:3])}" if alone else "some section has no source"
             self._problems.append(
-                f"bus {highest[0]}: GridLAB-D's power flow has {abs(theirs[highest]) / V_nom[highest[0]]:.2g} pu: "
-                f"{hint}; take it out of the model, or connect it"
+                f"bus {bus}: GridLAB-D's power flow has {abs(highest) / V_nom[bus]:.2g} pu: {hint}; take it out of the "
+                "model, or connect it"
             )
             return
         try:
@@ -321,20 +298,5 @@ class _GlmReader:
             )
 
 
-def _placed(problem: str, text: GlmText) -> str:
-    """Return a problem of GridLAB-D's behind the file and line of the object that it names, if they are known."""
-    named = OBJECT.search(problem)
-    place = text.place(named[1]) if named else ""
-    return f"{place}: {problem}" if place else problem
-
-
-def voltage_of(bus: dict[str, Any], letter: str) -> complex:
-    """Return GridLAB-D's voltage (V) of a node; that of leg 2 of a split-phase service is from the neutral to the leg.
-
-    Examples
-    --------
-    >>> voltage_of({"phases": 0x82, "V": [[120.0, 0.0], [119.0, 0.0], [0.0, 0.0]]}, "B")
-    (-119-0j)
-    """
-    V = complex(*bus["V"]["ABC".index(letter)])
-    return -V if bus["phases"] & SPLIT and letter == "B" else V
+def _finite(V: complex) -> bool:
+    return isfinite(abs(V))

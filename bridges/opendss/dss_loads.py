@@ -1,4 +1,4 @@
-"""Loads of an OpenDSS circuit: each phase as parts whose power goes with a power of the voltage, within limits."""
+"""Loads and generation of an OpenDSS circuit: each phase as parts whose power goes with a power of the voltage."""
 
 from __future__ import annotations
 
@@ -8,18 +8,23 @@ from typing import Any, NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
-from gridpeers.bridges.opendss.dss_elements import complex_of, letter_of
-from gridpeers.bridges.opendss.dss_engine import DssEngine
+from gridpeers.bridges.opendss.dss_engine import DssEngine, bus_of, complexes
 from gridpeers.plant.dynamics.kernel.solve import limited_admittance
+from gridpeers.plant.equipment import NODES
 from gridpeers.plant.equipment.imported_equipment import LoadPart, cut_off
 from gridpeers.plant.network.loads import law_row
+
+Law = dict[str, Any]
+"""How power goes with the voltage, by the fields of `LoadPart`."""
+
+CONSTANT: Law = {"exponents": (0.0, 0.0)}
+IMPEDANCE: Law = {"exponents": (2.0, 2.0)}
 
 
 class Branches(NamedTuple):
     """The branches of an element, between its conductors."""
 
     bus: str
-    """Bus of its terminal."""
     letters: list[str]
     """Letter of the node that each conductor leads to; empty for ground."""
     conductors: list[tuple[int, int]]
@@ -27,10 +32,31 @@ class Branches(NamedTuple):
     V_nom: float
     """Nominal voltage across each (V)."""
 
-    def ends(self) -> list[tuple[str, str]]:
-        """Return the ends of each branch as `LoadPart` has them; none of a branch with both ends at one node."""
+    def across(self, V: Any) -> Any:
+        """Return the voltage across each branch, from those of the conductors (V)."""
+        return np.array([V[start] - V[end] for start, end in self.conductors])
+
+    def parts(self, name: str, laws: list[Law], V_off_above: float) -> list[LoadPart]:
+        """Return a part of each law for each branch; none of a branch with both ends at one node."""
         pairs = [(self.letters[start], self.letters[end]) for start, end in self.conductors]
-        return [(one, other) if one else (other, one) for one, other in pairs if one != other]
+        return [
+            LoadPart(
+                name=name,
+                bus=self.bus,
+                ends=(one, other) if one else (other, one),
+                V_nom=self.V_nom,
+                V_off_above=V_off_above,
+                **law,
+            )
+            for one, other in pairs
+            if one != other
+            for law in laws
+        ]
+
+
+def letter_of(node: int) -> str:
+    """Return our letter of a bus's node of this number; ground, number 0, has none."""
+    return NODES[node - 1] if node > 0 else ""
 
 
 def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
@@ -41,7 +67,7 @@ def branches_of(element: Any, kV: float, *, is_delta: bool) -> Branches:
     """
     phases, conductors = int(element.NumPhases), int(element.NumConductors)
     return Branches(
-        bus=str(element.BusNames[0]).partition(".")[0].lower(),
+        bus=bus_of(element.BusNames[0]),
         letters=[letter_of(node) for node in element.NodeOrder],
         conductors=[(k, (k + 1) % conductors if is_delta else phases) for k in range(phases)],
         V_nom=kV * 1e3 / sqrt(3.0) if not is_delta and phases in (2, 3) else kV * 1e3,
@@ -61,34 +87,20 @@ VARIABLE = 0
 """Status of a load that the circuit's load multiplier scales."""
 
 
-class Share(NamedTuple):
-    """A part of each phase of a load, by the fields of `LoadPart`."""
-
-    S: complex
-    exponents: tuple[float, float]
-    edge: float = 0.0
-    V_low: float = 0.0
-    V_off: float = 0.0
-
-
 def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems: list[str]) -> list[LoadPart]:
     """Return the parts of all loads that are enabled and not left out; a problem for each that cannot be represented.
 
     Of models 6 and 7 one thing is not taken over: that below `vlowpu` (half of the nominal voltage) they jump to
     another impedance.
     """
-    parts: list[LoadPart] = []
-    loads, circuit = engine.circuit.Loads, engine.circuit
-    multiplier = float(circuit.Solution.LoadMult)
-    impedances = int(circuit.Solution.LoadModel) == ADMITTANCE
-    year = int(circuit.Solution.Year)
-    growth = (1.0 + float(circuit.Solution.pctGrowth) / 100.0) ** (year - 1) if year else 1.0
-    for load in loads:
+    found: list[LoadPart] = []
+    circuit, solution = engine.circuit, engine.circuit.Solution
+    impedances, year = int(solution.LoadModel) == ADMITTANCE, int(solution.Year)
+    growth = (1.0 + float(solution.pctGrowth) / 100.0) ** (year - 1) if year else 1.0
+    for load in circuit.Loads:
         element = circuit.ActiveCktElement
         name = f"load.{str(load.Name).lower()}"
-        if not element.Enabled or name in left_out:
-            continue
-        if load.kW == 0.0 and load.kvar == 0.0:
+        if not element.Enabled or name in left_out or load.kW == load.kvar == 0.0:
             continue
         if int(load.Model) == FIXED_Q and load.kvar and not impedances:
             notes.append(
@@ -99,76 +111,57 @@ def read_loads(engine: DssEngine, left_out: set[str], notes: list[str], problems
             problems.append(
                 f"{name}: growth={load.Growth}: growth by a GrowthShape is not supported; leave out set year"
             )
-        scale = growth * (multiplier if int(load.Status) == VARIABLE else 1.0)
-        parts += _parts(name, load, element, scale, impedances, problems)
-    return parts
-
-
-def _parts(name: str, load: Any, element: Any, scale: float, impedances: bool, problems: list[str]) -> list[LoadPart]:
-    branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
-    shares = _shares(element, name, load, int(element.NumPhases), scale, impedances, problems)
-    V_off_above = 0.0
-    if load.kW < 0.0:
-        V = complex_of(element.Voltages)
-        V_off_above = cut_off(max(abs(V[start] - V[end]) for start, end in branches.conductors) / branches.V_nom)
-    found = []
-    for ends in branches.ends():
-        for share in shares:
-            limited = share.exponents != (2.0, 2.0) or share.V_off > 0.0
-            found.append(
-                LoadPart(
-                    name=name,
-                    bus=branches.bus,
-                    ends=ends,
-                    S=share.S,
-                    V_nom=branches.V_nom,
-                    exponents=share.exponents,
-                    V_low=share.V_low if limited else 0.0,
-                    V_min=float(load.Vminpu) if limited and float(load.Vminpu) > share.V_low else 0.0,
-                    V_max=float(load.Vmaxpu) if limited else 0.0,
-                    edge=share.edge,
-                    V_off=share.V_off,
-                    V_off_above=V_off_above,
-                )
-            )
+        scale = growth * (float(solution.LoadMult) if int(load.Status) == VARIABLE else 1.0)
+        S = complex(load.kW, load.kvar) * 1e3 / int(element.NumPhases)
+        if impedances:
+            laws = [{"S": S * scale, **IMPEDANCE}]
+        else:
+            laws = _laws(name, load, float(element.Properties("vlowpu").Val or 0.5), S, scale, problems)
+        branches = branches_of(element, float(load.kV), is_delta=bool(load.IsDelta))
+        usual = np.abs(branches.across(complexes(element.Voltages))).max() / branches.V_nom
+        found += branches.parts(name, laws, cut_off(float(usual)) if load.kW < 0.0 else 0.0)
     return found
 
 
-def _shares(
-    element: Any, name: str, load: Any, phases: int, scale: float, impedances: bool, problems: list[str]
-) -> list[Share]:
-    model, V_low = int(load.Model), float(element.Properties("vlowpu").Val or 0.5)
-    S = complex(load.kW, load.kvar) * 1e3 / phases
-    if impedances:
-        return [Share(S * scale, (2.0, 2.0))]
+def _laws(name: str, load: Any, V_low: float, S: complex, scale: float, problems: list[str]) -> list[Law]:
+    """Return the laws of the parts of a load's phase, which takes this power (VA) before it is scaled."""
+    model, V_min, V_max = int(load.Model), float(load.Vminpu), float(load.Vmaxpu)
+
+    def law(
+        S: complex, exponents: tuple[float, float], edge: float = 0.0, V_low: float = V_low, off: float = 0.0
+    ) -> Law:
+        if exponents == (2.0, 2.0) and not off:
+            return {"S": S, **IMPEDANCE, "edge": edge}
+        limits = {"V_low": V_low, "V_min": V_min if V_min > V_low else 0.0, "V_max": V_max}
+        return {"S": S, "exponents": exponents, "edge": edge, "V_off": off, **limits}
+
     if model == ZIP:
         z = [float(value) for value in load.ZIPV]
         if len(z) < 7:
             problems.append(f"{name}: model=8 needs zipv with seven numbers, got {len(z)}")
             return []
         S *= scale
-        parts = [(complex(S.real * z[k], S.imag * z[k + 3]), n) for k, n in ((0, 2.0), (1, 1.0), (2, 0.0))]
-        return [Share(power, (n, n), n, V_low, max(0.0, z[6])) for power, n in parts if power]
+        shares = [(complex(S.real * z[k], S.imag * z[k + 3]), n) for k, n in ((0, 2.0), (1, 1.0), (2, 0.0))]
+        return [law(power, (n, n), edge=n, off=max(0.0, z[6])) for power, n in shares if power]
     if model in (FIXED_Q, FIXED_X):
         # Q is that of the script, whatever the multiplier; beyond the limits both are impedances
         n = 0.0 if model == FIXED_Q else 2.0
-        return [Share(complex(S.real * scale), (0.0, 0.0)), Share(complex(0.0, S.imag), (n, n), 2.0)]
-    if model == CVR:
-        return [Share(S * scale, (float(load.CVRwatts), float(load.CVRvars)), 0.0, V_low)]
-    if model not in EXPONENTS:
+        return [
+            law(complex(S.real * scale), (0.0, 0.0), V_low=0.0),
+            law(complex(0.0, S.imag), (n, n), edge=2.0, V_low=0.0),
+        ]
+    exponents = (float(load.CVRwatts), float(load.CVRvars)) if model == CVR else EXPONENTS.get(model)
+    if exponents is None:
         problems.append(f"{name}: model={model} is not supported; the models are 1 to 8")
         return []
-    return [Share(S * scale, EXPONENTS[model], 1.0 if model == 5 else 0.0, V_low)]
+    return [law(S * scale, exponents, edge=1.0 if model == 5 else 0.0)]
 
 
 GENERATION = frozenset({"generator", "pvsystem", "storage"})
 """Classes that are taken over as the power that they deliver in the script's snapshot."""
 
-IMPEDANCE = 2
-"""Model whose power goes with the square of the voltage; that of the other models is constant within limits."""
-
-NO_LIMITS, OWN_Q, OWN_X, LIMITED_CURRENT = 3, 4, 5, 7
-"""Further models of a Generator; LimitCurrent=yes of PVSystem is the last one."""
+GENERATOR_LAWS = {2: "impedance", 3: "no limits", 4: "own Q", 5: "own X", 7: "limited current"}
+"""Laws of a Generator by its model; those of the others are constant power within limits."""
 
 CLOSE = 1e-6
 """Largest difference between the engine's current and that of the parts, beside the largest current."""
@@ -183,30 +176,43 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
     """
     engine.circuit.SetActiveElement(name)
     element = engine.circuit.ActiveCktElement
-    V, current = complex_of(element.Voltages), complex_of(element.Currents)
+
+    def read(key: str) -> str:
+        return str(element.Properties(key).Val).lower()
+
+    V, current = complexes(element.Voltages), complexes(element.Currents)
     total = complex(-np.sum(V * np.conj(current)))
     if abs(total) < 1.0:
         notes.append(f"{name}: delivers nothing; left out")
         return []
-    is_delta = _property(element, "conn").lower().startswith(("d", "l"))
-    branches = branches_of(element, float(_property(element, "kv")), is_delta=is_delta)
-    across = np.array([V[start] - V[end] for start, end in branches.conductors])
-    m = np.abs(across) / branches.V_nom
-    kind = _kind(element, name)
-    laws = _laws(kind, *(float(_property(element, key)) for key in ("vminpu", "vmaxpu")))
+    branches = branches_of(element, float(read("kv")), is_delta=read("conn").startswith(("d", "l")))
+    across = branches.across(V)
+    kind = GENERATOR_LAWS.get(int(read("model") or 1), "")
+    if not name.startswith("generator."):  # the engine does not limit the current of Storage, whatever it says
+        limited = name.startswith("pvsystem.") and read("limitcurrent").startswith(("y", "t"))
+        kind = kind if kind == "impedance" else "limited current" if limited else ""
+    V_min = float(read("vminpu"))
+    within = {**CONSTANT, "V_min": V_min, "V_max": float(read("vmaxpu"))}
+    limited_current = {**CONSTANT, "V_low": V_min, "V_min": V_min}
+    law_of_P, law_of_Q = {
+        "impedance": (IMPEDANCE, IMPEDANCE),
+        "no limits": (CONSTANT, CONSTANT),
+        "own Q": (within, {**within, "edge": 2.0}),
+        "own X": (within, IMPEDANCE),
+        "limited current": (limited_current, limited_current),
+    }.get(kind, (within, within))
     unit = LoadPart(name=name, bus=branches.bus, ends=("A", ""), S=1.0 + 0j, V_nom=branches.V_nom, exponents=(0.0, 0.0))
     S = np.zeros(across.size, complex)
-    shares: list[LoadPart] = []
-    for power, law in zip((complex(total.real), 1j * total.imag), laws, strict=True):
-        share = replace(unit, **law)
-        row = np.array(law_row(share))
+    laws: list[Law] = []
+    for power, law in ((complex(total.real), law_of_P), (1j * total.imag, law_of_Q)):
+        row = np.array(law_row(replace(unit, **law)))
         factor = np.array([limited_admittance(row, V)[0].real * V * V for V in np.abs(across).tolist()])
         nominal = power / factor.sum()
         S += nominal * factor
-        if shares and laws[0] == law:
-            shares[0] = replace(shares[0], S=shares[0].S - nominal)
+        if laws and law_of_P == law:
+            laws[0]["S"] -= nominal
         elif power:
-            shares.append(replace(share, S=-nominal))
+            laws.append({**law, "S": -nominal})
     of_parts = np.zeros(current.size, complex)
     for (start, end), delivered in zip(branches.conductors, np.conj(S / across), strict=True):
         of_parts[start] -= delivered
@@ -218,38 +224,7 @@ def read_generation(engine: DssEngine, name: str, notes: list[str], problems: li
         )
         return []
     kW, kvar = (round(power / 1e3, 3) + 0.0 for power in (total.real, total.imag))
-    words = "as an impedance" if kind == IMPEDANCE else "constant"
+    words = "as an impedance" if kind == "impedance" else "constant"
     notes.append(f"{name}: delivers the {kW:g} kW and {kvar:g} kvar of the snapshot, {words}")
-    off = cut_off(float(m.max())) if total.real > 0.0 else 0.0
-    return [replace(share, ends=ends, V_off_above=off) for ends in branches.ends() for share in shares]
-
-
-def _kind(element: Any, name: str) -> int:
-    """Return the model of an element, as that of a Generator that has the same law.
-
-    The engine does not limit the current of Storage, whatever its LimitCurrent is.
-    """
-    model = int(_property(element, "model") or 1)
-    if name.startswith("generator."):
-        return model
-    limited = name.startswith("pvsystem.") and _property(element, "limitcurrent").lower().startswith(("y", "t"))
-    return IMPEDANCE if model == IMPEDANCE else LIMITED_CURRENT if limited else 1
-
-
-def _laws(kind: int, V_min: float, V_max: float) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Return the laws of P and of Q as fields of `LoadPart`."""
-    constant: dict[str, Any] = {"exponents": (0.0, 0.0)}
-    within = {**constant, "V_min": V_min, "V_max": V_max}
-    impedance = {"exponents": (2.0, 2.0)}
-    laws = {
-        IMPEDANCE: (impedance, impedance),
-        NO_LIMITS: (constant, constant),
-        OWN_Q: (within, {**within, "edge": 2.0}),
-        OWN_X: (within, impedance),
-        LIMITED_CURRENT: 2 * ({**constant, "V_low": V_min, "V_min": V_min},),
-    }
-    return laws.get(kind, (within, within))
-
-
-def _property(element: Any, key: str) -> str:
-    return str(element.Properties(key).Val)
+    usual = float(np.abs(across).max()) / branches.V_nom
+    return branches.parts(name, laws, cut_off(usual) if total.real > 0.0 else 0.0)

@@ -1,20 +1,27 @@
-"""The OpenDSS engine in a process of its own: it is asked for circuits, and may crash."""
+"""The OpenDSS engine in a process of its own, as it may crash on a script.
+
+The process loads the engine once, and stays for the next script. Requests are JSON objects, one a line on standard
+input (the fields of `ImportRequest`), answered one a line on standard output: {} when the circuit, pickled, is in the
+file `CIRCUIT` of its folder, {"problems": [...]} of a refused script, or {"error": traceback}.
+"""
 
 from __future__ import annotations
 
 import atexit
+import contextlib
 import importlib.util
+import json
 import os
 import pickle
 import signal
+import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+import traceback
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
-from gridpeers.bridges.opendss.dss_circuit import DssCircuit, ImportRequest
+from gridpeers.bridges.opendss.dss_circuit import DssCircuit, ImportRequest, read_circuit
 from gridpeers.plant.request_process import ProcessEndedError, RequestProcess, TransientFolder, no_room, program
 from gridpeers.plant.tables.read import FeederError
 from gridpeers.wire.wording import damaged, printable
@@ -23,7 +30,8 @@ MISSING = "reading .dss files needs the OpenDSS engine; install it: pip install 
 
 USER = "the import of .dss files"
 
-SERVER = "gridpeers.bridges.opendss.dss_server"
+CIRCUIT, PLACE = "circuit.pickle", "place"
+"""Files in the folder of the process: its answer, and what the engine is about to do."""
 
 LONGEST = 600.0
 """Time (s) after which a script that does not end is given up."""
@@ -31,104 +39,111 @@ LONGEST = 600.0
 SHOWN = 100
 """Letters of a command that an error shows."""
 
-_lock = threading.Lock()
-"""The engine reads one script at a time."""
-
-_processes: dict[int, DssProcess] = {}
-"""The engine's process, by the process that started it: one that was forked has not inherited the right to ask it."""
+_lock = threading.Lock()  # the engine reads one script at a time
+_processes: dict[int, tuple[RequestProcess, TransientFolder]] = {}
+"""The engine's process and folder, by the process that started it: a fork has not inherited the right to ask it."""
 
 
-class DssProcess:
-    """The process of the engine (`dss_server`), which ends with this one, and its folder."""
-
-    def __init__(self) -> None:
-        self._folder = TransientFolder("gridpeers-opendss-")
-        try:
-            self._process = RequestProcess(program(SERVER), self._folder)
-        except OSError:
-            self._folder.close()
-            raise
-
-    @property
-    def pid(self) -> int:
-        return self._process.pid
-
-    def send(self, request: ImportRequest) -> None:
-        self._process.send(request._asdict() | {"path": str(request.path)})
-
-    def circuit(self, path: Path) -> DssCircuit:
-        """Return the circuit that was asked for; FeederError if the engine refuses it, cannot be loaded, or crashes."""
-        try:
-            answer = self._process.answer(monotonic() + LONGEST)
-        except ProcessEndedError as how:  # while it loads the engine, or somebody ended it
-            raise FeederError("OpenDSS", (damaged("dss", f"its process {how}", USER),)) from None
-        if answer is None:
-            problem = f"{path.name}: the OpenDSS engine did not end within {LONGEST:g} s; simplify the script"
-            raise FeederError(path.name, (problem,))
-        if "not_importable" in answer:
-            raise FeederError("OpenDSS", (damaged("dss", answer["not_importable"], USER),))
-        if "unwritten" in answer:
-            problem = no_room("what the OpenDSS engine reads", answer["unwritten"])
-            raise FeederError(path.name, (f"{path.name}: {problem}",))
-        if "ended" in answer:
-            raise FeederError(path.name, (crashed(path, answer["ended"], answer["at"]),))
-        result = Path(answer["result"])
-        found: Any = pickle.loads(result.read_bytes())
-        result.unlink()
-        if isinstance(found, str):
-            raise RuntimeError(f"the import of {path} failed:\n{found}")
-        if not isinstance(found, DssCircuit):
-            raise FeederError(path.name, found)
-        return found
-
-    def close(self) -> None:
-        self._process.close()
-        self._folder.close()
-
-
-@contextmanager
-def reading(request: ImportRequest) -> Iterator[DssProcess]:
-    """Let the engine read a script while the caller does other things; its process stays for the next one."""
+def circuit_of(request: ImportRequest) -> DssCircuit:
+    """Return the circuit of a script; FeederError if the engine refuses it, cannot be loaded, or crashes."""
     if importlib.util.find_spec("dss") is None:
         raise FeederError("OpenDSS", (MISSING,))
+    name = Path(request.path).name
     with _lock:
-        process = _processes.get(os.getpid()) or DssProcess()
-        _processes[os.getpid()] = process
-        process.send(request)
-        answered = False
+        if os.getpid() not in _processes:
+            folder = TransientFolder("gridpeers-opendss-")
+            _processes[os.getpid()] = RequestProcess(program(__name__), folder), folder
+        process, folder = _processes[os.getpid()]
         try:
-            yield process
-            answered = True
-        finally:
-            if not answered:  # an error, or Ctrl-C: its next answer would be that of this request
-                close_engine()
+            process.send(request._asdict())
+            import gridpeers.plant.network  # noqa: F401  takes longer to load than the engine to read a small script
+
+            answer = process.answer(monotonic() + LONGEST)
+            if answer is None:
+                problem = f"{name}: the OpenDSS engine did not end within {LONGEST:g} s; simplify the script"
+                raise FeederError(name, (problem,))
+        except ProcessEndedError as how:
+            place = folder.path / PLACE
+            at = place.read_text(errors="replace").strip() if place.exists() else ""
+            close_engine()
+            problem = crashed(how, at, name) if at else damaged("dss", f"its process {how}", USER)
+            raise FeederError(name, (problem,)) from None
+        except BaseException:  # Ctrl-C, say: the next answer would be that of this request
+            close_engine()
+            raise
+        if "problems" in answer:
+            raise FeederError(name, tuple(answer["problems"]))
+        if "error" in answer:
+            raise RuntimeError(f"the import of {request.path} failed:\n{answer['error']}")
+        circuit: DssCircuit = pickle.loads((folder.path / CIRCUIT).read_bytes())
+        (folder.path / CIRCUIT).unlink()
+    return circuit
 
 
 def close_engine() -> None:
     """End the engine's process, if this process has one; the next import starts another."""
-    process = _processes.pop(os.getpid(), None)
-    if process is not None:
+    if running := _processes.pop(os.getpid(), None):
+        process, folder = running
         process.close()
+        folder.close()
 
 
 atexit.register(close_engine)
 
 
-def crashed(path: Path, status: int, at: str) -> str:
+def crashed(how: ProcessEndedError, at: str, name: str) -> str:
     """Return one line on an engine that ended while it read a script.
 
-    Examples
-    --------
-    >>> crashed(Path("a/Master.dss"), -11, "lines.dss:3: New Line.x")
-    'lines.dss:3: the OpenDSS engine itself crashes (SIGSEGV); change this, or take it out; if it is sound, take out \
-what comes before it, half by half, to find the cause: New Line.x'
+    >>> crashed(ProcessEndedError("was killed by SIGSEGV"), "lines.dss:3: New Line.x", "Master.dss")
+    'lines.dss:3: the OpenDSS engine itself crashes (its process was killed by SIGSEGV); change this, or take it out; \
+if it is sound, take out what comes before it, half by half, to find the cause: New Line.x'
     """
     where, _, command = printable(at).partition(": ")
-    how = f"exit status {status}" if status > 0 else signal.Signals(-status).name
-    if status == -signal.SIGKILL:
-        how += ", as where memory runs out"
+    memory = ", as where memory runs out" if signal.SIGKILL.name in str(how) else ""
     shown = command if len(command) <= SHOWN else f"{command[:SHOWN]}..."
     return (
-        f"{where or path.name}: the OpenDSS engine itself crashes ({how}); change this, or take it out; if it is "
-        f"sound, take out what comes before it, half by half, to find the cause: {shown}"
+        f"{where or name}: the OpenDSS engine itself crashes (its process {how}{memory}); change this, or take it out; "
+        f"if it is sound, take out what comes before it, half by half, to find the cause: {shown}"
     )
+
+
+def main() -> None:
+    """Serve until standard input ends."""
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # the engine may print
+    for line in sys.stdin:
+        print(json.dumps(_answer(json.loads(line))), file=answers, flush=True)
+
+
+def _answer(request: dict[str, Any]) -> dict[str, Any]:
+    try:
+        from dss import DSS  # noqa: F401
+    except Exception as error:  # a damaged package may raise anything
+        return {"problems": [damaged("dss", f"{type(error).__name__}: {error}", USER)]}
+    place = os.open(PLACE, os.O_CREAT | os.O_TRUNC | os.O_WRONLY)
+
+    def tell(text: str) -> None:
+        with contextlib.suppress(OSError):  # the disk is full
+            os.pwrite(place, text.encode()[:1000].ljust(1000), 0)
+
+    try:
+        circuit = read_circuit(ImportRequest(**request), tell)
+        try:
+            Path(CIRCUIT).write_bytes(pickle.dumps(circuit, pickle.HIGHEST_PROTOCOL))
+        except OSError as error:
+            Path(CIRCUIT).unlink()
+            return {
+                "problems": [f"{Path(request['path']).name}: {no_room('what the OpenDSS engine reads', str(error))}"]
+            }
+    except FeederError as error:
+        return {"problems": error.problems}
+    except Exception:
+        return {"error": traceback.format_exc()}
+    finally:
+        os.close(place)
+        Path(PLACE).unlink()
+    return {}
+
+
+if __name__ == "__main__":
+    main()

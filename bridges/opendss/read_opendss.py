@@ -12,16 +12,9 @@ from pathlib import Path
 
 import msgspec
 
-from gridpeers.bridges.import_checks import (
-    SHOWN_NAMES,
-    number_of,
-    refuse_if,
-    refuse_unsolvable,
-    with_plain_names,
-    without_unfed,
-)
+from gridpeers.bridges.import_checks import SHOWN_NAMES, checked, number_of, refuse_if, with_plain_names
 from gridpeers.bridges.opendss.dss_circuit import ImportRequest
-from gridpeers.bridges.opendss.dss_process import reading
+from gridpeers.bridges.opendss.dss_process import circuit_of
 from gridpeers.plant.equipment import Feeder
 from gridpeers.wire.wording import first_of
 
@@ -37,15 +30,8 @@ def read_opendss(
     Its `notes` list what was done instead of what the script says.
     """
     path = Path(path).absolute()
-    with reading(ImportRequest(path, f_nom, list(leave_out), list(switches))) as engine:
-        import gridpeers.plant.network  # noqa: F401  takes longer to load than the engine to read a small script
-
-        circuit = engine.circuit(path)
-    feeder, problems, notes = circuit.feeder, circuit.problems, list(circuit.feeder.notes)
-    if not problems:
-        feeder = without_unfed(feeder, notes)
-    feeder = msgspec.structs.replace(feeder, notes=tuple(notes))
-    refuse_unsolvable(path, feeder, problems, UNGROUNDED)
+    circuit = circuit_of(ImportRequest(str(path), f_nom, list(leave_out), list(switches)))
+    feeder = checked(path, circuit.feeder, circuit.problems, UNGROUNDED)
     if not circuit.left_out:
         feeder = _compared(path, feeder, circuit.V)
     return with_plain_names(feeder, circuit.added)

@@ -16,7 +16,7 @@ import pytest
 from msgspec.structs import replace
 
 from gridpeers.agents.agent_config import AgentConfig
-from gridpeers.bridges.gridlabd.delta_mode_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
+from gridpeers.bridges.gridlabd.gridlabd_process import KEPT_MEMORY, DeltaModeProcess, GridlabdError
 from gridpeers.plant.plant_config import PlantConfig, Protection
 from gridpeers.scenarios.drivers.inprocess import run_inprocess
 from gridpeers.scenarios.run_request import Outcome

@@ -10,7 +10,7 @@ def feeder_of(*names: str, switched: str = "") -> tuple[Feeder, dict[str, str]]:
     behind = bus_behind(names[0], switched)
     added = {behind: names[0]} if switched else {}
     buses = tuple(Bus(name=name, phases="A", V_nom=7200.0) for name in (*names, *added))
-    element = LinearElement(name="line.l\t1", nodes=((behind if switched else names[0], "A"),), Y=((1j,),))
+    element = LinearElement(name="line.l 1", nodes=((behind if switched else names[0], "A"),), Y=((1j,),))
     part = LoadPart(name="load.a b", bus=names[-1], ends=("A", ""), S=1e3, V_nom=7200.0, exponents=(2.0, 2.0))
     switch = Switch(
         name=f"{names[0]}-{behind}", alias=switched, from_bus=names[0], to_bus=behind, phases="A", closed=True
@@ -23,7 +23,7 @@ def feeder_of(*names: str, switched: str = "") -> tuple[Feeder, dict[str, str]]:
         elements=(element,),
         load_parts=(part,),
         switches=(switch,) if switched else (),
-        places={"bus a b": "x.dss:3", "line.l\t1": "x.dss:4"},
+        places={"bus a b": "x.dss:3", "line.l 1": "x.dss:4"},
     )
     return feeder, added
 
@@ -38,7 +38,7 @@ def test_each_bus_keeps_a_name_of_its_own() -> None:
     assert found.source is not None
     assert found.source.bus == "a_b_2"
     assert found.load_parts[0].bus == "plain.1_(c)"
-    assert found.places == {"bus a_b_2": "x.dss:3", "line.l_1": "x.dss:4"}
+    assert found.places == {"bus a_b_2": "x.dss:3", "line.l 1": "x.dss:4"}
     assert found.notes == (
         'buses have other names here, without blanks: "a b" is a_b_2, "a\u00a0b" is a_b_3, "x~y" is x_y, '
         '"plain.1 (c)" is plain.1_(c)',
@@ -51,7 +51,7 @@ def test_a_bus_behind_a_switch_follows_its_bus() -> None:
 
     (switch,) = found.switches
     assert (switch.name, switch.alias) == ("a_b-a_b~sw_1", "sw 1")
-    assert found.elements[0].name == "line.l_1"
+    assert found.elements[0].name == "line.l 1"
     assert found.elements[0].nodes == (("a_b~sw_1", "A"),)
     assert found.load_parts[0].name == "load.a b"
 

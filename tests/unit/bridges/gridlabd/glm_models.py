@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gridpeers.bridges.gridlabd.glm_elements import letters_of
-from gridpeers.bridges.gridlabd.glm_text import GlmText
+from gridpeers.bridges.gridlabd.glm_elements import voltages_of
 from gridpeers.bridges.gridlabd.gridlabd_process import solved_model
-from gridpeers.bridges.gridlabd.read_glm import read_glm, voltage_of
+from gridpeers.bridges.gridlabd.read_glm import read_glm
 from gridpeers.plant.network import Network, solve_power_flow
 
 TOLERANCE = 1e-6
@@ -143,11 +142,8 @@ def write(folder: Path, text: str, name: str = "feeder.glm") -> Path:
 
 def gridlabd_voltages(path: Path) -> dict[tuple[str, str], complex]:
     """Voltage (V) of each node as GridLAB-D has it; A and B are the legs of a split-phase service."""
-    return {
-        (bus["name"], letter): voltage_of(bus, letter)
-        for bus in solved_model(path, GlmText(path))["buses"]
-        for letter in letters_of(bus["phases"])
-    }
+    buses = solved_model(path)["buses"]
+    return {(bus["name"], letter): V for bus in buses for letter, V in voltages_of(bus).items()}
 
 
 def largest_difference(path: Path, leave_out: tuple[str, ...] = ()) -> tuple[float, int]:

@@ -6,11 +6,12 @@ import signal
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 
 from gridpeers.bridges.opendss import dss_process, read_opendss
-from gridpeers.bridges.opendss.dss_circuit import ImportRequest
+from gridpeers.plant.request_process import RequestProcess
 from gridpeers.plant.tables.read import FeederError
 from tests.command_line import invoke
 from tests.unit.bridges.opendss.opendss_solutions import LINE, STEP_DOWN, write
@@ -58,11 +59,13 @@ def test_a_crash_of_the_engine_is_one_line(tmp_path: Path, package: Path) -> Non
     path.write_text("Clear\nRedirect lines.dss\n")
     (tmp_path / "lines.dss").write_text("New Line.good\nNew Line.boom\n")
 
-    assert problem(path).startswith("lines.dss:2: the OpenDSS engine itself crashes (SIGSEGV); change this, or take it")
+    assert problem(path).startswith(
+        "lines.dss:2: the OpenDSS engine itself crashes (its process was killed by SIGSEGV)"
+    )
     assert problem(path).endswith(": New Line.boom")
     code, text = invoke("feeder", "import", str(path))
     assert (code, text.count("\n")) == (2, 1)
-    assert "lines.dss:2: the OpenDSS engine itself crashes (SIGSEGV)" in text
+    assert "lines.dss:2: the OpenDSS engine itself crashes" in text
     (tmp_path / "lines.dss").write_text("New Line.good\n")
     assert "makes no circuit" in problem(path)
 
@@ -86,18 +89,27 @@ def test_a_damaged_wheel_is_one_line(tmp_path: Path, package: Path, damage: str,
     assert text.endswith("pip install --force-reinstall dss-python dss-python-backend")
 
 
-def test_an_import_that_is_interrupted_leaves_no_process_and_no_wrong_answer(tmp_path: Path) -> None:
+def engine() -> tuple[Path, Path]:
+    """Files that tell whether the engine's process, and its folder, are there."""
+    process = Path(f"/proc/{dss_process._processes[os.getpid()][0].pid}")  # noqa: SLF001
+    return process, (process / "cwd").readlink()
+
+
+def test_an_import_that_is_interrupted_leaves_no_process_and_no_wrong_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """After an error while the engine reads, its process and folder are gone, and the next import is its own."""
     pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
-    path = write(tmp_path, LINE, STEP_DOWN)
+    read_opendss(write(tmp_path, LINE, STEP_DOWN))
+    process, folder = engine()
 
-    with pytest.raises(KeyboardInterrupt), dss_process.reading(ImportRequest(path, None, (), ())) as engine:  # noqa: PT012
-        folder = Path(f"/proc/{engine.pid}/cwd").readlink()
-        raise KeyboardInterrupt
+    with monkeypatch.context() as interrupted, pytest.raises(KeyboardInterrupt):  # noqa: PT012
+        interrupted.setattr(RequestProcess, "answer", Mock(side_effect=KeyboardInterrupt))
+        read_opendss(write(tmp_path, LINE, STEP_DOWN))
 
     assert not folder.exists()
-    assert not Path(f"/proc/{engine.pid}").exists()
-    assert read_opendss(write(tmp_path, LINE)).name == "test"
+    assert not process.exists()
+    assert len(read_opendss(write(tmp_path, LINE)).buses) == 3
 
 
 def test_a_killed_engine_is_told_and_started_again(tmp_path: Path) -> None:
@@ -105,9 +117,7 @@ def test_a_killed_engine_is_told_and_started_again(tmp_path: Path) -> None:
     pytest.importorskip("dss", reason="the import of .dss files needs the extra opendss")
     path = write(tmp_path, LINE)
     read_opendss(path)
-    with dss_process.reading(ImportRequest(path, None, (), ())) as engine:
-        engine.circuit(path)
-        os.kill(engine.pid, signal.SIGKILL)
+    os.kill(int(engine()[0].name), signal.SIGKILL)
 
     with pytest.raises(FeederError, match="its process was killed by SIGKILL"):
         read_opendss(path)
@@ -123,15 +133,10 @@ def test_a_full_disk_is_not_a_crash_of_the_engine(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (1024, before[1]))
     try:
         text = problem(path)
-        with dss_process.reading(ImportRequest(path, None, (), ())) as engine:
-            folder = Path(f"/proc/{engine.pid}/cwd").readlink()
-            with pytest.raises(FeederError):
-                engine.circuit(path)
-            assert list(folder.iterdir()) == []
+        assert list(engine()[1].iterdir()) == []
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
         dss_process.close_engine()
 
     assert text.startswith(f"{path.name}: what the OpenDSS engine reads cannot be written in {tempfile.gettempdir()} (")
     assert "File too large" in text
-    assert read_opendss(path).name == "test"
