@@ -1,7 +1,7 @@
 """Child processes: start them with a configuration on standard input, watch them, and always end them.
 
-Each child is its own process group, so Ctrl-C reaches the parent only, which then ends them in order. If the parent
-dies without a chance to do that, their standard input ends, and they leave (`gridpeers.wire.driver.process`).
+Each child is its own process group, so Ctrl-C reaches the parent alone. If that dies, their standard input ends, and
+they leave (`gridpeers.wire.driver.process`).
 """
 
 from __future__ import annotations
@@ -24,16 +24,12 @@ from gridpeers.wire.messages import PLANT
 LAST_LINES = 12
 
 GRACE = 2.0
-"""Time (s) that processes have to leave after SIGTERM."""
+"""Time (s) that processes have to leave after SIGTERM, the plant first."""
 
 _FAULTS = {-signal.SIGSEGV, -signal.SIGBUS, -signal.SIGABRT, -signal.SIGFPE, -signal.SIGILL}
-"""Exit statuses of processes that faults of their own code ended; other signals come from outside."""
+"""Exit statuses of faults in a process's own code; other signals come from outside."""
 
 _IN_ORDER = {IN_ORDER + status: status for status in (OK, BAD_CONFIG, BROKE)}
-"""By exit status of a process that ended in order, what it means."""
-
-HEAD_START = 2.0
-"""Longest time (s) for which a plant that is asked to leave is waited for before the agents are asked, too."""
 
 
 class Child:
@@ -93,16 +89,15 @@ class Child:
 
     @property
     def crashed(self) -> bool:
-        """Whether its own code ended it, as a law whose C code has a segmentation fault, or calls exit()."""
+        """True if its own code ended it, as a law whose C code has a segmentation fault, or calls exit()."""
         status = self._process.poll()
         return status is not None and status not in _IN_ORDER and (status >= 0 or status in _FAULTS)
 
     def signal(self, number: int) -> None:
-        """Send a signal, unless it has ended."""
         self._process.send_signal(number)
 
     def join(self, until: float) -> bool:
-        """Wait for its end until a time (s, monotonic); return whether it has ended."""
+        """Wait for its end until a time (s, monotonic); return False if it still runs."""
         self._watcher.join(max(0.0, until - monotonic()))
         return not self._watcher.is_alive()
 
@@ -115,7 +110,6 @@ class Child:
 
     @property
     def end(self) -> str:
-        """How it ended, in words."""
         status = self.status
         if status is None:
             return "still runs"
@@ -135,7 +129,6 @@ class Children:
         self._children: list[Child] = []
 
     def __getitem__(self, name: str) -> Child:
-        """Return the latest child of a name."""
         for child in reversed(self._children):
             if child.name == name:
                 return child
@@ -144,12 +137,11 @@ class Children:
     def __iter__(self) -> Iterator[Child]:
         return iter(self._children)
 
-    def lives(self, name: str) -> tuple[Child, ...]:
+    def lives(self, name: str) -> list[Child]:
         """Return all children of a name, the latest last."""
-        return tuple(child for child in self._children if child.name == name)
+        return [child for child in self._children if child.name == name]
 
     def add(self, child: Child) -> None:
-        """Add a child; former ones of its name stay too, until all are ended."""
         self._children.append(child)
 
     def running(self) -> list[Child]:
@@ -164,16 +156,13 @@ class Children:
         """End all: ask, wait a short while, then kill. By process id, never by name."""
         try:
             # The plant first, and gone: an agent that is asked while its plant is there leaves the network.
-            plants = [child for child in self.running() if child.name == PLANT]
-            for child in plants:
-                child.signal(signal.SIGTERM)
-            gone_by = monotonic() + HEAD_START
-            for child in plants:
-                child.join(gone_by)
-            for child in self.running():
-                if child not in plants:
+            for of_plant in (True, False):
+                asked = [child for child in self.running() if (child.name == PLANT) == of_plant]
+                for child in asked:
                     child.signal(signal.SIGTERM)
-            self.wait(GRACE)
+                until = monotonic() + GRACE
+                for child in asked:
+                    child.join(until)
         finally:  # a second Ctrl-C shortens the wait and nothing else
             for child in self.running():
                 child.signal(signal.SIGKILL)

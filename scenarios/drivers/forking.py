@@ -12,17 +12,15 @@ import socket
 import subprocess
 import sys
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from types import MappingProxyType, TracebackType
 from typing import IO, Any
 
 _SET_CHILD_SUBREAPER = 36
 """Option of `prctl(2)`: orphans below this process become its children."""
 
 AVAILABLE = sys.platform == "linux"
-"""Whether this system has what forking needs; elsewhere every process is started anew."""
-
+"""True where forking works; elsewhere every process is started anew."""
 
 PATIENCE = 15.0
 """Longest wait (s) for a new process: the plant's server imports for 1 s, but where its step is cached for another
@@ -36,16 +34,16 @@ class ForkServerError(RuntimeError):
 class ForkServer:
     """Fork processes of this one, from a server that has imported modules, or called the functions `module:function`.
 
-    What it has forked goes on when it is closed, and has its environment too. ForkServerError if this process cannot
-    become the parent of what the server forks.
+    What it has forked goes on when it is closed. ForkServerError if this process cannot become a parent of forked ones.
     """
 
-    def __init__(self, preload: Sequence[str], environment: Mapping[str, str] = MappingProxyType({})) -> None:
+    def __init__(self, preload: Sequence[str]) -> None:
         libc = ctypes.CDLL(None, use_errno=True)
         if libc.prctl(_SET_CHILD_SUBREAPER, 1, 0, 0, 0):
             raise ForkServerError(f"this process cannot be a subreaper: {os.strerror(ctypes.get_errno())}")
         self._control, served = socket.socketpair()
         self._control.settimeout(PATIENCE)
+        one_thread = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}  # a server may have no other threads
         with served:
             self._server = subprocess.Popen(
                 [sys.executable, "-P", "-m", "gridpeers.wire.driver.fork_server", str(served.fileno()), *preload],
@@ -53,7 +51,7 @@ class ForkServer:
                 stderr=subprocess.DEVNULL,  # what cannot be imported is in the log of the process that is started anew
                 pass_fds=(served.fileno(),),
                 start_new_session=True,
-                env=os.environ | environment,
+                env=os.environ | one_thread,
             )
 
     @property
@@ -68,31 +66,30 @@ class ForkServer:
         reading, writing = os.pipe()
         spoken = os.pipe() if speaks else None
         output = log.fileno() if spoken is None else spoken[1]
+        answer: dict[str, Any] = {"error": "the fork server is gone"}
         try:
             socket.send_fds(self._control, [json.dumps(list(words)).encode()], [reading, output, log.fileno()])
-            answer = self._control.recv(4096)
+            if data := self._control.recv(4096):
+                answer = json.loads(data)
         except OSError as error:
             self.close()  # what it forks now, nobody would know of
-            answer = json.dumps({"error": str(error)}).encode()
+            answer = {"error": str(error)}
         finally:
             os.close(reading)
             if spoken is not None:
                 os.close(spoken[1])
-        told: dict[str, Any] = json.loads(answer) if answer else {"error": "the fork server is gone"}
-        if "pid" not in told:
+        if "pid" not in answer:
             os.close(writing)
             if spoken is not None:
                 os.close(spoken[0])
-            raise ForkServerError(told["error"])
+            raise ForkServerError(answer["error"])
         heard = None if spoken is None else os.fdopen(spoken[0], "rb")
-        return ForkedProcess(told["pid"], os.fdopen(writing, "wb"), heard)
+        return ForkedProcess(answer["pid"], os.fdopen(writing, "wb"), heard)
 
     def __enter__(self) -> ForkServer:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -136,43 +133,32 @@ _OF_AGENTS = (
     "gridpeers.agents.agent_process",
     "gridpeers.agents.laws.consensus",
 )
-"""Modules, and a function to call, that the fork server loads once for all agents."""
 
 _OF_PLANTS = (
     *("gridpeers.wire.driver.session:load_zenoh", "gridpeers.plant.plant_process"),
     *("gridpeers.plant.build", "gridpeers.plant.build:load_kernels"),
 )
-"""The same for plants. Agents have another server, because they do not load numpy."""
+"""Agents have another server, because they do not load numpy."""
 
 _OF_FIGURES = ("gridpeers.scenarios.results.plots.drawing_process",)
-"""The same for processes that draw."""
-
-_ONE_BLAS_THREAD = {"OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
-"""A server may have no other threads, and the plant uses one anyway."""
-
 
 _SET_BY_US = {"ZENOH_RUNTIME", "KMP_DUPLICATE_LIB_OK"}
 """Variables that loading Zenoh, and threadpoolctl, sets here as it does there."""
 
-
-_kept: dict[tuple[str, ...], tuple[tuple[int, Path, dict[str, str]], ForkServer]] = {}
+_kept: dict[tuple[str, ...], tuple[tuple[int, str, dict[str, str]], ForkServer]] = {}
 """By modules: what the server has inherited (owner, folder, variables; once it differs, another is needed), and it."""
 
 
 def agent_server(module: str = "gridpeers.agents", *, start: bool = True) -> ForkServer | None:
-    """Return the server that forks agents, and start it if it is worth it; None where there is none."""
-    preload = *_OF_AGENTS, module
-    return _kept_server(preload) if start or preload in _kept else None
+    return _server((*_OF_AGENTS, module), start=start)
 
 
 def plant_server() -> ForkServer | None:
-    """Return the server that forks plants, and start it if there is none; None where this system cannot fork so."""
-    return _kept_server(_OF_PLANTS, _ONE_BLAS_THREAD)
+    return _server(_OF_PLANTS, start=True)
 
 
 def figure_server(*, start: bool = True) -> ForkServer | None:
-    """Return the server that forks processes that draw; if there is none, start it if so wished, else return None."""
-    return _kept_server(_OF_FIGURES, _ONE_BLAS_THREAD) if start or _OF_FIGURES in _kept else None
+    return _server(_OF_FIGURES, start=start)
 
 
 def prepare() -> None:
@@ -182,38 +168,31 @@ def prepare() -> None:
 
 
 def release() -> None:
-    """End the servers: for a process that goes on for long and starts few others from now on."""
-    _close_all(os.getpid())
+    """End the servers of this process: it goes on for long and starts few others from now on, or it ends."""
+    for preload, ((owner, *_), server) in list(_kept.items()):
+        if owner == os.getpid():  # else it is the server of the process that has forked this one
+            del _kept[preload]
+            server.close()
 
 
-def _kept_server(preload: tuple[str, ...], environment: Mapping[str, str] = MappingProxyType({})) -> ForkServer | None:
-    """Return the server with these modules, and start it if there is none; parameters are those of `ForkServer`."""
-    if not AVAILABLE:
+def _server(preload: tuple[str, ...], *, start: bool) -> ForkServer | None:
+    """Return the server with these modules, started if so wished; None if there is none, or this system cannot fork."""
+    if not AVAILABLE or not (start or preload in _kept):
         return None
     variables = {name: value for name, value in os.environ.items() if name not in _SET_BY_US}
     try:
-        surroundings = os.getpid(), Path.cwd(), variables
-    except OSError:  # the working directory has been deleted
+        surroundings = os.getpid(), str(Path.cwd()), variables
+        if preload in _kept:
+            before, server = _kept.pop(preload)
+            if before == surroundings and server.lives:
+                _kept[preload] = before, server
+                return server
+            if before[0] == os.getpid():
+                server.close()
+        server = ForkServer(preload)
+    except (ForkServerError, OSError):  # among others, the working directory has been deleted
         return None
-    if preload in _kept:
-        before, server = _kept[preload]
-        if before == surroundings and server.lives:
-            return server
-        del _kept[preload]
-        if before[0] == surroundings[0]:  # else it is the server of the process that has forked this one
-            server.close()
-    try:
-        server = ForkServer(preload, environment)
-    except (ForkServerError, OSError):
-        return None
-    if not _kept:
-        atexit.unregister(_close_all)
-        atexit.register(_close_all, os.getpid())
+    atexit.unregister(release)
+    atexit.register(release)
     _kept[preload] = surroundings, server
     return server
-
-
-def _close_all(owner: int) -> None:
-    """End all servers at the end of the process that owns them."""
-    while _kept and os.getpid() == owner:
-        _kept.popitem()[1][1].close()

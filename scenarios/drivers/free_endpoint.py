@@ -18,16 +18,13 @@ _OWN = range(20_000, 32_000)
 """Ports that no system gives to a process that asks for any (Linux begins at 32768). One of those would now and then go
 to the agents, which start with the plant: for listening, or as the near end of a call to the plant."""
 
-_TRIES = 100
-
 
 class ListenError(ValueError):
-    """Nobody can listen at an endpoint; the message gives the reason and the ways out."""
+    """Nobody can listen at an endpoint, e.g. because it is `in_use`; the message gives the reason and the ways out."""
 
     def __init__(self, text: str, *, in_use: bool = False) -> None:
         super().__init__(text)
         self.in_use = in_use
-        """Whether something listens there already."""
 
 
 class ZenohEndpoint(NamedTuple):
@@ -58,19 +55,21 @@ def local_endpoint(port: int) -> str:
 
 
 def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> str:
-    """Return an endpoint where a process of this host will be able to listen; port 0 becomes a free port.
-
-    ListenError, which names the option, if the port is in use, or the address is not one of this host.
-    """
+    """Return an endpoint where a process of this host will be able to listen, else ListenError; port 0 becomes free."""
     endpoint = parse_endpoint(text)
     if endpoint is None:
         raise ListenError(f'{option}: "{text}" is no endpoint; use e.g. tcp/127.0.0.1:7447, or port 0 for a free one')
     if not endpoint.connects:
         return text
-    ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_OWN, _TRIES)
+    ports = [endpoint.port] if endpoint.port else random.SystemRandom().sample(_OWN, 100)
+    family = socket.AF_INET6 if endpoint.host.startswith("[") else socket.AF_INET
     for port in ports:
         try:
-            _listen_for_a_moment(endpoint.host, port)
+            with socket.socket(family, socket.SOCK_STREAM) as trial:
+                # as the plant will listen: a port that only waits for the last packets of an earlier run is free
+                trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+                trial.bind((endpoint.host.strip("[]"), port))
+                trial.listen()
         except OSError as error:
             reason = error
             continue
@@ -80,15 +79,6 @@ def free_endpoint(text: str = "tcp/127.0.0.1:0", *, option: str = "listen") -> s
         f"{_way_out(endpoint.host, reason)}",
         in_use=reason.errno == errno.EADDRINUSE,
     )
-
-
-def _listen_for_a_moment(host: str, port: int) -> None:
-    family = socket.AF_INET6 if host.startswith("[") else socket.AF_INET
-    with socket.socket(family, socket.SOCK_STREAM) as trial:
-        # As the plant will listen: a port that only waits for the last packets of an earlier run is free.
-        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        trial.bind((host.strip("[]"), port))
-        trial.listen()
 
 
 def _way_out(host: str, error: OSError) -> str:

@@ -1,9 +1,8 @@
 """Driver without processes: plant and agents in one thread, with the same cores and so the same bytes as the processes.
 
-Where messages decide something, a bus delivers them in order: each is encoded and decoded, and discovery, roster and
-ticks are those of `LockstepAgent` and `LockstepPlant`. In all other runs `run_direct` takes the same decisions without
-messages, in a fraction of the time: each tick the plant measures, all agents decide, and the plant holds their
-set-points and advances.
+Where messages decide something, a bus delivers them in order, encoded and decoded. In all other runs `_run_direct`
+takes the same decisions without messages, in a fraction of the time: each tick the plant measures, all agents decide,
+and the plant holds their set-points and advances.
 """
 
 from __future__ import annotations
@@ -35,12 +34,12 @@ from gridpeers.wire.node import Action, Fetch, Listen, Log, Publish
 
 
 def messages_decide(plant: PlantConfig, agents: Sequence[AgentConfig]) -> bool:
-    """Return whether a message may miss its receiver: by an emulated link, or as an agent joins, leaves or dies."""
+    """Return True if a message may miss its receiver: by an emulated link, or as an agent joins, leaves or dies."""
     emulated = plant.links or any(config.links for config in agents)
     return bool(emulated or plant.schedule or {config.name for config in agents} != set(plant.agents))
 
 
-def run_direct(
+def _run_direct(
     config: PlantConfig,
     agents: Sequence[AgentConfig],
     laws: Sequence[Law],
@@ -48,7 +47,6 @@ def run_direct(
     on_telemetry: Callable[[Telemetry], None],
     on_other: Callable[[Other], None],
 ) -> DirectPlant:
-    """Run to the end from a plant at t = 0; return the plant's core."""
     core = DirectPlant(config, plant, on_telemetry, on_other)
     place = {name: i for i, name in enumerate(config.agents)}
     order = sorted(range(len(agents)), key=lambda i: place[agents[i].name])
@@ -61,8 +59,6 @@ def run_direct(
     return core
 
 
-SHOWN = 5
-
 COLLECTED = 20
 """Runs of this process after which it looks for garbage in all that it has: that takes 20 ms."""
 
@@ -72,10 +68,7 @@ _Node = LockstepPlant | LockstepAgent
 
 
 class InprocessBus:
-    """Deliver the messages of the nodes, in the order of publication.
-
-    `newcomer` makes the core of an agent that the plant awaits while the run goes on.
-    """
+    """Deliver the messages of the nodes, in the order of publication; `newcomer` makes an agent that joins."""
 
     def __init__(
         self,
@@ -116,24 +109,23 @@ class InprocessBus:
                 self._agents.append(self._newcomer(name))
                 self._start(self._agents[-1])
             if not (plant.finished or plant.work(0.0) or self._queue):
-                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:SHOWN])
+                missing = "; ".join(f"{what} from {who}" for what, who in plant.missing_messages()[:5])
                 raise AssertionError(f"stalled in phase {plant.phase} at tick {plant.tick} without {missing}")
         self._do(plant, plant.take_actions())
 
     def _start(self, agent: LockstepAgent) -> None:
         """Start an agent: it and the plant see each other, and it is introduced to all agents at once."""
         agent.start(0.0)
-        name = agent.token
+        keys = self._plant.keys
         for key in agent.subscriptions:
             self._subscribers[key].append(agent)
         nameplate, answer = agent.nameplate
         self._nameplates[nameplate] = answer
-        _, _, inverter, instance = self._plant.keys.parts(name)
-        keys = self._plant.keys
+        _, _, inverter, instance = keys.parts(agent.token)
         for key in (keys.state(inverter), keys.ready(inverter), keys.report(inverter), keys.journal(inverter)):
             if self._plant not in self._subscribers[key]:
                 self._subscribers[key].append(self._plant)
-        self._plant.appeared(name, 0.0)
+        self._plant.appeared(agent.token, 0.0)
         self._do(self._plant, self._plant.take_actions())
         agent.appeared(self._plant.token, 0.0)
         introduced = decode(answer)
@@ -186,9 +178,8 @@ def run_inprocess(
 ) -> Outcome:
     """Run a scenario in this process and this thread; agents start in their order, those that join later included.
 
-    The first telemetry is that of t = 0. A given `plant` is used instead of building the configuration's. With
-    `messages`, plant and agents exchange them even where these decide nothing. A plant without solution is an outcome;
-    a bad feeder or name is an exception, before the start.
+    A given `plant` is used instead of building the configuration's. With `messages`, plant and agents exchange them
+    even where these decide nothing. A plant without solution is an outcome, a bad feeder or name an exception.
     """
     began = perf_counter()
     started = began
@@ -210,9 +201,15 @@ def run_inprocess(
             try:
                 plant = start_plant(plant_config)
             except RuntimeError as error:
-                why = f"plant: cannot start: {error}"
-                spent = perf_counter() - began
-                return Outcome(broke=why, reproducible=False, events=(), notes=(), ticks=0, start_s=spent, run_s=0.0)
+                return Outcome(
+                    broke=f"plant: cannot start: {error}",
+                    reproducible=False,
+                    events=(),
+                    notes=(),
+                    ticks=0,
+                    start_s=perf_counter() - began,
+                    run_s=0.0,
+                )
             stack.callback(plant.close)
         stack.callback(close_laws, laws)
         stack.enter_context(_all_so_far_stays())
@@ -224,7 +221,7 @@ def run_inprocess(
         else:
             for config in known.values():  # one by one: those that are made are closed if the next cannot be
                 laws.append(make_law(config.control))
-            side = run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
+            side = _run_direct(plant_config, tuple(known.values()), laws, plant, note, on_other)
     failed = tuple(agent.failed for agent in agents if agent.failed)
     rejects = (*side.rejects.take_lines(), *(line for agent in agents for line in agent.rejects.take_lines()))
     for node in (side, *agents):
@@ -242,9 +239,9 @@ def run_inprocess(
 
 @contextmanager
 def _all_so_far_stays() -> Iterator[None]:
-    """Let garbage collection skip what is there by now: with 999 agents, to look at it took 7 % of the time.
+    """Let garbage collection skip what is there by now: 7 % of the time of 999 agents.
 
-    Python would never look at it again if one run follows another, so every `COLLECTED` runs all is looked at.
+    Every `COLLECTED`th run it looks at all.
     """
     if gc.get_freeze_count():  # a process whose memory others share, or a run beside this one
         yield

@@ -54,12 +54,12 @@ def run_processes(
 ) -> Outcome:
     """Run a scenario with a plant process and processes of agents, in simulated or in real time.
 
-    In real time the plant ends the run after end / speed, the death of an agent is only an event, and the scenario's
-    kills and pauses are real signals. Agents that join, or join again, start when the plant awaits them. The plant
-    listens at its `listen`, or at a free port, and the agents' `connect` is filled in. `on_start` is called once all
-    processes are started, in the `start_order`, the plant first unless said otherwise. `shared` is the number of
-    processes that agents share, 0 for one each. `star` lets all processes link to the plant alone in simulated time
-    (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use or Zenoh is missing.
+    In real time the death of an agent is only an event, and the scenario's kills and pauses are real signals. Agents
+    that join start when the plant awaits them. The plant listens at its `listen`, or at a free port, and the agents'
+    `connect` is filled in. `on_start` is called once all processes are started, in the `start_order`. `shared` is the
+    number of processes that agents share, 0 for one each. `star` lets all processes link to the plant alone in
+    simulated time (docs/protocol.md). ListenError or SessionError, with nothing started, if the port is in use or Zenoh
+    is missing.
     """
     agents = {config.name: config for config in agent_configs}
     wall = plant_config.clock == "wall"
@@ -120,17 +120,14 @@ class _ProcessDriver:
         self._notes: dict[str, str] = {}
 
     def on_exit(self, child: Child) -> None:
-        """Note that a process has ended; from any thread."""
         self.client.say(str(child.pid))
 
     def on_word(self, word: str) -> None:
-        """Note a word of the starting plant; from any thread."""
         if word == READY:
             self.client.say(READY)
 
     @property
     def patience(self) -> float:
-        """Time (s) that processes have to leave by themselves once the run has ended."""
         return AFTERMATH if self._broke else LEAVING
 
     def run(self, supervisor: Supervisor) -> None:
@@ -190,7 +187,6 @@ class _ProcessDriver:
         # else it was asked to leave, perhaps by a Stop that is faster than its telemetry, or the scenario killed it
 
     def _end(self, reason: str) -> None:
-        """Note the end of the run; without a reason it is a good one."""
         self._broke, self._ended, self._ended_at = reason, True, monotonic()
 
     @property
@@ -198,7 +194,7 @@ class _ProcessDriver:
         return "before t = 0" if self.client.latest is None else f"after t = {self.client.t:g} s"
 
     def note_failures(self, supervisor: Supervisor) -> None:
-        """Note every agent that failed, or has not ended though the run has; one that crashed before its end breaks it.
+        """Note every agent that failed, or has not ended; one that crashed before the end of the run breaks it.
 
         In simulated time a run may reach its end before the exit of a process is noticed.
         """

@@ -26,21 +26,17 @@ def secured(
     `inverters`. KeysError has every problem of a certificate, a line each.
     """
     every = tuple(inverters)
-    problems: list[str] = []
-    notes: list[str] = []
-    secured_agents = []
     credentials, note = open_credentials(folder, ("plant",))
-    notes.append(note)
+    problems, notes = [], [note]
+    secured_agents = []
     for agent in agents:
-        if agent.name not in started:
-            secured_agents.append(replace(agent, inverters=every))
-            continue
-        try:
-            own, note = open_credentials(folder, ("agent",), agent.name)
-        except KeysError as error:
-            problems.append(str(error))
-            continue
-        notes.append(note)
+        own = None
+        if agent.name in started:
+            try:
+                own, note = open_credentials(folder, ("agent",), agent.name)
+                notes.append(note)
+            except KeysError as error:
+                problems.append(str(error))
         secured_agents.append(replace(agent, inverters=every, credentials=own))
     if problems:
         raise KeysError("\n".join(problems))

@@ -33,11 +33,13 @@ def process_faults(nodes: Iterable[NodeFault]) -> list[ProcessFault]:
     """Return the signals of entries `[[node]]` in the order of time; their other faults are emulated."""
     faults = []
     for node in nodes:
-        if node.kill:
-            faults.append(ProcessFault(node.from_s, node.name, signal.SIGKILL))
+        end = math.inf if node.to_s is None else node.to_s
+        faults += [ProcessFault(node.from_s, node.name, signal.SIGKILL)] if node.kill else []
         if node.pause:
-            faults.append(ProcessFault(node.from_s, node.name, signal.SIGSTOP))
-            faults.append(ProcessFault(math.inf if node.to_s is None else node.to_s, node.name, signal.SIGCONT))
+            faults += [
+                ProcessFault(node.from_s, node.name, signal.SIGSTOP),
+                ProcessFault(end, node.name, signal.SIGCONT),
+            ]
     return sorted(faults)
 
 
@@ -72,10 +74,9 @@ class FaultInjector:
         while self._due and self.wait == 0.0:
             fault = self._due.pop(0)
             try:
-                child = children[fault.name]
+                children[fault.name].signal(fault.number)
             except KeyError:  # its agent has not joined yet
                 continue
-            child.signal(fault.number)
             if fault.number is signal.SIGKILL:
                 self.killed.add(fault.name)
             (self._paused.add if fault.number is signal.SIGSTOP else self._paused.discard)(fault.name)
@@ -91,9 +92,9 @@ class FaultInjector:
 class Supervisor:
     """Start the plant and its agents, inject the process faults of the scenario, and end every process.
 
-    Use it as a context: leaving it ends all processes. One thread owns it; `on_exit`, and `on_word` with the words of
-    the starting plant, are called from others. The second life of inv1 logs to `inv1-2.log`. Agents share `shared`
-    processes, 0 gives each its own; one that the scenario starts, stops, kills or pauses has its own in any case.
+    Leaving its context ends all processes. `on_exit`, and `on_word` with the words of the starting plant, are called
+    from other threads. The second life of inv1 logs to `inv1-2.log`. Agents share `shared` processes, 0 gives each its
+    own; one that the scenario starts, stops, kills or pauses has its own in any case.
     """
 
     def __init__(
@@ -126,10 +127,10 @@ class Supervisor:
             self.children.end()
 
     def start(self, *names: str) -> None:
-        """Start processes: the plant as "plant", agents by the name of their inverter, each in its next life.
+        """Start processes, "plant" and names of inverters, each in its next life.
 
-        Agents that share a process start with the first of them. The plant and the agents are forked from processes
-        that have imported what they need. If the plant is the first, the agents do not wait until its server is there.
+        Agents that share a process start with the first of them. If the plant is the first, the agents do not wait
+        until its server is there.
         """
         firsts = [name for name in names if name == self._mates(name)[0]]
         several = len(firsts) > 2  # else a server would take as long as the process itself
@@ -146,7 +147,6 @@ class Supervisor:
                 self.children.add(plant.result())
 
     def _child(self, name: str, *, several: bool) -> Child:
-        """Start the next life of a name, one of several or alone."""
         life = len(self.children.lives(name)) + 1
         log = self._log_dir / (f"{name}.log" if life == 1 else f"{name}-{life}.log")
         if name == PLANT:
@@ -176,7 +176,7 @@ class Supervisor:
         self.faults.inject(self.children)
 
     def failed(self, child: Child) -> bool:
-        """Whether a process has ended, or still runs, though neither the scenario nor a request explains it."""
+        """True if neither the scenario nor a request explains that a process has ended, or still runs."""
         return (child.status != 0 or child.crashed) and child.name not in self.faults.killed
 
 

@@ -26,10 +26,7 @@ LOOK = 0.5
 
 
 def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
-    """Return a plant with the recorder of its driver.
-
-    With `waits` it waits for the recorder even if it waits for no agent, as in a live run that is recorded.
-    """
+    """Return a plant with the recorder of its driver; with `waits` it waits for that even if it waits for no agent."""
     wait = max(RECORDER_WAIT, config.wait_for_agents) if waits else config.wait_for_agents
     return replace(config, recorders=(RECORDER,), wait_for_agents=wait)
 
@@ -37,9 +34,8 @@ def with_recorder(config: PlantConfig, *, waits: bool = False) -> PlantConfig:
 class TelemetryClient:
     """Pass on each message that the plant publishes for recorders, in its order, and keep the state of the run.
 
-    It asks again for missing messages, e.g. after this process stood still for longer than Zenoh's lease, and opens a
-    new session when the old one brings nothing any more. In simulated time the plant waits for its acknowledgements.
-    The plant waits for a recorder of its name before the start.
+    It asks again for missing messages, and opens a new session when the old one brings nothing any more. The plant
+    waits for a recorder of its name before the start, and in simulated time for its acknowledgements.
     """
 
     def __init__(
@@ -55,7 +51,6 @@ class TelemetryClient:
         self._name, self._endpoint, self._clock, self._on_message = name, endpoint, clock, on_message
         self.latest: Telemetry | None = None
         self.pacing: Pacing | None = None
-        """How well the plant has kept pace so far, in wall-clock time."""
         self.message_at = monotonic()
         """Time of the last message, of any kind, or answer (s, monotonic)."""
         self.progress: tuple[float, float] | None = None
@@ -95,7 +90,11 @@ class TelemetryClient:
                 self.message_at = monotonic()
                 self._core.received(key, payload, self.message_at)
                 for message in self._core.take():
-                    self._pass_on(message)
+                    if isinstance(message, Telemetry):
+                        self.latest, self.pacing = message, message.pacing or self.pacing
+                        if message.rows and not message.final:
+                            self.progress = message.t, self.message_at
+                    self._on_message(message)
         for loss in self.inbox.take_losses():
             self._core.lost(loss, monotonic())
         if not self._closed:
@@ -107,28 +106,21 @@ class TelemetryClient:
                 self._session.publish(self._core.keys.request, question)
         return words
 
-    def _pass_on(self, message: Recordable) -> None:
-        if isinstance(message, Telemetry):
-            self.latest, self.pacing = message, message.pacing or self.pacing
-            if message.rows and not message.final:
-                self.progress = message.t, self.message_at
-        self._on_message(message)
-
     def note_crash(self, agent: str, end: str) -> None:
         """Pass on that the process of an agent crashed, as an event of its law, with how it ended in words."""
         if self.latest is not None and not self.ended:
             event = PlantEvent(t=self.t, kind="law", subject=agent, text=f"{agent}: its process {end}")
             self._on_message(replace(self.latest, rows=(), events=(event,), awaited=(), quiet=(), others=0))
 
-    def close(self) -> None:
-        """Close the session, and with it the token: the plant knows then that the last telemetry is here."""
-        self._closed = True
-        self._session.close()
-
     def renew_session(self) -> None:
         """Go on with a new session: the plant publishes again what the old one had on its way."""
         self._session.close()
         self._session = self._open()
+
+    def close(self) -> None:
+        """Close the session, and with it the token: the plant knows then that the last telemetry is here."""
+        self._closed = True
+        self._session.close()
 
     def _open(self) -> Session:
         keys = self._core.keys

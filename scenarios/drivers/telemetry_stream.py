@@ -1,9 +1,8 @@
 """The plant's messages for a recorder, in order and without gaps; when to ask for missing ones again. Pure.
 
 A recorder that stands still for longer than Zenoh's lease loses its link, and with it messages on the way. The plant
-keeps its latest messages (`gridpeers.plant.realtime.recorder_feed`) and publishes them again when asked by a
-`Command`. In simulated time the same question acknowledges all before its number
-(`gridpeers.plant.telemetry_reporter`): it is sent after each Telemetry, and again and again until the next.
+publishes its latest messages again when asked by a `Command` (`gridpeers.plant.realtime.recorder_feed`). In simulated
+time the same question acknowledges all before its number (`gridpeers.plant.telemetry_reporter`).
 """
 
 from __future__ import annotations
@@ -31,9 +30,9 @@ Recordable = Telemetry | LinkReport | Journal | LinkRequest
 
 
 class TelemetryStream:
-    """Let messages through in the order in which the plant published them, each once.
+    """Let messages through in the order in which the plant published them, each once; in simulated time, acknowledge.
 
-    In simulated time it acknowledges. `lost` says that messages are lost, as the plant did not have them any more.
+    `lost` becomes True once messages are lost, as the plant did not have them any more.
     """
 
     def __init__(self, *, acknowledges: bool = False) -> None:
@@ -94,7 +93,7 @@ class TelemetryStream:
         return str(self._next)
 
     def is_astray(self, now: float) -> bool:
-        """Return whether a new session is to be opened now, as questions have had no answer for long."""
+        """Return True if a new session is to be opened now, as questions have had no answer for long."""
         since = self._heard_at if self.acknowledges else self._gap_since
         if since is None or now - max(since, self._opened_at) < self._patience:
             return False
@@ -117,12 +116,11 @@ class TelemetryEndpoint(PlantFollower):
 
     @property
     def finished(self) -> bool:
-        """Whether nothing more is taken: never, as messages before the end of the session are recorded too."""
+        """False: messages before the end of the session are recorded too."""
         return False
 
     @property
     def subscriptions(self) -> tuple[str, ...]:
-        """Keys to subscribe to before the token is declared."""
         return tuple(self.routes)
 
     def appeared(self, key: str) -> None:
@@ -131,19 +129,13 @@ class TelemetryEndpoint(PlantFollower):
                 self._plant_appeared(part)
 
     def vanished(self, key: str) -> None:
-        """Note that a token is gone, but for that of the plant that it follows.
-
-        A link that breaks takes the token away from a plant that goes on. All others make room for new ones.
-        """
+        """Note that a token is gone, but for the followed plant's: a broken link takes it from a plant that goes on."""
         match self.keys.parts(key):
             case ("alive", "plant", part) if epoch_of(part) != self.admission.epochs.get(PLANT):
                 self._plant_vanished(part)
 
     def is_known(self, key: str, payload: bytes) -> bool:
-        """Whether a message looks like one of the plant; in simulated time whatever comes for recorders counts as such.
-
-        There the plant passes on what agents say, and goes as fast as the recorder reads.
-        """
+        """Return True for what looks like a message of the plant; in simulated time that is all for recorders."""
         return (self._stream.acknowledges and key == self.keys.telemetry) or super().is_known(key, payload)
 
     def take(self) -> list[Recordable]:
@@ -156,23 +148,11 @@ class TelemetryEndpoint(PlantFollower):
         if number is None:
             return None
         self._questions += 1
-        name = self._name
-        return encode(
-            Command(
-                sender=name,
-                epoch=1,
-                seq=self._questions,
-                t=0.0,
-                verb="telemetry",
-                argument=number,
-                reply_to=name,
-            )
-        )
+        name, seq = self._name, self._questions
+        return encode(Command(sender=name, epoch=1, seq=seq, t=0.0, verb="telemetry", argument=number, reply_to=name))
 
     def _admit(self, route: Route, message: AnyMessage, now: float) -> None:
-        if not isinstance(
-            message, LinkReport | Journal
-        ):  # the plant passes them on as they are, once it has checked them
+        if not isinstance(message, LinkReport | Journal):  # the plant has checked them
             super()._admit(route, message, now)
 
     def _on_recordable(self, message: Recordable, payload: bytes, now: float) -> None:
